@@ -177,13 +177,7 @@ def _write_line(content: dict[str, Any]) -> None:
 
 
 def _finish(result: "BatchResult", out: Path, *, quiet: bool) -> None:
-    """Print the summary.
-
-    Raises
-    ------
-    DataError
-        An output has failed.
-    """
+    """Print the summary."""
     if not quiet:
         for warning in result.warnings[:MAX_WARNINGS]:
             write_message(f"tts2face: warning: {warning}")

@@ -169,13 +169,7 @@ def _prune_store(store: str, database: str | None, outputs: tuple[Path, ...], da
 
 
 def _existing(database: str) -> str:
-    """A database that exists: control never creates one.
-
-    Raises
-    ------
-    InputError
-        There is no such SQLite file.
-    """
+    """A database that exists: control never creates one."""
     path = Path(database.removeprefix("sqlite:///"))
     if "://" not in str(database).removeprefix("sqlite:///") and not path.is_file():
         raise InputError(f"there is no database {path}; give --database as for `tts2face batch`")

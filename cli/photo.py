@@ -39,17 +39,7 @@ Smile = Annotated[
 def face_of_photo(
     photo: str, consent: str | None, *, fit: Path | None = None, smile: str | None = None, quiet: bool
 ) -> str:
-    """Path of the face of a photo, which is made and kept with the consent if it is not there yet.
-
-    Raises
-    ------
-    InputError
-        There is no such photo or face, or no consent.
-    DataError
-        The picture shows no face that can be moved, the fit is not that of the picture, or the smile shows no teeth.
-    BackendError
-        The landmark model or a package is not installed.
-    """
+    """Path of the face of a photo, which is made and kept with the consent if it is not there yet."""
     from tts2face.photo.face_from_photo import find_kept, keep_face, kept_path
 
     kept = kept_path(photo, fit, smile)
@@ -68,13 +58,7 @@ def make_face(photo: str, consent: str | None, *, name: str | None = None, quiet
 
 @functools.cache  # asked for once, also where the command is run again with the landmark model
 def agreed(photo: str, consent: str | None, name: str | None) -> str | None:
-    """The consent of the person in a photo, given or asked for.
-
-    Raises
-    ------
-    InputError
-        There is no such photo, or no consent.
-    """
+    """The consent of the person in a photo, given or asked for."""
     from tts2face.photo.photograph import split_number
 
     shown = name or split_number(photo)[0].stem
@@ -128,13 +112,7 @@ def is_missing_model(error: BackendError) -> bool:
 
 
 def sets_up_model(arguments: Sequence[str]) -> bool:
-    """Set up the landmark model that a command line lacks, if it has --yes or its user agrees; whether it is there now.
-
-    Raises
-    ------
-    BackendError
-        It cannot be downloaded.
-    """
+    """Set up the landmark model that a command line lacks, if it has --yes or its user agrees; whether it is there now."""
     from tts2face.video.setup_models import SOURCE, set_up_model
 
     options = arguments[: arguments.index(END_OF_OPTIONS)] if END_OF_OPTIONS in arguments else arguments

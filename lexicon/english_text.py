@@ -259,11 +259,6 @@ def homograph_segments(words: Sequence[str], places: Iterable[int]) -> dict[int,
         Words and punctuation marks of the sentence.
     places
         Indices of the words.
-
-    Raises
-    ------
-    BackendError, DataError
-        The tagger is missing or damaged.
     """
     found: dict[int, tuple[IpaPhone, ...]] = {}
     lower = [word.lower() for word in words]
@@ -329,11 +324,6 @@ def english_segments(texts: Sequence[str], marks: Sequence[str], own: Dictionary
         Words, and the punctuation after each.
     own
         The user's entries, which take precedence.
-
-    Raises
-    ------
-    BackendError
-        A word needs espeak-ng or the tagger, which are not installed.
     """
     spoken: list[tuple[IpaPhone, ...] | None] = []
     forms = _lookup_forms(texts)

@@ -150,15 +150,7 @@ def parse_espeak_word(written: str, language: str) -> tuple[IpaPhone, ...]:
 
 
 def segments_by_rules(words: Sequence[str], language: str) -> tuple[tuple[IpaPhone, ...], ...]:
-    """Phones of words by espeak-ng, each word by itself; empty for a word that it does not read.
-
-    Raises
-    ------
-    InputError
-        The language does not exist.
-    BackendError
-        espeak-ng is not installed.
-    """
+    """Phones of words by espeak-ng, each word by itself; empty for a word that it does not read."""
     return tuple(
         tuple(segment for part in written for segment in parse_espeak_word(part, language))
         for written in phonemize(words, language)
@@ -178,13 +170,7 @@ def has_kanji(text: str) -> bool:
 
 @functools.cache
 def load_reader() -> Any:
-    """The library that reads Chinese characters.
-
-    Raises
-    ------
-    BackendError
-        It is not installed.
-    """
+    """The library that reads Chinese characters."""
     os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")  # it imports onnxruntime, which would send telemetry
     try:
         import pyopenjtalk

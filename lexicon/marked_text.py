@@ -142,13 +142,7 @@ class MarkedTextBuilder:
         self._length += len(text)
 
     def add_mark(self, mark: Mark) -> None:
-        """Add a mark at the current position; pauses at one position are added up.
-
-        Raises
-        ------
-        InputError
-            Their sum is too long.
-        """
+        """Add a mark at the current position; pauses at one position are added up."""
         if isinstance(mark, PauseMark):
             index, earlier = self._last_pause
             if earlier is not None and earlier.at == mark.at:
@@ -176,13 +170,7 @@ class MarkedTextBuilder:
         )
 
     def open_voice(self, kind: str, shown: str, *, voice: str | None, language: str | None) -> None:
-        """Begin a span of another voice or language that `close` ends; None keeps the current one.
-
-        Raises
-        ------
-        InputError
-            Spans are nested too deep.
-        """
+        """Begin a span of another voice or language that `close` ends; None keeps the current one."""
         before = self._begin(kind, shown)
         self._start_run(
             replace(before, start=self._length, voice=voice or before.voice, language=language or before.language)

@@ -121,13 +121,7 @@ def _parse_row(line: str, where: str) -> Phone:
 
 
 def read_phones(text: str) -> dict[str, Phone]:
-    """Phones by symbol, from the text of `phones.tsv`.
-
-    Raises
-    ------
-    DataError
-        A line has the wrong number of cells or an unknown feature, a symbol occurs twice, or a part is missing.
-    """
+    """Phones by symbol, from the text of `phones.tsv`."""
     phones: dict[str, Phone] = {}
     for number, line in enumerate(text.splitlines()[1:], start=2):
         phone = _parse_row(line, f"phones.tsv, line {number}")
@@ -211,13 +205,7 @@ def arpabet_to_ipa(name: str) -> str:
 
 
 def ipa_to_arpabet(label: str, stress: int | None = None) -> str:
-    """ARPABET name of an English phone; a vowel carries its stress digit when `stress` is given.
-
-    Raises
-    ------
-    InputError
-        The label is unknown, ARPABET has no name for it, or stress is not 0, 1 or 2.
-    """
+    """ARPABET name of an English phone; a vowel carries its stress digit when `stress` is given."""
     phone = look_up_phone(label)
     if not phone.arpabet:
         raise InputError(f"ARPABET has no name for {label}; it covers English phones only")

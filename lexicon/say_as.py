@@ -45,11 +45,6 @@ def say_as(kind: str, text: str, written_format: str, language: str) -> str:
         ``interpret-as``: one of `KINDS`.
     written_format
         ``format``: of dates one of `DATE_FORMATS`, of times hms12 or hms24, of currencies a code such as USD; or empty.
-
-    Raises
-    ------
-    InputError
-        The kind does not exist, the text is not of this kind, or the language does not support it.
     """
     if kind not in KINDS:
         raise InputError(f"<say-as> has no kind {kind[:40]!r}; use {', '.join(KINDS)}")

@@ -42,11 +42,6 @@ def words_with_given_phones(written: str, phones: Sequence[PhoneMark], language:
     ----------
     phones
         Their places are characters of `written`; in order, none within another.
-
-    Raises
-    ------
-    InputError
-        A word with given phones belongs to a number, an address or the like, which is read as a whole.
     """
     names = _placeholders(written, len(phones))
     placeholder = re.compile(rf"{_placeholder_stem(written)}[a-z]+")

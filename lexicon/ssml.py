@@ -70,12 +70,6 @@ def parse_ssml(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:
     ----------
     language
         Language of the text, where no element sets another.
-
-    Raises
-    ------
-    InputError
-        It is not well-formed, has a document type, an element or attribute outside the subset, or a value out of range;
-        the message names it and its line.
     """
     reader = _SsmlReader(language)
     try:

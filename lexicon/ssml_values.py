@@ -32,13 +32,7 @@ def primary_subtag(tag: str) -> str:
 
 
 def check_lengths(element: str, attributes: Attributes) -> None:
-    """Refuse attributes longer than `MAX_ATTRIBUTE_CHARACTERS`.
-
-    Raises
-    ------
-    InputError
-        An attribute is longer; the message names it.
-    """
+    """Refuse attributes longer than `MAX_ATTRIBUTE_CHARACTERS`."""
     for name, value in attributes.items():
         if len(value) > MAX_ATTRIBUTE_CHARACTERS or len(name) > MAX_ATTRIBUTE_CHARACTERS:
             raise InputError(
@@ -48,13 +42,7 @@ def check_lengths(element: str, attributes: Attributes) -> None:
 
 
 def check_attributes(element: str, attributes: Attributes, *known: str) -> Attributes:
-    """The attributes, after a check that all of them are known.
-
-    Raises
-    ------
-    InputError
-        An attribute is unknown; the message names it.
-    """
+    """The attributes, after a check that all of them are known."""
     for name in attributes:
         if name not in known:
             raise InputError(f"<{element}> does not support the attribute {name[:40]!r}; use {', '.join(known)}")
@@ -62,13 +50,7 @@ def check_attributes(element: str, attributes: Attributes, *known: str) -> Attri
 
 
 def look_up_value(what: str, value: str, values: Mapping[str, float]) -> float:
-    """Value of a named setting.
-
-    Raises
-    ------
-    InputError
-        The name does not exist.
-    """
+    """Value of a named setting."""
     if value not in values:
         raise InputError(f"there is no {what} {value[:40]!r}; use {', '.join(values)}")
     return values[value]
@@ -111,13 +93,7 @@ PhonemeWord = tuple[str, tuple[IpaPhone, ...]]
 
 
 def phoneme_words(text: str, written: str, alphabet: str) -> list[PhonemeWord]:
-    """Words with their phones: word by word if the IPA has as many words as the text, else all phones as one word.
-
-    Raises
-    ------
-    InputError
-        The alphabet does not exist, or a phone does not belong to it.
-    """
+    """Words with their phones: word by word if the IPA has as many words as the text, else all phones as one word."""
     if alphabet not in ALPHABETS:
         raise InputError(f"<phoneme> does not support the alphabet {alphabet[:40]!r}; use {', '.join(ALPHABETS)}")
     if len(written) > MAX_PHONES_CHARACTERS:

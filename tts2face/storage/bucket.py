@@ -58,15 +58,7 @@ class Stored:
 
 
 class BucketStore:
-    """A folder of a bucket, or of a local folder by ``file://``; puts are atomic, and a file that was added stays.
-
-    Raises
-    ------
-    InputError
-        The URL is wrong, or contains credentials.
-    BackendError
-        The package obstore is missing.
-    """
+    """A folder of a bucket, or of a local folder by ``file://``; puts are atomic, and a file that was added stays."""
 
     def __init__(self, url: str, folder: str = "") -> None:
         try:

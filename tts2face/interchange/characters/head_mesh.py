@@ -154,13 +154,7 @@ class HeadMesh:
 
 
 def build_head_mesh(character: Character, mapping: ShapeMapping, yaw_deg: float) -> HeadMesh:
-    """Head of a character, turned by `yaw_deg` about the vertical axis so that it looks along z.
-
-    Raises
-    ------
-    DataError
-        No shape of the mapping moves the character.
-    """
+    """Head of a character, turned by `yaw_deg` about the vertical axis so that it looks along z."""
     angle = np.radians(yaw_deg)
     turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]).round(12)
     whole = _join(character, mapping, turn)
@@ -175,13 +169,7 @@ def build_head_mesh(character: Character, mapping: ShapeMapping, yaw_deg: float)
 
 
 def moved_box(head: HeadMesh) -> tuple[FloatArray, FloatArray]:
-    """Lowest and highest corner (3,) of the vertices that the shapes of the face move.
-
-    Raises
-    ------
-    DataError
-        No vertex is moved.
-    """
+    """Lowest and highest corner (3,) of the vertices that the shapes of the face move."""
     moved = np.zeros(len(head.vertices), bool)
     for shape in head.shapes.values():
         length = np.linalg.norm(shape, axis=1)

@@ -100,15 +100,7 @@ class ImportedFace:
 
 
 def read_character(path: Path) -> Character:
-    """Character of a .glb, .gltf or .vrm file, or of a folder of .obj files.
-
-    Raises
-    ------
-    InputError
-        The path does not exist or has another suffix.
-    DataError
-        A file is damaged, too large or not supported.
-    """
+    """Character of a .glb, .gltf or .vrm file, or of a folder of .obj files."""
     if path.is_dir():
         return read_obj_folder(path)
     if not path.exists():

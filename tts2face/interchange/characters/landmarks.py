@@ -63,13 +63,7 @@ class LocatedLandmarks:
 
 
 class CharacterViews:
-    """Rendered views of a face without teeth and tongue, with landmarks read in each; soft shadows are computed once.
-
-    Raises
-    ------
-    BackendError
-        The tracker is not installed.
-    """
+    """Rendered views of a face without teeth and tongue, with landmarks read in each; soft shadows are computed once."""
 
     def __init__(self, face: Face, model: Path | None = None) -> None:
         self.face = face
@@ -109,11 +103,6 @@ def locate_landmarks(views: CharacterViews) -> LocatedLandmarks:
 
     The skin is read at rest in all `VIEWS`, the inner lips with an open mouth. Each landmark is the reading nearest to
     the median of all.
-
-    Raises
-    ------
-    DataError
-        The tracker recognises no face.
     """
     face = views.face
     skin, eyes = part_triangles(face, SKIN), part_triangles(face, EYES)
@@ -208,15 +197,7 @@ def landmark_table(places: Mapping[int, FloatArray]) -> str:
 
 
 def read_landmark_table(path: Path) -> dict[int, FloatArray]:
-    """Positions (3,) of the landmarks of a TSV file.
-
-    Raises
-    ------
-    InputError
-        The file cannot be opened.
-    DataError
-        A row is wrong, or a landmark occurs twice.
-    """
+    """Positions (3,) of the landmarks of a TSV file."""
     try:
         lines = read_text(path, MAX_TABLE_BYTES).splitlines()
     except OSError as refused:

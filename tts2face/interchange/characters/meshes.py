@@ -35,13 +35,7 @@ IntArray = NDArray[np.int64]
 
 
 def read_pieces(file: GltfFile, tree: NodeTree) -> Iterator[MaterialPiece]:
-    """Pieces of all meshes of the shown scene; points and lines are skipped.
-
-    Raises
-    ------
-    DataError
-        A mesh or skin is damaged or too large, or is compressed with Draco.
-    """
+    """Pieces of all meshes of the shown scene; points and lines are skipped."""
     nodes, meshes = file.entries("nodes"), file.entries("meshes")
     n_vertices = 0
     for number in sorted(tree.world):
@@ -274,13 +268,7 @@ class MaterialReader:
 
 
 def decode_image(content: bytes, place: str) -> NDArray[np.uint8]:
-    """Pixels (H, W, 4) of a PNG, JPEG or WebP image, reduced to at most `MAX_IMAGE_SIDE` on a side.
-
-    Raises
-    ------
-    DataError
-        The image is damaged or has too many pixels.
-    """
+    """Pixels (H, W, 4) of a PNG, JPEG or WebP image, reduced to at most `MAX_IMAGE_SIDE` on a side."""
     from PIL import Image
 
     try:

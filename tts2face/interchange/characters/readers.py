@@ -29,13 +29,7 @@ Expressions = dict[str, Mapping[MorphTarget, float]]
 
 
 def read_gltf_character(path: Path) -> Character:
-    """Character of a .glb, .gltf or .vrm file.
-
-    Raises
-    ------
-    DataError
-        The file is damaged, too large or compressed in a way that is not supported, or has no mesh.
-    """
+    """Character of a .glb, .gltf or .vrm file."""
     file = read_gltf(path)
     notes: list[str] = []
     tree = read_nodes(file.root)
@@ -138,11 +132,6 @@ def read_libraries(folder: Path, libraries: Iterable[str]) -> dict[str, Material
 
     ``map_Kd`` is the image, ``Kd`` the colour without one, ``d`` or ``Tr`` the transparency; ``map_d``, or the alpha of
     the image, is where the material has holes.
-
-    Raises
-    ------
-    DataError
-        A file is damaged.
     """
     found: dict[str, Material] = {}
     for library in libraries:
@@ -223,13 +212,7 @@ FloatArray = NDArray[np.float64]
 
 
 def read_obj_folder(folder: Path) -> Character:
-    """Character of a folder: faces, texture coordinates and materials of ``neutral.obj``, and shapes of equal vertices.
-
-    Raises
-    ------
-    DataError
-        ``neutral.obj`` is missing, a file is damaged, or a shape has another number of vertices.
-    """
+    """Character of a folder: faces, texture coordinates and materials of ``neutral.obj``, and shapes of equal vertices."""
     neutral = folder / NEUTRAL
     if not neutral.is_file():
         raise DataError(f"{folder} has no {NEUTRAL}; name the face at rest so")

@@ -54,15 +54,7 @@ def with_sides(mapping: ShapeMapping) -> ShapeMapping:
 
 
 def read_mapping(path: Path) -> ShapeMapping:
-    """Mapping of a TSV file (shape, source, gain) or of a TOML file with a table ``[shapes]``.
-
-    Raises
-    ------
-    InputError
-        The file does not exist or has another suffix.
-    DataError
-        A row or value is wrong.
-    """
+    """Mapping of a TSV file (shape, source, gain) or of a TOML file with a table ``[shapes]``."""
     if path.suffix not in (".tsv", ".toml"):
         raise InputError(f"a mapping is a .tsv or .toml file, not {path.name}")
     try:

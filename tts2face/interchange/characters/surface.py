@@ -243,13 +243,7 @@ MIN_GAP_MM = 3.0  # by which the lips must part at weight 1 of some shape
 
 
 def place_face(face: Face, character: Character, head: HeadMesh, provisional: Placement) -> Face:
-    """Face in mm with its origin between the eyes and the pivot of its head.
-
-    Raises
-    ------
-    DataError
-        The landmarks of the eye corners are missing.
-    """
+    """Face in mm with its origin between the eyes and the pivot of its head."""
     model = default_head()
     distance = eye_distance(face)
     metres = distance / provisional.scale * 1000.0
@@ -277,13 +271,7 @@ def place_face(face: Face, character: Character, head: HeadMesh, provisional: Pl
 
 
 def drop_unsuited_shapes(face: Face) -> tuple[Face, list[str]]:
-    """Face without blinks that do not close the eyes and wide eyes that do not open them, and notes about them.
-
-    Raises
-    ------
-    DataError
-        The lips or lids have no landmarks, or no shape parts the lips.
-    """
+    """Face without blinks that do not close the eyes and wide eyes that do not open them, and notes about them."""
     mouth = build_lip_constraints(face)
     widest = float(mouth.gaps[:, mouth.moving].max(initial=0.0)) if len(mouth.moving) else 0.0
     if widest < MIN_GAP_MM:

@@ -49,11 +49,6 @@ def decimate(points: FloatArray, triangles: IntArray, tolerance: FloatArray) -> 
         Corners. Vertices at open edges move along them only; those of a seam, which share a place, stay.
     tolerance : (n,)
         Error in mm, as root mean square over the surface around a vertex, beyond which it stays.
-
-    Raises
-    ------
-    ValueError
-        The arrays do not fit each other.
     """
     if points.ndim != 2 or len(tolerance) != len(points) or (len(triangles) and triangles.max() >= len(points)):
         raise ValueError(f"{points.shape} points, {tolerance.shape} tolerances and the triangles do not fit each other")

@@ -22,13 +22,7 @@ Bytes = NDArray[np.uint8]
 
 
 def decode_buffer(content: Bytes, mode: str, count: int, stride: int) -> Bytes:
-    """Bytes (count * stride) of a compressed buffer view, before its filter.
-
-    Raises
-    ------
-    DataError
-        The mode or the version is unknown, or the stream is damaged.
-    """
+    """Bytes (count * stride) of a compressed buffer view, before its filter."""
     if mode == ATTRIBUTES and 0 < stride <= 256 and stride % 4 == 0:
         return _decode_attributes(content, count, stride)
     if mode in (TRIANGLES, INDICES) and stride in (2, 4):

@@ -57,13 +57,7 @@ def read_text(path: Path, encoding: str | None = None) -> str:
 
 
 def check_encoding(encoding: str) -> str:
-    """Name of a text encoding.
-
-    Raises
-    ------
-    InputError
-        Python has no such encoding.
-    """
+    """Name of a text encoding."""
     try:
         return codecs.lookup(encoding).name
     except LookupError as unknown:

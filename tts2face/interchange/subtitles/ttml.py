@@ -44,13 +44,7 @@ class _Paragraph:
 
 
 def read_ttml(text: str) -> tuple[list[WrittenCue], list[SubtitleWarning]]:
-    """Cues of a TTML document.
-
-    Raises
-    ------
-    DataError
-        It is not well-formed XML, has a document type declaration, or is nested too deep; the message names the line.
-    """
+    """Cues of a TTML document."""
     return _TtmlReader().read(text)
 
 
