@@ -9,7 +9,7 @@ from cli.corpus import Provenance, check_suffix
 from cli.flags import Cache, Jobs, Model, switch
 from cli.photo import Yes
 from cli.process import stage_bar, write_message
-from tts2face.storage.files import refuse_overwriting
+from tts2face.storage.output_paths import refuse_overwriting
 
 
 def gestures(  # noqa: PLR0913 - one parameter a flag

@@ -15,7 +15,8 @@ from cli.flags import Cache, Jobs, Model, switch, whole_number
 from cli.photo import Yes
 from cli.process import ask, progress_bar, stage_bar, write_message
 from lexicon.errors import InputError
-from tts2face.storage.files import check_file_name, refuse_overwriting, write_atomically
+from tts2face.storage.files import write_atomically
+from tts2face.storage.output_paths import check_file_name, refuse_overwriting
 
 
 def prompts(

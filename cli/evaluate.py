@@ -18,7 +18,7 @@ from cli.flags import Cache, Jobs, Model, switch, whole_number
 from cli.photo import Yes
 from cli.process import progress_bar, stage_bar, write_message
 from lexicon.errors import InputError
-from tts2face.storage.files import check_file_name, refuse_overwriting
+from tts2face.storage.output_paths import check_file_name, refuse_overwriting
 
 if TYPE_CHECKING:
     from corpus_tools.measures.splits import Split

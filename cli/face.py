@@ -11,7 +11,7 @@ from cli.photo import Consent, Fit, Smile, Yes, agreed, make_face, warner
 from cli.process import progress_bar, write_message
 from lexicon.errors import InputError
 from tts2face.picture.options import Picture
-from tts2face.storage.files import check_file_name, refuse_overwriting
+from tts2face.storage.output_paths import check_file_name, refuse_overwriting
 
 if TYPE_CHECKING:
     from tts2face.interchange.characters.importing import ImportReport

@@ -12,7 +12,7 @@ from cli.process import stage_bar, write_message
 from lexicon.errors import InputError
 from tts2face.interchange.exports.table import is_export, split_format
 from tts2face.request import OWN_FACE
-from tts2face.storage.files import refuse_overwriting
+from tts2face.storage.output_paths import refuse_overwriting
 
 if TYPE_CHECKING:
     from tts2face.picture.options import Picture

@@ -93,7 +93,7 @@ def refuse_others(
 def check_photo(photo: str, others: Mapping[str, str | Path | None], outputs: Mapping[str, str | Path | None]) -> None:
     """Refuse a photo that does not exist, no output, and outputs that would overwrite it or other files, by flags."""
     from tts2face.photo.photograph import split_number
-    from tts2face.storage.files import refuse_overwriting
+    from tts2face.storage.output_paths import refuse_overwriting
 
     path, _ = split_number(photo)
     if all(output is None for output in outputs.values()):
@@ -112,7 +112,7 @@ def is_missing_model(error: BackendError) -> bool:
 
 
 def sets_up_model(arguments: Sequence[str]) -> bool:
-    """Set up the landmark model that a command line lacks, if it has --yes or its user agrees; whether it is there now."""
+    """Set up the landmark model that a command line lacks, if it has --yes or its user agrees; whether it is there."""
     from tts2face.video.setup_models import SOURCE, set_up_model
 
     options = arguments[: arguments.index(END_OF_OPTIONS)] if END_OF_OPTIONS in arguments else arguments

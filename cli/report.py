@@ -9,7 +9,7 @@ from cli.flags import Cache, Face, Jobs, Model, whole_number
 from cli.photo import Yes
 from cli.process import progress_bar, stage_bar, write_message
 from lexicon.errors import InputError
-from tts2face.storage.files import refuse_overwriting
+from tts2face.storage.output_paths import refuse_overwriting
 
 report = App(
     name="report",

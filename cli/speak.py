@@ -22,7 +22,8 @@ from tts2face.processes.collection import resume_collection
 from tts2face.request import OWN_FACE, Request
 from tts2face.session.named_models import Models
 from tts2face.source import FromPhones, Recorded, Spoken
-from tts2face.storage.files import check_file_name, refuse_overwriting, write_atomically
+from tts2face.storage.files import write_atomically
+from tts2face.storage.output_paths import check_file_name, refuse_overwriting
 
 if TYPE_CHECKING:
     from tts2face.lips.explanation import PhoneExplanation

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from lexicon.errors import BackendError, InputError
 from lexicon.values.fields import check_fields
-from tts2face.storage.files import user_cache
+from tts2face.storage.user_folders import user_cache
 from tts2face.types import Progress
 
 StageCallback = Callable[[str], Progress]  # name of a stage -> its progress callback

@@ -146,7 +146,7 @@ def _tag_tokens(words: Sequence[str]) -> list[str]:
 
 @functools.lru_cache(maxsize=_MAX_CACHED_SENTENCES)
 def tag_words(words: tuple[str, ...]) -> tuple[str, ...]:
-    """Penn Treebank tags of the words and punctuation marks of a sentence; of a contraction, the tag of its first part."""
+    """Penn Treebank tags of the words and marks of a sentence; of a contraction, the tag of its first part."""
     parts = [[part for part in _PARTS.findall(word) if part] or [word] for word in words]
     tags = iter(_tag_tokens([part for word in parts for part in word]))
     groups = [[next(tags) for _ in word] for word in parts]

@@ -103,10 +103,10 @@ def heard_once() -> Iterator[None]:
 @pytest.fixture(scope="module")
 def drafted() -> Iterator[None]:
     """Files are deflated as drafts, at a fifth of the time: for tests of what is in them, which are a little larger."""
-    from tts2face.storage import tensors
+    from tts2face.storage import deflated
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tensors, "LEVEL", tensors.DRAFT_LEVEL)
+        patch.setattr(deflated, "LEVEL", deflated.DRAFT_LEVEL)
         yield
 
 

@@ -18,7 +18,7 @@ from types import FunctionType
 from typing import Any, TypeVar
 
 from tests.api.test_import_graph import ROOT, imports, modules
-from tts2face.storage.files import user_cache
+from tts2face.storage.user_folders import user_cache
 
 Value = TypeVar("Value")
 COMPUTES = ("numpy", "scipy", "numba", "av", "onnxruntime", "hibari-tts", "espeakng-loader", "hama", "soxr")

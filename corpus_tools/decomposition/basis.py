@@ -15,7 +15,7 @@ from corpus_tools.recordings.folder import VIDEO_SUFFIXES
 from lexicon.errors import DataError, InputError
 from tts2face.models.landmarks import N_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.models.palette import EXPRESSIONS
-from tts2face.storage.media_files import open_picture
+from tts2face.storage.pictures import open_picture
 from tts2face.video.media import TimedFrame, read_frames
 from tts2face.video.pose import remove_pose
 from tts2face.video.tracking import FaceTracker

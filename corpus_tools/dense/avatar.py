@@ -24,7 +24,7 @@ from tts2face.picture.occlusion import bake_occlusion
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import draw
 from tts2face.processes.threads import available_cores
-from tts2face.storage.files import find_file
+from tts2face.storage.shipped import find_file
 from tts2face.video.pose import remove_pose
 from tts2face.video.tracking import FaceTracker
 

@@ -31,7 +31,7 @@ from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.models.talker import NOT_STATED
 from tts2face.picture.occlusion import bake_occlusion
 from tts2face.processes.threads import available_cores
-from tts2face.storage.files import find_file
+from tts2face.storage.shipped import find_file
 from tts2face.types import Progress
 from tts2face.video.tracking import find_bundle
 

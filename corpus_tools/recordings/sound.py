@@ -16,7 +16,8 @@ from tts2face.sound.alignment import Aligner, TextMismatch
 from tts2face.sound.pauses import Span, cut_at_pauses, cut_sound
 from tts2face.sound.transcript import assign_words
 from tts2face.sound.word_lattice import PronouncedWords
-from tts2face.storage.tensors import read_kept, write_tensors
+from tts2face.storage.array_cache import read_kept
+from tts2face.storage.tensors import write_tensors
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from lexicon.values.files import check_regular_file
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, FACE_OVAL
+from tts2face.storage.array_cache import read_kept
 from tts2face.storage.content_store import content_hash
-from tts2face.storage.tensors import read_kept, write_tensors
+from tts2face.storage.tensors import write_tensors
 from tts2face.video.media import TimedFrame, read_frames, read_media_info
 from tts2face.video.tracking import MODEL_SHA256, Tracking
 

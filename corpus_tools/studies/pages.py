@@ -25,7 +25,7 @@ from tts2face.models.face_loading import load_face
 from tts2face.models.talker import speech_channels
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import MeshRenderer, mesh_renderer
-from tts2face.storage.files import check_name
+from tts2face.storage.output_paths import check_name
 from tts2face.types import Trajectory
 from tts2face.video.media import read_frames
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lexicon.errors import BackendError
-from tts2face.storage.files import user_cache
+from tts2face.storage.user_folders import user_cache
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -26,7 +26,7 @@ from tts2face.models.networks import SCORE_MAP_PREFIX, SCORE_SHAPES, ScoreMap, m
 from tts2face.models.talker import Talker, load_talker
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
-from tts2face.storage.files import find_file
+from tts2face.storage.shipped import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.types import Progress, Trajectory
 from tts2face.video.take import BLENDSHAPES, BlendshapeReader

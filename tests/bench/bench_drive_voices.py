@@ -24,7 +24,7 @@ from tts2face.session.recording import map_audio_to_motion
 from tts2face.sound.transcript import recognise_phones
 from tts2face.sound.voice_pool import load_voice
 from tts2face.source import AUDIO_MAP_NAMES, RECOGNISED
-from tts2face.storage.media_files import wave_bytes
+from tts2face.storage.wave_files import wave_bytes
 from tts2face.types import Speech, frame_count
 
 VOICES = ("heart", "joe", "espeak", "espeak-female")

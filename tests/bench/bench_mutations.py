@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 from tests.models.made import write_made_talker
-from tts2face.storage.files import SHIPPED_FOLDER
+from tts2face.storage.shipped import SHIPPED_FOLDER
 
 BATCH = 50  # mutations in one process; one that crashes ends its batch
 

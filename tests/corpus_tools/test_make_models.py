@@ -13,7 +13,7 @@ from corpus_tools.shipped.drawn.worn import HAIRCUTS
 from tts2face.models.face_names import OF_FACE
 from tts2face.models.palette import load_palette
 from tts2face.models.talker import load_talker
-from tts2face.storage.files import SHIPPED_FOLDER
+from tts2face.storage.shipped import SHIPPED_FOLDER
 
 
 def test_derived_styles_are_made_as_they_are_shipped(tmp_path: Path) -> None:

@@ -45,7 +45,7 @@ from tts2face.numeric.arrays import decode_srgb, encode_srgb
 from tts2face.picture.camera import camera_matrices
 from tts2face.picture.options import Picture, parse_camera
 from tts2face.picture.renderer import draw
-from tts2face.storage.files import find_file
+from tts2face.storage.shipped import find_file
 
 CAMERA, SIDE_PX = "0,0,900", 448
 FOREHEAD_MM = 8.0  # by which the tracker sees the top of the forehead above the drawn people's own landmark

@@ -87,7 +87,7 @@ def test_every_kind_of_error_has_an_exit_code() -> None:
 def test_invalid_input_gives_one_sentence_and_no_output(
     arguments: list[str], code: int, reason: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from tts2face.storage.files import SHIPPED_FOLDER
+    from tts2face.storage.shipped import SHIPPED_FOLDER
     from tts2face.storage.tensors import write_tensors
 
     (here / "junk.talker").write_bytes(b"no talker at all")

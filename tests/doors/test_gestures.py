@@ -18,7 +18,7 @@ from tts2face.models.face_loading import load_face
 from tts2face.models.palette import FEATURES, load_palette, write_palette
 from tts2face.request import GAZES, Request
 from tts2face.session.session import Session
-from tts2face.storage.files import SHIPPED_FOLDER
+from tts2face.storage.shipped import SHIPPED_FOLDER
 from tts2face.types import Clip
 
 TEXT = "Bob may move five big maps, but we keep two."

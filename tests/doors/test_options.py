@@ -13,7 +13,7 @@ from cli.main import app, run
 from lexicon.errors import InputError
 from tests.world import World
 from tts2face.picture.film import check_output
-from tts2face.storage.files import check_name
+from tts2face.storage.output_paths import check_name
 
 
 @pytest.mark.parametrize(

@@ -17,8 +17,8 @@ from tts2face.models.face_file import Identity, read_face, write_face
 from tts2face.models.face_loading import load_face
 from tts2face.processes.shared import Shared
 from tts2face.session.catalogue import IdentityEntry, identities
-from tts2face.storage import files
-from tts2face.storage.files import find_file
+from tts2face.storage import shipped
+from tts2face.storage.shipped import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 
 N = 40
@@ -207,7 +207,7 @@ def test_arrays_that_do_not_fit_are_refused() -> None:
 
 
 def test_a_former_face_is_said_once_and_shown_by_another_without_its_hair(caplog):
-    files._say_new_name.cache_clear()
+    shipped._say_new_name.cache_clear()
     assert {find_file("cartoon", "face").name for _ in range(2)} == {"ada.face"}
     (note,) = [record.message for record in caplog.records if "cartoon" in record.message]
     assert note == "the face cartoon is no longer part of this program; ada is used"
@@ -216,13 +216,13 @@ def test_a_former_face_is_said_once_and_shown_by_another_without_its_hair(caplog
 
 
 def test_a_former_identity_is_said_once_and_shown_by_another_where_there_is_one(caplog, tmp_path: Path) -> None:
-    files._say_new_name.cache_clear()
+    shipped._say_new_name.cache_clear()
     head = find_file("head", "face")
     former = [read_face(head, "walter") for _ in range(2)]
     assert all(face.metadata["identity"] == "erik" for face in former)
     (note,) = [record.message for record in caplog.records if "walter" in record.message]
     assert note == "the identity walter is no longer part of this program; erik is used"
-    assert not {*files.FORMER["identity"]} & {entry.name for entry in identities()}
+    assert not {*shipped.FORMER["identity"]} & {entry.name for entry in identities()}
     own = small_face()
     write_face(tmp_path / "own.face", own, {"walter": Identity(np.ones((N, 3), np.float32))})
     assert read_face(tmp_path / "own.face", "walter").metadata["identity"] == "walter"

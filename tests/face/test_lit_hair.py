@@ -18,7 +18,8 @@ from tts2face.models.hair import parse_hair_colour
 from tts2face.models.hair_file import LitHair, read_hair, swing_shapes, tint_hair, wear_hair, write_hair, write_lit_hair
 from tts2face.models.light import Baked
 from tts2face.numeric.arrays import decode_srgb, encode_srgb
-from tts2face.storage.tensors import deflate, read_tensors, unpack_arrays, write_tensors
+from tts2face.storage.deflated import deflate, unpack_arrays
+from tts2face.storage.tensors import read_tensors, write_tensors
 
 OWN, BLACK, LIGHT = (0.3, 0.2, 0.1), (0.1, 0.08, 0.06), (0.7, 0.65, 0.6)
 SHINE = 0.05  # linear light of gloss, whatever the colour

@@ -7,7 +7,7 @@ from tests.face.posing import posed_vertices
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
 from tts2face.models.landmarks import INNER_LIP_UPPER
-from tts2face.storage.files import find_file
+from tts2face.storage.shipped import find_file
 
 FRONT_Z = 8.0  # mm; teeth further back are behind the cheeks
 

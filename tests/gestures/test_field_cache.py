@@ -8,8 +8,8 @@ import pytest
 
 from tts2face.gestures import field
 from tts2face.gestures.field import Field, FieldOptions, build_field, initial_state, sample_field
-from tts2face.storage import tensors
-from tts2face.storage.tensors import fingerprint, read_cached, write_cached
+from tts2face.storage import array_cache
+from tts2face.storage.array_cache import fingerprint, read_cached, write_cached
 
 LENGTHS = np.array([150, 90, 200], np.int32)
 
@@ -73,7 +73,7 @@ def test_a_damaged_file_and_a_folder_that_cannot_be_written_only_cost_time(cache
 
 
 def test_the_oldest_files_are_removed(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tensors, "MAX_FILES", 3)
+    monkeypatch.setattr(array_cache, "MAX_FILES", 3)
     for number in range(5):
         write_cached("field", 1, str(number), {"a": np.zeros(1)})
     assert sorted(path.name for path in cache.iterdir()) == ["2", "3", "4"]

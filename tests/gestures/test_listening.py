@@ -27,7 +27,7 @@ from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import EXPRESSIONS, Palette
 from tts2face.request import Request
 from tts2face.session.prepared import prepare
-from tts2face.storage.media_files import pcm_bytes
+from tts2face.storage.wave_files import pcm_bytes
 from tts2face.types import Waveform
 
 FPS, RATE = 30.0, 16_000

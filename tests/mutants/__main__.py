@@ -20,7 +20,7 @@ from pathlib import Path
 from tests.mutants.first_failure import NOTE
 from tests.mutants.listed import ROOT, Mutant, listed_mutants
 from tts2face.numeric.kernels import CACHE_VARIABLE, cache_folder
-from tts2face.storage.files import user_cache
+from tts2face.storage.user_folders import user_cache
 
 LIMIT_S = 60.0  # of the tests of one fault on an idle machine
 FAILED = 1  # exit code of pytest if a test has failed

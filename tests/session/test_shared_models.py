@@ -16,7 +16,7 @@ from tts2face.models import talker as talker_files
 from tts2face.processes.shared import N_KEPT, Shared, free_unused, shared
 from tts2face.session.functions import SessionCache
 from tts2face.session.named_models import Models
-from tts2face.storage.files import find_file
+from tts2face.storage.shipped import find_file
 
 
 @pytest.fixture

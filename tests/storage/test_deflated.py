@@ -15,18 +15,8 @@ from safetensors.numpy import save_file
 
 from lexicon.errors import DataError
 from tts2face.storage import tensors
-from tts2face.storage.tensors import (
-    FIRST,
-    LAST,
-    MAX_BYTES,
-    PACKED,
-    TYPES,
-    pack_arrays,
-    read_metadata,
-    read_tensors,
-    unpack_arrays,
-    write_tensors,
-)
+from tts2face.storage.deflated import FIRST, LAST, MAX_BYTES, TYPES, pack_arrays, unpack_arrays
+from tts2face.storage.tensors import PACKED, read_metadata, read_tensors, write_tensors
 
 PATH = Path("a.face")
 INDICES = np.array([[3, 9], [4, 9], [1000, 8], [0, 8], [-70000, 2**31 - 1]], np.int32)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.storage.files import refuse_overwriting
+from tts2face.storage.output_paths import refuse_overwriting
 
 
 @pytest.fixture

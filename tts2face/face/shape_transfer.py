@@ -14,7 +14,7 @@ from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.numeric.arrays import append_rows
 from tts2face.numeric.splines import fit_local_interpolant
-from tts2face.storage.tensors import computed_once
+from tts2face.storage.array_cache import computed_once
 
 DEFAULT_FACE = "head"
 SOFT_PARTS = ("lash", "brow")  # substrings of the names of parts that move with the skin

@@ -23,7 +23,7 @@ from tts2face.gestures.field_kernels import (
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.numeric.arrays import principal_axes
 from tts2face.numeric.kd_tree import KdTree, build_tree, count_nodes
-from tts2face.storage.tensors import computed_once
+from tts2face.storage.array_cache import computed_once
 
 N_SEARCH_AXES = 8  # principal axes of the windows in which the search tree is built
 AXES_STRIDE = 8  # the axes are computed from every eighth window; all windows give the same axes

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from tts2face.models.palette import GESTURE_FPS, Style
 from tts2face.numeric.arrays import smooth_gaussian, smoothstep
 from tts2face.sound.features import IntensityTrack, intensity_track, pitch, speech_level
-from tts2face.storage.tensors import computed_once
+from tts2face.storage.array_cache import computed_once
 from tts2face.types import HEAD_CHANNELS, Waveform
 
 QUIET_DB, PROSODY_LOUD_DB = -35.0, 10.0  # limits relative to the mean level of speech; values beyond are clipped

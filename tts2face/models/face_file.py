@@ -34,14 +34,14 @@ from tts2face.models.light import Baked, Lamps, Light, Photographed
 from tts2face.models.light_coding import decode_light, encode_light, pack_shapes, quantise, unpack_shapes
 from tts2face.models.networks import score_map_arrays, score_map_from_arrays
 from tts2face.models.photo_view import PhotoView
-from tts2face.storage.files import present_name
-from tts2face.storage.media_files import (
+from tts2face.storage.model_pictures import (
     decode_colours,
     decode_coverage,
     encode_colours,
     encode_coverage,
     texture_tensors,
 )
+from tts2face.storage.shipped import present_name
 from tts2face.storage.tensors import read_tensors, write_tensors
 
 KIND = "face"

@@ -10,7 +10,7 @@ from tts2face.models.hair import attach_hair, parse_hair_colour
 from tts2face.models.hair_file import LitHair, load_hair, tint_hair, wear_hair
 from tts2face.models.light import Lamps
 from tts2face.processes.shared import Shared, file_state
-from tts2face.storage.files import FORMER, SHIPPED_FOLDER, find_file
+from tts2face.storage.shipped import FORMER, SHIPPED_FOLDER, find_file
 
 
 def load_face(

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from tts2face.request import DRAWN_FACE, REALISTIC_FACE
-from tts2face.storage.files import SHIPPED_FOLDER
+from tts2face.storage.shipped import SHIPPED_FOLDER
 
 BALD = "bald"  # haircut without hair
 HAIR_KIND = "hair"

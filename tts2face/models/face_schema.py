@@ -19,9 +19,9 @@ from tts2face.models.face import PART_KINDS
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.light_coding import MAX_STEP_MM, SHAPE_TENSORS, check_shapes
 from tts2face.models.networks import check_score_map
-from tts2face.storage.media_files import texture_tensors
+from tts2face.storage.deflated import deflate, inflate
+from tts2face.storage.model_pictures import texture_tensors
 from tts2face.storage.schema import MAX_MM, Contents, ModelPlace, Tensor, millimetres
-from tts2face.storage.tensors import deflate, inflate
 
 Bits = NDArray[np.uint8]
 MAX_OCCLUSION_BYTES = 128  # of one vertex: 1,024 directions; planes of one bit for each direction take a third more

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from lexicon.values.checks import free, list_of, text
-from tts2face.storage.files import find_file
 from tts2face.storage.schema import Contents, Tensor
+from tts2face.storage.shipped import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 
 KIND, VERSION = "gaze", 1

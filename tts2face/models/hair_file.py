@@ -38,9 +38,9 @@ from tts2face.models.light_coding import (
     unpack_shapes,
 )
 from tts2face.numeric.arrays import decode_srgb
-from tts2face.storage.files import SHIPPED_FOLDER, find_file
-from tts2face.storage.media_files import decode_colours, decode_coverage, encode_colours, encode_coverage
+from tts2face.storage.model_pictures import decode_colours, decode_coverage, encode_colours, encode_coverage
 from tts2face.storage.schema import Contents, ModelPlace, Tensor, millimetres
+from tts2face.storage.shipped import SHIPPED_FOLDER, find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 
 DARKEST, LEAST_GLOSS = 1e-3, 0.15  # linear light, and share of the change of gloss on light hair

@@ -26,9 +26,9 @@ from tts2face.models.baked_light import (
     fills_pages,
 )
 from tts2face.numeric.arrays import zeros_with_room
-from tts2face.storage.media_files import JPEG_QUALITY, decode_colours, encode_colours
+from tts2face.storage.deflated import pack_arrays, unpack_arrays
+from tts2face.storage.model_pictures import JPEG_QUALITY, decode_colours, encode_colours
 from tts2face.storage.schema import MAX_MM, Contents, ModelPlace, Tensor
-from tts2face.storage.tensors import pack_arrays, unpack_arrays
 
 MAX_SIDE = 4096
 MAX_FACTOR = 1e3  # of any weight or light

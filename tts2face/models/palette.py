@@ -20,8 +20,8 @@ from lexicon.errors import DataError, InputError
 from lexicon.values.checks import Check, free, number, record, table, text
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.processes.shared import Shared, file_state
-from tts2face.storage.files import find_file
 from tts2face.storage.schema import Contents, Tensor, millimetres, refuse
+from tts2face.storage.shipped import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.types import HEAD_CHANNELS
 

@@ -22,7 +22,7 @@ from tts2face.models.networks import (
 )
 from tts2face.models.talker_schema import check_talker
 from tts2face.processes.shared import Shared, file_state
-from tts2face.storage.files import find_file
+from tts2face.storage.shipped import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.types import HEAD_CHANNELS, Trajectory
 

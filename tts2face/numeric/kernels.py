@@ -30,7 +30,8 @@ from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 import numpy as np
 
 from tts2face.numeric.object_code import load_object
-from tts2face.storage.files import user_cache, write_atomically
+from tts2face.storage.files import write_atomically
+from tts2face.storage.user_folders import user_cache
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")

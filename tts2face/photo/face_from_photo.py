@@ -24,7 +24,7 @@ from tts2face.photo.speaking_photo import speaking_photo
 from tts2face.photo.teeth import read_teeth
 from tts2face.request import REALISTIC_FACE
 from tts2face.storage.content_store import FolderStore
-from tts2face.storage.files import user_cache
+from tts2face.storage.user_folders import user_cache
 from tts2face.video.tracking import find_segmenter
 
 

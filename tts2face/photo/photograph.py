@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.storage.media_files import open_picture
+from tts2face.storage.pictures import open_picture
 
 if TYPE_CHECKING:
     from PIL.Image import Image as Picture

@@ -21,7 +21,8 @@ from lexicon.errors import InputError
 from tts2face.picture.frames import GifWriter, PngFolderWriter, is_png_folder
 from tts2face.picture.movie import MKV_MOVIE, MOV_MOVIE, MP4_MOVIE, WEBM_MOVIE, ClipFrames, MovieWriter
 from tts2face.picture.renderer import FrameRenderer
-from tts2face.storage.files import MOVIE_SUFFIXES, check_name, translate_disk_errors
+from tts2face.storage.files import translate_disk_errors
+from tts2face.storage.output_paths import MOVIE_SUFFIXES, check_name
 from tts2face.storage.temporary import Temporary
 from tts2face.types import Clip, Progress, exact_rate
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.picture.provenance import png_labels
-from tts2face.storage.media_files import open_wave, pcm_bytes
+from tts2face.storage.wave_files import open_wave, pcm_bytes
 
 TICKS_PER_SECOND = 100  # ticks of a GIF's clock per second
 MIN_TICKS = 2  # browsers play shorter delays as 0.1 s

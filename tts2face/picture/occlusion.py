@@ -22,7 +22,7 @@ from tts2face.picture.kernels.picture import allocate_buffers, draw_samples, pro
 from tts2face.picture.kernels.raster import GRID_SHIFT, HOLES, NOT_DRAWN, transform_to_camera
 from tts2face.picture.kernels.tables import NORMAL
 from tts2face.picture.surface import Surface, build_surface
-from tts2face.storage.tensors import computed_once
+from tts2face.storage.array_cache import computed_once
 
 N_DIRECTIONS = 128  # docs/decisions/112-occlusion.md: more change the light by less than its smoothing
 VIEW_SAMPLES = 192  # samples along a side of the views: 1.5 mm each on a head

@@ -26,7 +26,7 @@ from tts2face.picture.occlusion import occlusion_poses
 from tts2face.picture.options import BLUR, DRAFT, HIGH, STUDIO, CameraView, Picture, parse_background
 from tts2face.picture.surface import Surface, build_surface
 from tts2face.processes.threads import available_cores
-from tts2face.storage.media_files import open_picture
+from tts2face.storage.pictures import open_picture
 
 BACKS_SIDE_PX = 192  # pictures in which visible back faces are looked for; one band of rows
 STUDIO_BRIGHT, STUDIO_DARK = (150.0, 146.0, 141.0), (62.0, 62.0, 65.0)  # sRGB at the centre of the wall and far from it

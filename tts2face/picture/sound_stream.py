@@ -11,7 +11,7 @@ import numpy as np
 
 from lexicon.errors import InputError
 from tts2face.picture.provenance import WriteBuffer
-from tts2face.storage.media_files import pcm_bytes
+from tts2face.storage.wave_files import pcm_bytes
 from tts2face.types import Chunk, Waveform
 
 UNKNOWN_BYTES = 0xFFFFFFFF  # size of a WAV file that is not yet known; players read to the end of the stream

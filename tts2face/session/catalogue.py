@@ -9,7 +9,7 @@ from typing import Any
 
 from lexicon.errors import BackendError, DataError
 from tts2face.request import OWN_FACE, REALISTIC_FACE
-from tts2face.storage.files import SHIPPED_FOLDER, find_file
+from tts2face.storage.shipped import SHIPPED_FOLDER, find_file
 
 SHORT_S = 120.0  # recordings that are shorter are listed in seconds
 

@@ -23,7 +23,7 @@ from tts2face.processes.shared import free_unused
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.named_models import Models
 from tts2face.session.speech_stream import Piece
-from tts2face.storage.files import refuse_overwriting
+from tts2face.storage.output_paths import refuse_overwriting
 from tts2face.types import Clip, concatenate_clips
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from tts2face.session.speech import MarkTime
 from tts2face.session.speech_stream import Piece, SpeechModels, spoken_pieces
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.source import Recorded
-from tts2face.storage.files import AnyPath, refuse_overwriting
+from tts2face.storage.output_paths import AnyPath, refuse_overwriting
 from tts2face.types import Clip, Progress
 
 if TYPE_CHECKING:

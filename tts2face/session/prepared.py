@@ -30,7 +30,7 @@ from tts2face.picture.options import Picture
 from tts2face.request import CAMERA, Request, option_fields
 from tts2face.session.joining import Excerpt
 from tts2face.source import Listening, Recorded, Source, Spoken
-from tts2face.storage.files import AnyPath
+from tts2face.storage.output_paths import AnyPath
 from tts2face.types import exact_rate
 
 if TYPE_CHECKING:

@@ -29,7 +29,7 @@ from tts2face.sound.voice import (
     pronounce_content,
     split_spoken_sentences,
 )
-from tts2face.storage.tensors import computed_once
+from tts2face.storage.array_cache import computed_once
 from tts2face.types import Speech, Waveform, concatenate_speech
 
 if TYPE_CHECKING:

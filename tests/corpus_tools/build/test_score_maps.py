@@ -19,7 +19,7 @@ from lexicon.errors import DataError
 from tts2face.models.face_file import read_face
 from tts2face.models.networks import N_SCORES, SCORE_SHAPES, logistic
 from tts2face.models.talker import load_talker
-from tts2face.storage.files import find_file
+from tts2face.storage.shipped import find_file
 from tts2face.storage.tensors import read_tensors
 from tts2face.video.take import BlendshapeReader
 

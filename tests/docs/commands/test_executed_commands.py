@@ -30,7 +30,7 @@ from tts2face.models.palette import Palette, load_palette, write_palette
 from tts2face.photo import face_from_photo
 from tts2face.serving.work.database import prepare_database
 from tts2face.session import session
-from tts2face.storage.files import SHIPPED_FOLDER
+from tts2face.storage.shipped import SHIPPED_FOLDER
 
 SMALL = {"--size": "64x64", "--fps": "5"}
 

@@ -13,7 +13,7 @@ from tts2face.models.face_names import haircut_names
 from tts2face.models.hair import Hair, fit_hair
 from tts2face.models.hair_file import SWING_SHAPES, load_hair
 from tts2face.session.catalogue import haircuts, identities
-from tts2face.storage.files import SHIPPED_FOLDER, find_file
+from tts2face.storage.shipped import SHIPPED_FOLDER, find_file
 
 PEOPLE = ("", "amara", "kofi", "mei", "ingrid", "nia")
 SOLID = 80  # coverage, of 255, from which a card hides what is behind it

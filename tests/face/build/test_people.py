@@ -9,7 +9,7 @@ from tests.face.posing import posed_vertices
 from tests.face.test_mouth import FRONT_Z, part_vertices, uncovered, weights
 from tts2face.models.face_file import read_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LOWER_LIP_INNER_MID
-from tts2face.storage.files import find_file
+from tts2face.storage.shipped import find_file
 
 CLOSED = (
     {},

@@ -9,7 +9,7 @@ from tts2face.face.body import BREATH_SHAPE, PUPIL_SHAPE, SWING_SHAPES
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.light import Baked
-from tts2face.storage.files import find_file
+from tts2face.storage.shipped import find_file
 
 UPPER_LID, LOWER_LID = (159, 386), (145, 374)  # right and left eye, in the middle
 

@@ -16,7 +16,7 @@ from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, UPPER_LI
 from tts2face.models.networks import N_SCORES, SCORE_SHAPES, ScoreMap, logistic, mouth_scores
 from tts2face.models.talker import Talker, read_talker, speech_channels, write_talker
 from tts2face.numeric.least_squares import bounded_least_squares
-from tts2face.storage.files import find_file
+from tts2face.storage.shipped import find_file
 from tts2face.types import Trajectory
 
 JAW, UPPER = list(SCORE_SHAPES).index("jawOpen"), list(SCORE_SHAPES).index("mouthUpperUp")

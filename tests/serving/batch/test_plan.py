@@ -15,7 +15,7 @@ from tts2face.serving.batch.cast import read_cast
 from tts2face.serving.batch.options import BatchOptions
 from tts2face.serving.batch.plan import plan_batch
 from tts2face.serving.batch.segment import segment_from_json
-from tts2face.storage.files import SHIPPED_FOLDER
+from tts2face.storage.shipped import SHIPPED_FOLDER
 
 CAST = """
 [default]

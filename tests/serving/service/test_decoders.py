@@ -34,8 +34,8 @@ from tts2face.serving.service.decoders import (
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import add_key
 from tts2face.serving.work.uploaded_file import CHILD_BYTES, DECODE, HANDLERS, MEASURE, PICTURE
-from tts2face.storage import media_files
-from tts2face.storage.media_files import decoding_bytes, open_picture
+from tts2face.storage import pictures
+from tts2face.storage.pictures import decoding_bytes, open_picture
 
 FORMATS: Mapping[str, Mapping[str, Any]] = {
     "PNG": {}, "WEBP": {"lossless": True}, "JPEG": {}, "progressive": {"format": "JPEG", "progressive": True},
@@ -207,7 +207,7 @@ def test_a_picture_is_measured_by_its_head_and_format(tmp_path: Path) -> None:
 MEASURE_HERE = """
 import resource, sys
 from PIL import Image
-from tts2face.storage.media_files import decoding_bytes
+from tts2face.storage.pictures import decoding_bytes
 with Image.open(sys.argv[2]) as small:
     small.load()
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -246,7 +246,7 @@ def test_a_picture_that_takes_too_much_memory_is_refused_before_it_is_decoded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The command line's own reader of pictures, too."""
-    monkeypatch.setattr(media_files, "MAX_DECODING_BYTES", 10 << 20)
+    monkeypatch.setattr(pictures, "MAX_DECODING_BYTES", 10 << 20)
     path = tmp_path / "a.webp"
     path.write_bytes(one_colour("WEBP", 900))
     message = "takes 12 MB to decode, a WEBP of 900 x 900 pixels, more than 10; save it in"

@@ -16,7 +16,7 @@ from tts2face.serving.batch.segment import Segment, input_hashes
 from tts2face.serving.work.blobs import BlobStore, MissingBlobError, open_blobs
 from tts2face.serving.work.placed_files import place_file, place_models, place_segment_files
 from tts2face.session.named_models import Models
-from tts2face.storage.files import find_file
+from tts2face.storage.shipped import find_file
 
 
 @pytest.fixture

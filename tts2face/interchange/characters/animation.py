@@ -29,8 +29,9 @@ from tts2face.interchange.gltf.writer import GlbWriter
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import continuous_quaternions, matrix_quaternion
 from tts2face.numeric.least_squares import bounded_least_squares
-from tts2face.storage.files import refuse_overwriting, write_atomically
-from tts2face.storage.media_files import wave_bytes
+from tts2face.storage.files import write_atomically
+from tts2face.storage.output_paths import refuse_overwriting
+from tts2face.storage.wave_files import wave_bytes
 from tts2face.types import Clip, Trajectory
 
 HEAD_NODE = "tts2face_head"

@@ -63,7 +63,7 @@ class LocatedLandmarks:
 
 
 class CharacterViews:
-    """Rendered views of a face without teeth and tongue, with landmarks read in each; soft shadows are computed once."""
+    """Rendered views of a face without teeth and tongue, with landmarks read in each; shadows are computed once."""
 
     def __init__(self, face: Face, model: Path | None = None) -> None:
         self.face = face

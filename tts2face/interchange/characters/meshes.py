@@ -24,7 +24,7 @@ from tts2face.interchange.characters.character import (
 from tts2face.interchange.gltf.fields import Fields
 from tts2face.interchange.gltf.nodes import NodeTree
 from tts2face.interchange.gltf.reader import DRACO, GltfFile
-from tts2face.storage.media_files import MAX_DECODING_BYTES, decoding_bytes
+from tts2face.storage.pictures import MAX_DECODING_BYTES, decoding_bytes
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 MAX_VERTICES = 2_000_000  # of all meshes; a film character has 200,000

@@ -212,7 +212,7 @@ FloatArray = NDArray[np.float64]
 
 
 def read_obj_folder(folder: Path) -> Character:
-    """Character of a folder: faces, texture coordinates and materials of ``neutral.obj``, and shapes of equal vertices."""
+    """Character of a folder: faces, texture places and materials of ``neutral.obj``, and shapes of equal vertices."""
     neutral = folder / NEUTRAL
     if not neutral.is_file():
         raise DataError(f"{folder} has no {NEUTRAL}; name the face at rest so")

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from lexicon.errors import InputError
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.interchange.exports.parts import AllLabels, Part, Target, part_words
-from tts2face.storage.media_files import open_wave, pcm_bytes
+from tts2face.storage.wave_files import open_wave, pcm_bytes
 
 if TYPE_CHECKING:
     from lexicon.pronounce import Pronunciation, Word

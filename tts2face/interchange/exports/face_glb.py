@@ -33,7 +33,7 @@ from tts2face.interchange.exports.surfaces import (
 from tts2face.interchange.gltf.container import INDICES, VERTICES, GltfBuffer
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import continuous_quaternions
-from tts2face.storage.files import refuse_overwriting
+from tts2face.storage.output_paths import refuse_overwriting
 from tts2face.storage.spool import Spool
 from tts2face.types import HEAD_CHANNELS, Trajectory
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from lexicon.errors import BackendError, InputError
 from tts2face.plugins import EXPORTS, declared, load_plugin
-from tts2face.storage.files import MOVIE_SUFFIXES
+from tts2face.storage.output_paths import MOVIE_SUFFIXES
 
 
 @dataclass(frozen=True, slots=True)

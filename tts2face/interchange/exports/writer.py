@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Protocol, TextIO
 from lexicon.errors import InputError
 from tts2face.interchange.exports.parts import FormatWriter, FrameGrid, Target
 from tts2face.interchange.exports.table import FormatInfo, find_format, sound_name, split_format
-from tts2face.storage.files import check_name, translate_disk_errors
+from tts2face.storage.files import translate_disk_errors
+from tts2face.storage.output_paths import check_name
 from tts2face.storage.temporary import Temporary
 from tts2face.types import Clip, exact_rate
 

@@ -51,7 +51,7 @@ from tts2face.sound.voice_pool import (
     voice_names,
 )
 from tts2face.source import NATURAL, parse_articulation
-from tts2face.storage.files import present_name
+from tts2face.storage.shipped import present_name
 
 MODEL_NAMES = tuple(option.name for option in fields(Models))
 PATTERN_NAMES = ("speaker", "subtitle_style", "file", "text")

@@ -29,7 +29,7 @@ from tts2face.serving.batch.output import (
 )
 from tts2face.serving.batch.segment import Segment, SegmentResult
 from tts2face.serving.batch.store import Store, open_store
-from tts2face.storage.files import refuse_overwriting
+from tts2face.storage.output_paths import refuse_overwriting
 from tts2face.storage.temporary import Temporary
 from tts2face.types import Progress
 

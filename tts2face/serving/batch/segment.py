@@ -27,7 +27,8 @@ from tts2face.models.face_names import BALD
 from tts2face.request import OWN_FACE, Request
 from tts2face.session.named_models import Models
 from tts2face.storage.content_store import content_hash
-from tts2face.storage.files import find_file, translate_disk_errors
+from tts2face.storage.files import translate_disk_errors
+from tts2face.storage.shipped import find_file
 from tts2face.types import SOUND_RATE, exact_rate, first_sample
 from tts2face.video.media import sound_blocks
 

@@ -10,7 +10,7 @@ from starlette.exceptions import HTTPException
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
 from tts2face.serving.service.messages import DefectError
 from tts2face.serving.service.pool import BusyError
-from tts2face.storage.files import without_folders, without_paths
+from tts2face.storage.user_folders import without_folders, without_paths
 
 
 class RefusedError(HTTPException):

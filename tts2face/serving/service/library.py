@@ -41,7 +41,8 @@ from tts2face.serving.work.resources import (
 from tts2face.serving.work.run import RESOURCES
 from tts2face.serving.work.uploaded_file import DRAW
 from tts2face.session import catalogue
-from tts2face.storage.files import FORMER, find_file, translate_disk_errors
+from tts2face.storage.files import translate_disk_errors
+from tts2face.storage.shipped import FORMER, find_file
 from tts2face.storage.temporary import Temporary
 
 NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,39}")

@@ -216,6 +216,6 @@ def _speech_event(piece: "Piece", begin: float) -> Event:
 
 
 def _sound(clip: Clip) -> Chunk:
-    from tts2face.storage.media_files import pcm_bytes
+    from tts2face.storage.wave_files import pcm_bytes
 
     return Chunk(pcm_bytes(clip.speech.waveform.samples), clip.speech.waveform.duration)

@@ -9,7 +9,7 @@ from typing import Any
 from lexicon.errors import Tts2faceError
 from tts2face.processes.parent import ChildEndedError
 from tts2face.serving.service.logs import log_event
-from tts2face.storage.files import without_paths
+from tts2face.storage.user_folders import without_paths
 
 N_ENDED = 3  # processes that end before they are ready, one after another: no accident
 CallProcess = Callable[[str, Mapping[str, Any]], Awaitable[object]]  # with the name and the content of a call

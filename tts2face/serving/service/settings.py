@@ -15,7 +15,7 @@ from lexicon.values.fields import check_fields
 from lexicon.values.files import read_text
 from lexicon.values.records import checked
 from lexicon.values.toml_text import parse_toml
-from tts2face.storage.files import user_data
+from tts2face.storage.user_folders import user_data
 
 PREFIX = "TTS2FACE_SERVE_"  # of environment variables: TTS2FACE_SERVE_PORT
 SECRET_PREFIX = "whsec_"  # of secrets of webhooks in base64 (Standard Webhooks)

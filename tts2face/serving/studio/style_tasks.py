@@ -11,7 +11,7 @@ import numpy as np
 from tts2face.models.palette_editing import StyleMix, mix_styles
 from tts2face.picture.options import Picture
 from tts2face.serving.service.messages import Event, Inputs, Task, Work
-from tts2face.storage.media_files import pcm_bytes
+from tts2face.storage.wave_files import pcm_bytes
 from tts2face.types import Chunk
 
 if TYPE_CHECKING:

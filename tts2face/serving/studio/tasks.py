@@ -26,7 +26,7 @@ from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.prepared import StaleEdgesError
 from tts2face.session.project import Project, cut_timeline, without_edges
 from tts2face.session.project_file import parse_project
-from tts2face.storage.media_files import pcm_bytes
+from tts2face.storage.wave_files import pcm_bytes
 from tts2face.types import Chunk
 
 if TYPE_CHECKING:

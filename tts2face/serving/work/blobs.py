@@ -9,7 +9,8 @@ from pathlib import Path
 from lexicon.errors import BackendError
 from tts2face.serving.batch.segment import file_hash
 from tts2face.storage.content_store import ContentStore, FolderStore, content_hash, divided, open_content_store
-from tts2face.storage.files import translate_disk_errors, user_cache
+from tts2face.storage.files import translate_disk_errors
+from tts2face.storage.user_folders import user_cache
 
 HASH = re.compile(r"[0-9a-f]{64}")
 CACHE_BYTES = 4 << 30  # of local copies of a bucket

@@ -22,8 +22,8 @@ from tts2face.serving.work.kinds import JobCancelledError, JobTask, Product, fin
 from tts2face.serving.work.placed_files import place_file, place_models
 from tts2face.serving.work.segment_queue import ACTIVE, JOBS_PER_QUERY, failure_reason, open_client
 from tts2face.storage.bucket import StoreAwayError
-from tts2face.storage.files import without_folders
 from tts2face.storage.temporary import Temporary
+from tts2face.storage.user_folders import without_folders
 
 BLOBS, RESOURCES = "results", "resources"  # kinds of files in a store: of jobs, and uploaded models
 MODEL_SECTIONS = ("models", "request")  # parts of a job's JSON that may name uploads

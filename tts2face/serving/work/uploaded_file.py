@@ -30,7 +30,7 @@ from tts2face.serving.work.resource_check import (
 )
 from tts2face.serving.work.tools import LOW_PRIORITY
 from tts2face.storage.files import is_disk_full
-from tts2face.storage.media_files import decoding_bytes
+from tts2face.storage.pictures import decoding_bytes
 from tts2face.types import SOUND_RATE
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from PIL import Image
 import tts2face
 from tests.docs.blocks import DOCS, code_blocks
 from tests.running import RunningService
-from tts2face.storage.files import find_file
+from tts2face.storage.shipped import find_file
 
 EXAMPLES = code_blocks(DOCS / "http.md", "python")
 

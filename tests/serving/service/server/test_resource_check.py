@@ -22,7 +22,7 @@ from tts2face.models.consent import PHOTO_TOOL
 from tts2face.models.face_file import read_face
 from tts2face.models.light import Photographed
 from tts2face.serving.work.resource_check import PLACES, SHOWN, STATEMENT, draw_resource, is_picture
-from tts2face.storage.files import find_file
+from tts2face.storage.shipped import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 
 MOST_BYTES = 50e6

@@ -13,7 +13,7 @@ from websockets.asyncio.client import connect
 import tts2face
 from tests.models.made import write_made_models
 from tests.running import RunningService
-from tts2face.storage.files import find_file
+from tts2face.storage.shipped import find_file
 
 TEXT = "We were away."
 MAMA = b"away  M AA1 M AA0\n"  # another word than the one that is written

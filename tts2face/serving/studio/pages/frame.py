@@ -37,7 +37,7 @@ from tts2face.serving.studio.studio import Studio
 from tts2face.serving.studio.workspace import Workspace
 from tts2face.serving.work.resource_check import FACE, PALETTE
 from tts2face.session import catalogue
-from tts2face.storage.files import find_file
+from tts2face.storage.shipped import find_file
 
 DARK_COOKIE = "tts2face_dark"
 RECORD_PAGE = "/record"  # for keys that may build talkers

@@ -1,26 +1,16 @@
-"""Reading of picture files, with a limit on their size that is checked before they are decoded.
-
-16-bit mono .wav files, written in parts.
-
-Pictures within model files: pixels as JPEG, coverage as PNG.
-"""
+"""Reading of picture files, with a limit on their size that is checked before they are decoded."""
 
 import io
 import warnings
-import wave
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from lexicon.errors import DataError
 
 if TYPE_CHECKING:
     from PIL.Image import Image as Picture
-
 
 MAX_PIXELS = 100_000_000  # 300 MB as RGB; a small file can declare any size
 MAX_DECODING_BYTES = 1 << 30  # of one picture; a file of 2 KB can take that
@@ -89,75 +79,3 @@ def open_picture(
         if isinstance(error, DataError):
             raise
         raise DataError(f"cannot read {name}; {advice}") from error
-
-
-FULL_SCALE = 32767
-
-
-def open_wave(target: str | BinaryIO, rate: int) -> wave.Wave_write:
-    """Open a .wav file for writing at a path or in an open file; closing it completes its header."""
-    file = wave.open(target, "wb")  # noqa: SIM115 - closed by the caller
-    file.setparams((1, 2, rate, 0, "NONE", "not compressed"))
-    return file
-
-
-def pcm_bytes(samples: NDArray[np.floating]) -> bytes:
-    """Samples (n,) in [-1, 1] as 16-bit integers."""
-    steps: NDArray[np.int16] = np.rint(samples * FULL_SCALE).astype("<i2")
-    return steps.tobytes()
-
-
-def wave_bytes(samples: NDArray[np.floating], rate: int) -> bytes:
-    """Content of a .wav file."""
-    content = io.BytesIO()
-    with open_wave(content, rate) as file:
-        file.writeframes(pcm_bytes(samples))
-    return content.getvalue()
-
-
-JPEG_QUALITY = 92
-
-
-def texture_tensors(number: int) -> tuple[str, str]:
-    """Names of the tensors that hold the colours and the alpha of a face's texture."""
-    return f"texture{number or ''}", f"alpha{number or ''}"
-
-
-def encode_colours(pixels: NDArray[np.uint8], quality: int = JPEG_QUALITY) -> NDArray[np.uint8]:
-    """JPEG, as bytes (N,), of pixels (H, W, 3) or (H, W)."""
-    return _encode(pixels, "JPEG", quality=quality, **({"subsampling": 0} if pixels.ndim == 3 else {}))
-
-
-def encode_coverage(alpha: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """PNG, as bytes (N,), of coverage (H, W)."""
-    return _encode(alpha, "PNG")
-
-
-def decode_colours(content: NDArray[np.uint8], path: Path, mode: str = "RGB") -> NDArray[np.uint8]:
-    """Pixels of a JPEG in a mode of Pillow (RGB or L).
-
-    Raises
-    ------
-    DataError
-        The picture cannot be decoded or is too large.
-    """
-    return _decode(content, "JPEG", mode, path)
-
-
-def decode_coverage(content: NDArray[np.uint8], path: Path) -> NDArray[np.uint8]:
-    """Coverage (H, W) of a PNG; raises as `decode_colours`."""
-    return _decode(content, "PNG", "L", path)
-
-
-def _encode(pixels: NDArray[np.uint8], kind: str, **options: Any) -> NDArray[np.uint8]:
-    from PIL import Image
-
-    content = io.BytesIO()
-    Image.fromarray(pixels).save(content, kind, **options)
-    return np.frombuffer(content.getvalue(), np.uint8)
-
-
-def _decode(content: NDArray[np.uint8], kind: str, mode: str, path: Path) -> NDArray[np.uint8]:
-    what = f"the texture of {path}"
-    with open_picture(content.tobytes(), what, (kind,), advice="build or copy the file again") as image:
-        return np.array(image.convert(mode))
