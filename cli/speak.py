@@ -305,7 +305,7 @@ def convert(  # noqa: PLR0913 - one parameter a flag
     quiet: Annotated[bool, switch("Print no summary.")] = False,
 ) -> None:
     """Write a track to files of other programs."""
-    from tts2face.session.functions import convert as convert_track
+    from tts2face.session.clip_files import convert as convert_track
 
     began = time.perf_counter()
     written = convert_track(

@@ -53,10 +53,10 @@ if TYPE_CHECKING:
     from tts2face.session.catalogue import styles as styles
     from tts2face.session.catalogue import talkers as talkers
     from tts2face.session.catalogue import voices as voices
-    from tts2face.session.functions import convert as convert
-    from tts2face.session.functions import export as export
-    from tts2face.session.functions import load_clip as load_clip
-    from tts2face.session.functions import write_clip as write_clip
+    from tts2face.session.clip_files import convert as convert
+    from tts2face.session.clip_files import export as export
+    from tts2face.session.clip_files import load_clip as load_clip
+    from tts2face.session.clip_files import write_clip as write_clip
     from tts2face.session.outputs import WrittenClip as WrittenClip
     from tts2face.session.performance import Performance as Performance
     from tts2face.session.project import Project as Project
@@ -149,7 +149,7 @@ __all__ = [
 _MODULES = {
     "lexicon.errors": ("BackendError", "DataError", "InputError", "Tts2faceError"),
     "lexicon.sequence": ("PhoneSequence", "WordSpan"),
-    "tts2face.session.functions": ("convert", "export", "load_clip", "write_clip"),
+    "tts2face.session.clip_files": ("convert", "export", "load_clip", "write_clip"),
     "tts2face.serving.batch.cast": ("Cast", "read_cast"),
     "tts2face.serving.batch.options": ("BatchOptions",),
     "tts2face.serving.batch.output": ("Plan",),

@@ -253,6 +253,11 @@ class Clip:
         if len(self.motion) != expected:
             raise InputError(f"the sound needs {expected} frames, the motion has {len(self.motion)}")
 
+    @classmethod
+    def at_rest(cls, n_frames: int, fps: float, speech: Speech) -> "Clip":
+        """Speech of a face that has no channels and does not move its head."""
+        return cls(Trajectory((), np.zeros((n_frames, 0), np.float32), fps), resting_head(n_frames, fps), speech)
+
     @property
     def fps(self) -> float:
         """Frames per second."""

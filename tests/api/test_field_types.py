@@ -48,10 +48,10 @@ from tts2face.serving.batch.lines import LineSettings
 from tts2face.serving.batch.options import BatchOptions
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.studio.comparison import KEPT, Reference
+from tts2face.session.corrections import SentenceEdges
 from tts2face.session.encoded_stream import StreamFormat
 from tts2face.session.named_models import Models
 from tts2face.session.performance import Performance
-from tts2face.session.prepared import SentenceEdges
 from tts2face.session.project import Project
 from tts2face.source import FromPhones, FromSound, Idle, Listening, Recorded, SourceOptions, Spoken
 from tts2face.types import Clip, Speech, Trajectory, Waveform, resting_head

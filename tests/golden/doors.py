@@ -9,9 +9,10 @@ from typing import Any
 from tests.golden.fingerprints import Fingerprint, hashed, of_clips, of_files, of_pictures
 from tts2face.picture.options import Picture
 from tts2face.request import Request
-from tts2face.session.functions import SessionCache, load_clip, write_clip
+from tts2face.session.clip_files import load_clip, write_clip
 from tts2face.session.named_models import Models
 from tts2face.session.session import Session
+from tts2face.session.session_cache import SessionCache
 
 SESSIONS = SessionCache(3)  # of the shipped models; what was made before does not change a result
 SMALL = {"size": "64x64", "supersampling": 1}

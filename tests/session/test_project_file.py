@@ -13,8 +13,8 @@ from tts2face.gestures.timeline_file import timeline_json
 from tts2face.lips.options import ExcludedToken
 from tts2face.picture.options import Picture
 from tts2face.request import Request, option_fields
+from tts2face.session.corrections import SentenceEdges
 from tts2face.session.named_models import Models
-from tts2face.session.prepared import SentenceEdges
 from tts2face.session.project import Project
 from tts2face.session.project_file import load_project, project_json, save_project
 

@@ -12,8 +12,8 @@ from tts2face.gestures.elements import ChannelEdit
 from tts2face.gestures.timeline import Timeline
 from tts2face.lips.options import ExcludedToken
 from tts2face.request import Request
+from tts2face.session.corrections import SentenceEdges
 from tts2face.session.named_models import Models
-from tts2face.session.prepared import SentenceEdges
 from tts2face.session.project import Project
 from tts2face.session.project_file import load_project, save_project
 from tts2face.session.session import Session

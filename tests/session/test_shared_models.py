@@ -14,8 +14,8 @@ from lexicon.errors import DataError
 from tts2face import Session, load_face, load_palette, load_talker
 from tts2face.models import talker as talker_files
 from tts2face.processes.shared import N_KEPT, Shared, free_unused, shared
-from tts2face.session.functions import SessionCache
 from tts2face.session.named_models import Models
+from tts2face.session.session_cache import SessionCache
 from tts2face.storage.shipped import find_file
 
 

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 import tts2face
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tests.world import LEAD_S, RATE_HZ, LetterVoice
+from tts2face.session.corrections import SentenceEdges
 from tts2face.session.joining import lead_in
-from tts2face.session.prepared import SentenceEdges
 from tts2face.sound import voice_pool
 from tts2face.sound.pauses import ONSET_WINDOW_S, speech_onset
 from tts2face.types import Speech, Waveform

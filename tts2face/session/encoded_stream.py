@@ -19,8 +19,8 @@ from tts2face.picture.options import Picture
 from tts2face.picture.pace import Pace
 from tts2face.picture.sound_stream import SOUND_KINDS, encode_sound
 from tts2face.session.animated_face import AnimatedFace
-from tts2face.session.models import SessionModels
 from tts2face.session.prepared import PreparedRequest
+from tts2face.session.shared_models import SessionModels
 from tts2face.session.speech_stream import Piece, timed_speech
 from tts2face.source import Recorded
 from tts2face.types import Chunk

@@ -23,9 +23,9 @@ from tts2face.lips.performer import PerformerRetargeter, build_performer_retarge
 from tts2face.models.face import Face
 from tts2face.models.talker import speech_channels
 from tts2face.request import Request
-from tts2face.session.models import SessionModels
 from tts2face.session.prepared import prepare
 from tts2face.session.recording import select_audio_map
+from tts2face.session.shared_models import SessionModels
 from tts2face.session.speech_stream import Piece, after_listening
 from tts2face.session.steps import pieces_from
 from tts2face.sound.features import FEATURE_RATE

@@ -39,7 +39,7 @@ class Models:
 
     def shown_face(self) -> "Face | None":
         """Face of these models, None for the talker's own; raises as `Session`."""
-        from tts2face.session.models import shown_face
+        from tts2face.session.shared_models import shown_face
 
         return shown_face(self.face, self.identity, self.hair, self.hair_color)
 

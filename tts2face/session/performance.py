@@ -13,9 +13,9 @@ from tts2face.face.body import Body
 from tts2face.numeric.arrays import interpolate_rows
 from tts2face.picture.options import Picture
 from tts2face.session.animated_face import AnimatedFace, FaceMotion
-from tts2face.session.models import SessionModels
 from tts2face.session.outputs import OutputFiles, WrittenClip
 from tts2face.session.recording import clip_bounds
+from tts2face.session.shared_models import SessionModels
 from tts2face.types import SOUND_RATE, Clip, Progress, Speech, Waveform, exact_rate
 from tts2face.video.media import read_media_info, read_sound
 from tts2face.video.streaming import StreamingTracker
@@ -147,7 +147,7 @@ def resample_take(motion: FaceMotion, fps: float) -> FaceMotion:
 def take_clips(motion: FaceMotion, sound: Waveform) -> Iterator[Clip]:
     """Divide motion and sound into clips of at most `MAX_CLIP_FRAMES` frames; short sound is padded with silence."""
     body = Body(motion.face.channels, 0)
-    for first, last, begin, end in clip_bounds(motion.face, sound.rate):
+    for first, last, begin, end in clip_bounds(len(motion.face), exact_rate(motion.face.fps), sound.rate):
         speech = Speech.without_phones(sound.part(begin, end).padded(end - begin))
         face, head = motion.face.part(first, last), motion.head.part(first, last)
         yield Clip(body.move(face, head, speech.phones), head, speech)

@@ -1,181 +1,34 @@
-"""A request that is parsed and checked once: its text and marks, its timeline, and phone edges corrected by hand."""
+"""A request that is parsed and checked once: its text with its marks, its timeline and its options of synthesis."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from lexicon.dictionary import read_dictionary
 from lexicon.errors import InputError
 from lexicon.foreign_words import make_readable
 from lexicon.ipa import IpaPhone
-from lexicon.languages import check_readable, language_code
-from lexicon.marked_text import RATE_LIMITS, VOLUME_LIMITS, MarkedText
-from lexicon.sentence_length import check_silence
+from lexicon.languages import check_readable
+from lexicon.marked_text import MarkedText
 from lexicon.sentences import Sentence, split_sentences
-from lexicon.sequence import SILENCE, PhoneSequence
 from lexicon.ssml import parse_marks
-from lexicon.values.fields import check_fields
 from lexicon.values.files import is_file
-from tts2face.gestures.elements import ExpressionSpan, Gains, ListeningSpan
-from tts2face.gestures.listening import CUE_RATE, cue_times, responses
-from tts2face.gestures.timeline import Timeline, parse_expressions, parse_gains, parse_style
-from tts2face.gestures.timeline_file import read_timeline
+from tts2face.gestures.timeline import Timeline
 from tts2face.lips.options import METHOD_OPTIONS, ExcludedToken, SynthesisOptions
 from tts2face.picture.options import Picture
-from tts2face.request import CAMERA, Request, option_fields
+from tts2face.request import Request, option_fields
+from tts2face.session.corrections import SentenceEdges
 from tts2face.session.joining import Excerpt
+from tts2face.session.request_timeline import build_request_timeline, listening_timeline
+from tts2face.session.text_marks import check_marks
 from tts2face.source import Listening, Recorded, Source, Spoken
 from tts2face.storage.output_paths import AnyPath
 from tts2face.types import exact_rate
 
 if TYPE_CHECKING:
     from tts2face.sound.voice_pool import VoicePool
-
-
-@lru_cache(maxsize=1000)
-def innermost_styles(nested: tuple[str, ...]) -> Mapping[str, str]:
-    """Style of each feature under nested marks; the innermost mark of a feature applies."""
-    chosen: dict[str, str] = {}
-    for written in nested:
-        chosen |= parse_style(written)
-    return chosen
-
-
-def marked_styles(text: MarkedText) -> tuple[str, ...]:
-    """Names of all styles in the marks of a text, in order of first use; raises as `check_marks`."""
-    runs = dict.fromkeys(run.styles for run in text.runs)
-    return tuple(dict.fromkeys(style for styles in runs for style in innermost_styles(styles).values()))
-
-
-def check_marks(text: MarkedText, request: Request) -> None:
-    """Reject marks that are invalid or cannot be combined with the request, in time linear in the length of the text.
-
-    Raises
-    ------
-    InputError
-        A style cannot be parsed, the product of a speed or loudness with the request's is out of range, the text names
-        another language, or the text of a recording has marks that change pauses or the voice.
-    """
-    if isinstance(request.source, Recorded) and text.has_voice_changes:
-        raise InputError(
-            "[pause], <break>, <prosody>, <emphasis>, <voice> and <lang> have no effect on a recording; remove them or "
-            "--audio"
-        )
-    if text.language is not None and _primary(language_code(text.language)) != _primary(request.language):
-        raise InputError(f"the text names the language {text.language}, not {request.language}; choose one of them")
-    marked_styles(text)
-    check_silence(text)
-    spoken = request.spoken or Spoken("")
-    for what, marked, requested, (low, high) in (
-        ("speed", {run.rate for run in text.runs}, spoken.rate, RATE_LIMITS),
-        ("loudness", {run.volume for run in text.runs}, spoken.volume, VOLUME_LIMITS),
-    ):
-        for factor in marked:
-            if not low <= factor * requested <= high:
-                raise InputError(
-                    f"a {what} of {factor:g} in the text times {requested:g} of the request lies outside "
-                    f"{low:g} to {high:g}; change one of them"
-                )
-
-
-def _primary(language: str) -> str:
-    """Primary language of a code: ``en`` of ``en-gb``."""
-    return language.partition("-")[0]
-
-
-RECORDING = ""  # text of the one sentence of a recording
-MAX_END_CHANGE_S = 0.05  # the last edge is the end of the sound, padded to a whole number of frames
-OF_VIDEO = "video"  # expression of the person in the video of a recording
-SMILE_S = 10.0  # of its beginning are read: as `held_smile`, its score is the weight of happy (.63 for .7)
-EQUAL_EDGES_S = 1e-3  # by which edges of one sound differ, as its start is cut at a sample
-
-
-class StaleEdgesError(InputError):
-    """Corrected edges of a sentence that has other phones or another duration now."""
-
-    def __init__(self, text: str, occurrence: int) -> None:
-        self.text, self.occurrence = text, occurrence
-        where = f"the sentence {text[:60]!r}" if text else "the recording"
-        super().__init__(
-            f"the corrected phone edges of {where} belong to other phones or to another sound; remove them, or "
-            "restore the text, voice and pronunciations for which they were made"
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class SentenceEdges:
-    """Corrected edges of one sentence.
-
-    Parameters
-    ----------
-    text, occurrence
-        Written sentence without its marks (`RECORDING` for a recording), and the number of equal sentences before it.
-    phones
-        The N phones for which the edges were corrected.
-    edges
-        N + 1 edges in seconds of the sentence, increasing from 0.
-
-    Raises
-    ------
-    InputError
-        The number is negative, or there is not one edge more than phones.
-    """
-
-    text: str
-    occurrence: int
-    phones: tuple[str, ...]
-    edges: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        """Refuse other types, edges that do not fit the phones, and times that do not increase."""
-        check_fields(self)
-        if self.occurrence < 0:
-            raise InputError(f"the occurrence of a sentence must be 0 or more, not {self.occurrence}")
-        PhoneSequence(self.phones, self.edges)
-
-    def applied(self, phones: PhoneSequence) -> PhoneSequence | None:
-        """The phones of a sentence at the corrected edges; None if it has other phones or another sound.
-
-        The first sentence of a clip has less silence before it than the same one elsewhere: edges move with the sound,
-        which is the same where at least half of them were not corrected.
-        """
-        if phones.phones != self.phones:
-            return None
-        own = np.array(self.edges)
-        later = phones.edges[1:-1] - own[1:-1]
-        if abs(phones.end - own[-1]) > MAX_END_CHANGE_S and len(later) and phones.phones[0] == SILENCE:
-            shift = float(np.median(later))
-            if 2 * np.count_nonzero(np.abs(later - shift) <= EQUAL_EDGES_S) >= len(later):
-                own[1:] += shift
-        if abs(phones.end - own[-1]) > MAX_END_CHANGE_S or own[-2] >= phones.end or own[1] <= 0.0:
-            return None
-        own[-1] = phones.end
-        return PhoneSequence(phones.phones, own)
-
-
-def correct_phones(
-    phones: PhoneSequence, text: str, occurrence: int, corrections: Sequence[SentenceEdges]
-) -> PhoneSequence:
-    """Phones of a sentence at their corrected edges, or as they are without a correction.
-
-    Raises
-    ------
-    StaleEdgesError
-        The correction belongs to other phones or to a sound of another length.
-    """
-    for one in corrections:
-        if (one.text, one.occurrence) == (text, occurrence):
-            corrected = one.applied(phones)
-            if corrected is None:
-                raise StaleEdgesError(text, occurrence)
-            return corrected
-    return phones
-
 
 HEARING_STEPS, RECORDING_STEPS = 300, 700  # steps of progress of a recording: until its phones are known, and then
 IDLE_STEPS = 1000  # steps of progress of idle animation
@@ -268,7 +121,7 @@ def prepare(request: Request) -> PreparedRequest:
         build_request_timeline(request),
         synthesis_options(request),
         read_dictionary(request.dictionary).entries if request.dictionary else {},
-        listening=_listening(request),
+        listening=listening_timeline(request),
         notes=notes,
     )
     if not source.text and not isinstance(source, Spoken):
@@ -289,20 +142,6 @@ def recordings(source: Source) -> dict[str, Path]:
             return {"partner": source.partner}
         case _:
             return {}
-
-
-def _listening(request: Request) -> Timeline:
-    """What the face does while it listens; what is heard of a partner gives the responses."""
-    source = request.source
-    if not isinstance(source, Listening):
-        return Timeline()
-    span = ListeningSpan(0.0, source.seconds, reacts=source.partner is None)
-    cues: list[float] = []
-    if source.partner is not None:
-        from tts2face.video.media import read_sound
-
-        cues = [time for time in cue_times(read_sound(source.partner, CUE_RATE)) if time < source.seconds]
-    return responses(cues, request.seed).merge(Timeline(listens=(span,)))
 
 
 def prepare_request(text: str | Request | PreparedRequest, options: dict[str, Any]) -> PreparedRequest:
@@ -343,50 +182,6 @@ def split_picture(picture: Picture | None, options: dict[str, Any]) -> tuple[Pic
 
 def _option_names(kind: type) -> tuple[str, ...]:
     return tuple(option.name for option in option_fields(kind) if option.name != "text")
-
-
-def build_request_timeline(request: Request) -> Timeline:
-    """Timeline of a request's ``timeline`` file, overridden by its ``style``, ``gain`` and ``expression``.
-
-    Raises
-    ------
-    InputError, DataError
-        An option cannot be parsed, or the file is invalid; or the recording shows no face, as `read_take`.
-    BackendError
-        The tracker of faces is not installed, for the expression of a video.
-    """
-    flags = Timeline(
-        style=parse_style(request.style) if request.style is not None else {},
-        expressions=_expressions(request),
-        gains=_gains(request),
-    )
-    return read_timeline(request.timeline).merge(flags) if request.timeline is not None else flags
-
-
-def _expressions(request: Request) -> tuple[ExpressionSpan, ...]:
-    if request.expression is None:
-        return ()
-    if request.expression.strip() != OF_VIDEO:
-        return parse_expressions(request.expression)
-    source = request.source
-    if not isinstance(source, Recorded):
-        raise InputError("--expression video needs a recording with pictures of the person; add --audio clip.mp4")
-    from tts2face.lips.performer import held_smile
-    from tts2face.video.streaming import StreamingTracker
-    from tts2face.video.take import BlendshapeReader, read_take
-
-    take = read_take(source.audio, StreamingTracker(), BlendshapeReader(), seconds=SMILE_S)
-    smile = held_smile(take.landmarks, take.scores)
-    return (ExpressionSpan("happy", float(np.mean(list(smile.values())))),) if smile else ()
-
-
-def _gains(request: Request) -> Gains:
-    gains = parse_gains(request.gain) if request.gain is not None else Gains()
-    if request.gaze != CAMERA:
-        return gains
-    if "gaze" in gains.factors:
-        raise InputError("--gain of the gaze has no effect with --gaze camera; remove one of them")
-    return Gains({**gains.factors, "gaze": 0.0})
 
 
 def synthesis_options(request: Request) -> SynthesisOptions:

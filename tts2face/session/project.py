@@ -19,8 +19,9 @@ from tts2face.lips.options import ExcludedToken
 from tts2face.models.palette import FEATURES
 from tts2face.picture.options import Picture
 from tts2face.request import Request
+from tts2face.session.corrections import SentenceEdges
 from tts2face.session.named_models import Models
-from tts2face.session.prepared import PreparedRequest, SentenceEdges, prepare
+from tts2face.session.prepared import PreparedRequest, prepare
 
 MAX_NAME = 200
 

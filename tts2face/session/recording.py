@@ -32,10 +32,8 @@ from tts2face.types import (
     Speech,
     Trajectory,
     Waveform,
-    exact_rate,
     first_sample,
     frame_count,
-    resting_head,
 )
 from tts2face.video.media import sound_blocks
 
@@ -49,12 +47,14 @@ DEFAULT_AUDIO_MAPS = ("voices", "network")  # the first that a talker has
 class TimedTranscript:
     """Phones and words of a recording with their times; a single silence if the words are unknown.
 
-    ``mismatches`` are spans in which the recording probably contains other words.
+    ``mismatches`` are spans in which the recording probably contains other words; ``gain`` brings its sound to the
+    level of an audio map.
     """
 
     phones: PhoneSequence
     words: tuple[WordSpan, ...]
     mismatches: tuple[TextMismatch, ...] = ()
+    gain: float = 1.0
 
     @property
     def duration(self) -> float:
@@ -136,12 +136,22 @@ def map_audio_to_motion(
     InputError, DataError
         The recording cannot be read, is silent or too short.
     """
-    levels, _ = _features(path, "level", audio_map.fps, 1.0)
-    gain = audio_map.gain_for(speech_level(levels))
-    features, duration = _features(path, audio_map.feature, audio_map.fps, gain)
+    heard = measure_recording(path, audio_map)
+    return heard, mapped_motion(path, audio_map, talker, fps, heard)
+
+
+def measure_recording(path: Path, audio_map: AudioMap) -> TimedTranscript:
+    """Duration of a recording and its gain for an audio map; errors as `map_audio_to_motion`."""
+    levels, duration = _features(path, "level", audio_map.fps, 1.0)
+    silence = PhoneSequence([SILENCE], [0.0, duration])
+    return TimedTranscript(silence, (), gain=audio_map.gain_for(speech_level(levels)))
+
+
+def mapped_motion(path: Path, audio_map: AudioMap, talker: Talker, fps: float, heard: TimedTranscript) -> Trajectory:
+    """Speech parameters of a recording that is measured; as `map_audio_to_motion`."""
+    features, duration = _features(path, audio_map.feature, audio_map.fps, heard.gain)
     lips = resample_motion(audio_map.parameters(features), audio_map.fps, fps, frame_count(duration, fps))
-    phones = PhoneSequence([SILENCE], [0.0, duration])
-    return TimedTranscript(phones, ()), Trajectory(speech_channels(talker.model), lips, fps)
+    return Trajectory(speech_channels(talker.model), lips, fps)
 
 
 def _features(path: Path, kind: str, fps: float, gain: float) -> tuple[NDArray[np.float32], float]:
@@ -156,27 +166,23 @@ def resample_motion(values: NDArray[np.float32], rate: float, fps: float, n_fram
     return interpolate_cubic(values, np.minimum(np.arange(n_frames) / fps * rate, len(values) - 1))
 
 
-def clip_bounds(motion: Trajectory, rate: int) -> Iterator[tuple[int, int, int, int]]:
+def clip_bounds(n_frames: int, fps: Fraction, rate: int) -> Iterator[tuple[int, int, int, int]]:
     """First frame, frame after the last, and the same of samples, of clips of at most `MAX_CLIP_FRAMES` frames."""
-    fps = exact_rate(motion.fps)
-    for first in range(0, len(motion), MAX_CLIP_FRAMES):
-        last = min(first + MAX_CLIP_FRAMES, len(motion))
+    for first in range(0, n_frames, MAX_CLIP_FRAMES):
+        last = min(first + MAX_CLIP_FRAMES, n_frames)
         yield first, last, first_sample(first, rate, fps), first_sample(last, rate, fps)
 
 
-def recording_clips(path: Path, transcript: TimedTranscript, motion: Trajectory, *, volume: float) -> Iterator[Clip]:
-    """Divide a recording's motion and sound into clips of at most `MAX_CLIP_FRAMES` frames, each with its phones."""
-    fps = exact_rate(motion.fps)
+def recording_clips(
+    path: Path, transcript: TimedTranscript, n_frames: int, fps: Fraction, *, volume: float
+) -> Iterator[Clip]:
+    """Divide a recording into clips of at most `MAX_CLIP_FRAMES` frames, each with its phones and the face at rest."""
     sound = _SampleReader(sound_blocks(path, SOUND_RATE))
-    for first, last, begin, end in clip_bounds(motion, SOUND_RATE):
+    for first, last, begin, end in clip_bounds(n_frames, fps, SOUND_RATE):
         samples = np.clip(volume * sound.next(end - begin), -1.0, 1.0)
         seconds = (float(Fraction(first) / fps), len(samples) / SOUND_RATE)
         phones, words = _phones_within(transcript, *seconds)
-        yield Clip(
-            motion.part(first, last),
-            resting_head(last - first, motion.fps),
-            Speech(Waveform(samples, SOUND_RATE), phones, words),
-        )
+        yield Clip.at_rest(last - first, float(fps), Speech(Waveform(samples, SOUND_RATE), phones, words))
 
 
 def _phones_within(

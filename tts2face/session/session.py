@@ -18,7 +18,6 @@ from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.encoded_stream import StreamFormat, encode_stream
 from tts2face.session.fixed_length import Length, clips_of_length
 from tts2face.session.live import LiveLips, LiveSpeech
-from tts2face.session.models import SessionModels, shown_face
 from tts2face.session.outputs import (
     OutputFiles,
     RequestSteps,
@@ -28,6 +27,7 @@ from tts2face.session.outputs import (
     write_pieces,
 )
 from tts2face.session.prepared import PreparedRequest, input_paths, prepare_request, split_picture
+from tts2face.session.shared_models import SessionModels, shown_face
 from tts2face.session.speech_stream import Piece, SpeechSpan, measure_speech, timed_speech
 from tts2face.sound.features import FEATURE_RATE
 from tts2face.sound.voice_pool import VoicePool

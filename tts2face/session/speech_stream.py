@@ -17,8 +17,9 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.gestures.timeline import Timeline
 from tts2face.processes.memory import NO_MEMORY, SentenceMemory
 from tts2face.request import CONVERSATION
+from tts2face.session.corrections import correct_phones
 from tts2face.session.joining import Excerpt, excerpt_of_speech, shift_start, silent_speech, word_bounds
-from tts2face.session.prepared import IDLE_STEPS, PreparedRequest, correct_phones
+from tts2face.session.prepared import IDLE_STEPS, PreparedRequest
 from tts2face.session.speech import (
     NO_DELIVERIES,
     Deliveries,
@@ -38,17 +39,17 @@ from tts2face.source import TURN_S, Idle, Listening, Recorded, Spoken
 from tts2face.types import (
     Clip,
     Speech,
-    Trajectory,
     Waveform,
     YieldTurn,
     concatenate_speech,
     frame_count,
     keep_on,
     pad_to_frame,
-    resting_head,
 )
 
 if TYPE_CHECKING:
+    from concurrent.futures import Future
+
     from tts2face.lips.explanation import PhoneExplanation
     from tts2face.sound.alignment import TextMismatch
 
@@ -87,6 +88,8 @@ class Piece:
         Phones of the whole recording, with its first piece; None for all other pieces.
     voice_sound
         Sound as the voice returns it, which gestures follow; None where it is that of the clip.
+    drawn
+        Gestures that a thread draws (`tts2face.session.gesture_layer`), until they are added.
     """
 
     clip: Clip
@@ -99,6 +102,7 @@ class Piece:
     text: str = ""
     transcript: PhoneSequence | None = None
     voice_sound: Waveform | None = None
+    drawn: "Future[Any] | None" = None
 
     @property
     def speech(self) -> Speech:
@@ -161,10 +165,9 @@ def spoken_pieces(
     for spoken, n_steps, text in speak_sentences(prepared, models, has_phones=has_phones):
         speech, begin = pad_to_frame(spoken.speech, first_frame, fps), float(first_frame / fps)
         n_frames = frame_count(speech.waveform.duration, float(fps))
-        still = Trajectory((), np.zeros((n_frames, 0), np.float32), float(fps))
         sound = spoken.sound.padded(len(speech.waveform.samples))
         yield Piece(
-            Clip(still, resting_head(n_frames, float(fps)), replace(speech, waveform=sound)),
+            Clip.at_rest(n_frames, float(fps), replace(speech, waveform=sound)),
             begin,
             n_steps,
             spoken.timeline.restrict(0.0, speech.waveform.duration).shift(begin),

@@ -30,7 +30,7 @@ from tts2face.serving.service.server import Mount, create_app
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.service.synthesis import TASKS, Synthesis
-from tts2face.session.functions import SessionCache
+from tts2face.session.session_cache import SessionCache
 
 START_S = 60.0
 SECONDS = 1.0  # of speech of an answer of a table

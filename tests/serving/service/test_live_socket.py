@@ -10,7 +10,7 @@ from starlette.testclient import TestClient, WebSocketTestSession
 
 from tests.serving.service.in_process import SessionProcess, service_client
 from tts2face.serving.service.settings import ServiceSettings
-from tts2face.session.functions import SessionCache
+from tts2face.session.session_cache import SessionCache
 
 WORDS = ["Hello", "there,", "how", "are", "you?", "I", "am", "well.", "And"]
 

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from tts2face.session import functions
-from tts2face.session.functions import SessionCache
 from tts2face.session.named_models import Models
+from tts2face.session.session_cache import SessionCache
 
 MB = 1_000_000
 
@@ -64,7 +64,7 @@ def test_the_least_recently_used_session_is_released_first() -> None:
 def test_the_memory_of_a_process_is_measured() -> None:
     """In a new process, which has no free memory to use again."""
     code = """
-from tts2face.session.functions import resident_bytes
+from tts2face.session.session_cache import resident_bytes
 before = resident_bytes()
 block = bytearray(b"x" * 50_000_000)
 print(before, resident_bytes() - before)

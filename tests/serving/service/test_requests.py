@@ -26,7 +26,7 @@ from tests.serving.service.test_uploads import png, png_bomb, wav
 from tts2face.picture.sound_stream import HEAD_BYTES
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.settings import ServiceSettings
-from tts2face.session.functions import SessionCache
+from tts2face.session.session_cache import SessionCache
 
 TEXT = "Hello there. This is a test."
 SPEECH = {"input": TEXT, "voice": "alloy", "model": "tts-1"}

@@ -18,7 +18,7 @@ from tts2face.processes.message import ERROR, GO, MORE, PAUSE, STOP, Message, re
 from tts2face.serving.service.messages import Event, Step, Wait, Work
 from tts2face.serving.service.scheduler import InterruptedTaskError, OneAtATime, Turns, wait_elsewhere
 from tts2face.serving.service.synthesis import Synthesis
-from tts2face.session.functions import SessionCache
+from tts2face.session.session_cache import SessionCache
 from tts2face.sound.alignment import Aligner
 from tts2face.sound.voice_pool import VoicePool, load_voice
 from tts2face.types import Chunk

@@ -16,7 +16,7 @@ from tts2face.serving.service.pool import WarmProcess
 from tts2face.serving.service.preparation import Preparation
 from tts2face.serving.service.server import Mount, create_app
 from tts2face.serving.service.settings import ServiceSettings
-from tts2face.session.functions import SessionCache
+from tts2face.session.session_cache import SessionCache
 from tts2face.types import Chunk
 
 READY_TIMEOUT_S = 120.0

@@ -38,7 +38,7 @@ def closed(keys: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> It
     from tts2face.serving.service.settings import ServiceSettings
     from tts2face.serving.studio.app import STUDIO
     from tts2face.serving.studio.requests import TASKS
-    from tts2face.session.functions import SessionCache
+    from tts2face.session.session_cache import SessionCache
 
     settings = ServiceSettings(
         data=tmp_path_factory.mktemp("closed"), keys=Path(keys["file"]), workers=0, warm_studio=False

@@ -39,10 +39,10 @@ from tts2face.serving.batch.segment import (
     open_track,
     segment_from_json,
 )
-from tts2face.session.functions import SessionCache
 from tts2face.session.joining import Excerpt, fade_out
 from tts2face.session.prepared import PreparedRequest, prepare
 from tts2face.session.session import Session
+from tts2face.session.session_cache import SessionCache
 from tts2face.sound.pauses import speech_onset
 from tts2face.source import IDLE_LIMITS_S, FromPhones, Idle, Recorded, Spoken
 from tts2face.storage.files import translate_disk_errors

@@ -32,8 +32,8 @@ from tts2face.serving.service.messages import (
 )
 from tts2face.serving.service.scheduler import OneAtATime, Turns, give_turn, lead
 from tts2face.session import warm_up
-from tts2face.session.functions import SessionCache
 from tts2face.session.named_models import Models
+from tts2face.session.session_cache import SessionCache
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.types import Chunk, Waveform
 

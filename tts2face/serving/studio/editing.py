@@ -19,8 +19,8 @@ from tts2face.gestures.timeline import Timeline, expand_feature
 from tts2face.lips.options import ExcludedToken
 from tts2face.picture.options import Picture
 from tts2face.request import Request, option_fields
+from tts2face.session.corrections import SentenceEdges
 from tts2face.session.named_models import Models
-from tts2face.session.prepared import SentenceEdges
 from tts2face.session.project import Project
 
 MIN_PHONE_S = 0.01  # shortest phone that dragging an edge leaves: a frame of the alignment

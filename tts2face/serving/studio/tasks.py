@@ -23,7 +23,7 @@ from tts2face.lips.explanation import N_INSTANTS, LipOutline, PhoneExplanation, 
 from tts2face.models.talker import Talker
 from tts2face.serving.service.messages import DRAWING_THREADS, Event, Inputs, Task, Work
 from tts2face.session.animated_face import AnimatedFace
-from tts2face.session.prepared import StaleEdgesError
+from tts2face.session.corrections import StaleEdgesError
 from tts2face.session.project import Project, cut_timeline, without_edges
 from tts2face.session.project_file import parse_project
 from tts2face.storage.wave_files import pcm_bytes

@@ -1,10 +1,6 @@
-"""What is public besides `Session`: drawing, exporting and reading back a clip; and sessions by names of models."""
+"""Clips and their files without a session: drawing, exporting, reading back and converting."""
 
-import gc
-import os
-from collections import OrderedDict
 from collections.abc import Callable, Iterable
-from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,16 +15,13 @@ from tts2face.models.face_names import default_face
 from tts2face.models.palette import load_palette
 from tts2face.picture.film import write_clips
 from tts2face.picture.options import Picture
-from tts2face.processes.shared import free_unused
 from tts2face.session.animated_face import AnimatedFace
-from tts2face.session.named_models import Models
 from tts2face.session.speech_stream import Piece
 from tts2face.storage.output_paths import refuse_overwriting
 from tts2face.types import Clip, concatenate_clips
 
 if TYPE_CHECKING:
-    from tts2face.session.session import Session
-    from tts2face.sound.voice_pool import VoicePool
+    pass
 
 
 def write_clip(
@@ -188,71 +181,3 @@ def _mesh_with_channels(channels: tuple[str, ...], mesh: Face, names: tuple[str,
             f"{face} with the palette {palette}; name the face and palette that made it"
         )
     return mesh
-
-
-class SessionCache:
-    """Loads sessions at their first use and keeps the last ones; a second one takes 250 MB.
-
-    Parameters
-    ----------
-    n_sessions
-        Sessions to keep.
-    voices
-        Loaded voices that all sessions share; None: each has its own.
-    max_bytes
-        Memory of this process beyond which the least recently used sessions are released, all but one; None: any.
-    memory_mb
-        Finished sentences that a session with an owner keeps, as for `Session`.
-    """
-
-    def __init__(
-        self,
-        n_sessions: int = 1,
-        *,
-        voices: "VoicePool | None" = None,
-        max_bytes: int | None = None,
-        memory_mb: float = 0.0,
-    ) -> None:
-        self._n_sessions, self._voices, self._max_bytes = n_sessions, voices, max_bytes
-        self._memory_mb = memory_mb
-        self._sessions: OrderedDict[tuple[Models, str, tuple[int, ...]], Session] = OrderedDict()
-
-    def get(self, models: Models, owner: str = "") -> "Session":
-        """Session of these models; a new one if a file has changed; raises as `Session`.
-
-        Parameters
-        ----------
-        owner
-            For whom the session keeps finished sentences, and for nobody else; empty: it keeps none.
-        """
-        key = (models, owner, _file_times(models))
-        if key in self._sessions:
-            self._sessions.move_to_end(key)
-        else:
-            while len(self._sessions) >= self._n_sessions:
-                self._sessions.popitem(last=False)
-            gc.collect()  # sessions hold themselves in circles
-            self._sessions[key] = models.open_session(self._voices, memory_mb=self._memory_mb if owner else 0.0)
-            free_unused()  # models of the released sessions that the new one does not share
-        while self._max_bytes is not None and len(self._sessions) > 1 and resident_bytes() > self._max_bytes:
-            self._sessions.popitem(last=False)
-            free_unused()
-            gc.collect()
-        return self._sessions[key]
-
-
-def _file_times(models: Models) -> tuple[int, ...]:
-    """Times of the last change of those models that are files, in nanoseconds."""
-    found = []
-    for name in (models.talker, models.face, models.palette):
-        if name is not None and os.sep in name:
-            with suppress(OSError):
-                found.append(os.stat(name).st_mtime_ns)
-    return tuple(found)
-
-
-def resident_bytes() -> int:
-    """Memory of this process in bytes; 0 where the system does not tell."""
-    with suppress(OSError):
-        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-    return 0

@@ -1,0 +1,192 @@
+"""Steps that move the face besides its lips: gestures, and the body that follows them.
+
+What a step keeps for the next request, and by which key, is its method ``key``.
+"""
+
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field, replace
+from hashlib import blake2b
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.face.body import Body, phrase_starts
+from tts2face.face.gestures import SPEECH_GAINS
+from tts2face.gestures.elements import KINDS, interpolate_keys
+from tts2face.gestures.gaze import microsaccades
+from tts2face.gestures.listening import with_responses
+from tts2face.gestures.noise import NoiseStream
+from tts2face.gestures.stream import GestureFields, GestureStream, GestureValues
+from tts2face.gestures.timeline import Timeline
+from tts2face.models.palette import Palette
+from tts2face.processes.memory import NO_MEMORY, SentenceMemory
+from tts2face.request import FIELDS
+from tts2face.session.animated_face import AnimatedFace
+from tts2face.session.edits import ChannelEdits
+from tts2face.session.prepared import PreparedRequest
+from tts2face.session.speech_stream import Piece
+from tts2face.session.text_marks import marked_styles
+from tts2face.types import Clip, Waveform, YieldTurn, keep_on
+
+DEFAULT_STYLE = "neutral"
+REACH_S = 2.0  # s around a piece within which elements of the timeline affect it: nods last .6 s, fades .6 s
+TURN_REACH_S = 0.6  # before a phrase within which the face listened, where a turn begins
+STATE_BYTES = 200_000  # of a stream between two pieces
+POLL_S = 0.005  # between turns of other requests, while gestures are drawn
+Drawn = tuple[GestureValues, GestureStream | NoiseStream]  # gestures of a piece, and the stream for the piece after it
+
+
+def default_style(palette: Palette) -> str:
+    """Name of the style for requests that choose none: neutral, or the palette's first recorded style."""
+    return DEFAULT_STYLE if DEFAULT_STYLE in palette.names else next(iter(palette.styles))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Progress:
+    """Gestures after a piece: key of the pieces so far, stream, gestures of the marks, and seconds of the clip."""
+
+    history: bytes = b""
+    stream: GestureStream | NoiseStream | None = None
+    marked: Timeline = field(default_factory=Timeline)
+    seconds: float = 0.0
+
+
+class GestureLayer:
+    """Steps that move the face of one clip besides its lips: gestures, `edits` by hand, then the `body`.
+
+    Only the last step goes on to the next piece: after an exception between steps, the next is the same piece.
+
+    Parameters
+    ----------
+    yield_turn
+        Called while gestures are waited for.
+    memory
+        Keeps the motion of pieces, so that a changed timeline repeats only the pieces from the change on.
+
+    Raises
+    ------
+    InputError, DataError
+        The palette lacks a style of the request, or the face cannot move a feature for which a gain is given.
+    """
+
+    def __init__(
+        self,
+        prepared: PreparedRequest,
+        fields: GestureFields,
+        face: AnimatedFace,
+        yield_turn: YieldTurn = keep_on,
+        memory: SentenceMemory = NO_MEMORY,
+    ) -> None:
+        self._requested = Timeline(style=face.default_styles).merge(prepared.timeline)
+        self._face, self._yield_turn, self._memory = face, yield_turn, memory
+        palette, request = fields.palette, prepared.request
+        self._requested.check_styles(palette)
+        for style in marked_styles(prepared.text):
+            palette.require(style)
+        face.check_gains(self._requested.gains.factors)
+        self.edits = ChannelEdits(self._requested.edits, face)
+        self._body = Body(face.channels, request.seed)
+        self._seed, self._options = request.seed, (request.seed, request.gestures, request.pitch)
+        self._has_microsaccades = request.gestures == FIELDS  # other methods are as they were published
+        kind: type[NoiseStream] | type[GestureStream] = NoiseStream if request.gestures == "noise" else GestureStream
+        self._thread = ThreadPoolExecutor(1, "gestures")
+        # Building the fields takes 0.5 s, in parallel with loading the voice.
+        self._first: Future[GestureStream | NoiseStream] = self._thread.submit(
+            kind,
+            fields,
+            style=default_style(palette),
+            seed=request.seed,
+            fps=float(prepared.fps),
+            seeds=self._requested.seeds,
+        )
+        self._now = self._next = _Progress()
+
+    def draw(self, piece: Piece) -> Piece:
+        """The piece whose gestures are drawn in a thread, while its lips are made."""
+        return replace(piece, drawn=self._thread.submit(self._recall, piece))
+
+    def __call__(self, piece: Piece) -> Piece:
+        """The piece with gestures, which follow the loudness of its voice and the timelines of request and marks."""
+        lips, drawn = piece.clip.motion, piece.drawn
+        assert drawn is not None
+        while not wait([drawn], POLL_S).done:
+            self._yield_turn()
+        history, timeline, (gestures, stream) = drawn.result()
+        moved = self._memory.recall(
+            lambda: (history, lips.values.tobytes()),
+            lambda: self._face.add_gestures(lips, gestures, {name: timeline.gains.of(name) for name in SPEECH_GAINS}),
+            lambda made: made.face.values.nbytes + lips.values.nbytes,
+        )
+        self._next = _Progress(history, stream, self._marked(piece), self._now.seconds + lips.duration)
+        return replace(piece, clip=Clip(moved.face, moved.head, piece.speech), drawn=None)
+
+    def _marked(self, piece: Piece) -> Timeline:
+        """Gestures of the marks of a piece, and of those before it: a nod of the last piece lasts half a second."""
+        return self._now.marked.restrict(self._now.seconds - 1.0, np.inf).merge(piece.timeline)
+
+    def _recall(self, piece: Piece) -> tuple[bytes, Timeline, Drawn]:
+        """Gestures of a piece with their key, after those before it, and the timelines of request and marks."""
+        sound = piece.speech.waveform if piece.voice_sound is None else piece.voice_sound
+        times = self._now.seconds + piece.clip.motion.times
+        timeline = self._requested.merge(self._marked(piece))
+        timeline = with_responses(timeline, float(times[0]), float(times[-1]), self._seed)
+        history = self.key(times, sound, timeline) if self._memory.is_used else self._now.history
+        drawn = self._memory.recall(
+            lambda: history,
+            lambda: self._draw(sound, times, timeline),
+            lambda made: STATE_BYTES + sum(values.nbytes for values in made[0].values()),
+        )
+        return history, timeline, drawn
+
+    def key(self, times: NDArray[np.float64], sound: Waveform, timeline: Timeline) -> bytes:
+        """Digest of everything on which the gestures of a piece, after those before it, depend."""
+        here = replace(timeline.restrict(times[0] - REACH_S, times[-1] + REACH_S), edits=())  # a later step
+        elements = [
+            (name, kind.lane(one), interpolate_keys(times, one.keys).tobytes()) if kind.shape == "curve" else one
+            for name, kind in KINDS.items()
+            for one in getattr(here, name)
+        ]
+        maps = (dict(here.style), dict(here.gains.factors), sorted(here.seeds.items()))
+        found = blake2b(repr((self._now.history, self._options, elements, maps)).encode())
+        found.update(times.tobytes())
+        found.update(sound.samples.tobytes())
+        return found.digest()
+
+    def _draw(self, sound: Waveform, times: NDArray[np.float64], timeline: Timeline) -> Drawn:
+        """Gestures of a piece, and the stream for the piece after it."""
+        stream = (self._now.stream or self._first.result()).copy()
+        gestures = _gaze_relative_to_head(stream.next(sound, len(times), timeline))
+        if "gaze" in gestures and self._has_microsaccades:
+            seed = self._requested.seeds.get("gaze", self._seed)
+            gestures = {**gestures, "gaze": gestures["gaze"] + microsaccades(times, seed).astype(np.float32)}
+        return gestures, stream
+
+    def body(self, piece: Piece) -> Piece:
+        """The piece with hair, shoulders and pupils that follow its motion; the next piece continues from it."""
+        self._now, clip = self._next, piece.clip
+        moved = self._body.move(clip.motion, clip.head, clip.speech.phones, self._turns(piece))
+        return replace(piece, clip=replace(clip, motion=moved))
+
+    def _turns(self, piece: Piece) -> list[float]:
+        """Seconds of a piece at which speech begins after the face has listened."""
+        starts = phrase_starts(piece.speech.phones)
+        before = np.array(starts) + self._now.seconds - piece.clip.motion.duration - TURN_REACH_S
+        listened = self._requested.merge(self._now.marked).is_listening(before)
+        return [start for start, was_listening in zip(starts, listened.tolist(), strict=True) if was_listening]
+
+    def finish(self) -> None:
+        """Reject requested gestures beyond the end of the clip.
+
+        Raises
+        ------
+        InputError
+            A span or nod of the request begins after the end.
+        """
+        self._requested.check_duration(self._now.seconds)
+
+
+def _gaze_relative_to_head(gestures: GestureValues) -> GestureValues:
+    """Convert the gaze from world to head coordinates, so that fixations hold while the head moves."""
+    if "gaze" not in gestures or "head" not in gestures:
+        return gestures
+    return {**gestures, "gaze": gestures["gaze"] - gestures["head"][:, :2]}

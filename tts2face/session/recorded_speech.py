@@ -1,0 +1,75 @@
+"""First step of a recording: its phones and words are found, and its sound becomes pieces with the face at rest."""
+
+from collections.abc import Hashable, Iterator
+from dataclasses import replace
+
+from tts2face.models.talker import Talker
+from tts2face.processes.memory import SentenceMemory
+from tts2face.session.corrections import RECORDING, correct_phones
+from tts2face.session.prepared import HEARING_STEPS, RECORDING_STEPS, PreparedRequest
+from tts2face.session.recording import (
+    TimedTranscript,
+    align_transcript,
+    measure_recording,
+    recognise_transcript,
+    recording_clips,
+    select_audio_map,
+)
+from tts2face.session.speech import resolve_recording_marks
+from tts2face.session.speech_stream import Piece
+from tts2face.source import FromSound, Recorded
+from tts2face.types import Progress, frame_count
+
+TRANSCRIPT_BYTES = 10_000  # of a transcript besides its phones
+
+
+def hear(
+    prepared: PreparedRequest, source: Recorded, talker: Talker, memory: SentenceMemory, on_heard: Progress | None
+) -> TimedTranscript:
+    """Phones and words of a recording with their times; a single silence if lips follow its sound.
+
+    Parameters
+    ----------
+    on_heard
+        Called while the phones are found.
+    """
+    if isinstance(source.lips, FromSound):
+        return measure_recording(source.audio, select_audio_map(source.lips.audio_map, talker))
+    language = prepared.request.language
+
+    def key() -> Hashable:
+        found = source.audio.stat()
+        file = (str(source.audio.resolve()), found.st_mtime_ns, found.st_size)
+        return ("transcript", file, prepared.text.text, language, frozenset(prepared.dictionary.items()))
+
+    def find() -> TimedTranscript:
+        if not source.text:
+            return recognise_transcript(source.audio, on_heard)
+        return align_transcript(prepared.text.text, language, source.audio, prepared.dictionary, on_heard)
+
+    found = memory.recall(key, find, lambda made: TRANSCRIPT_BYTES + made.phones.edges.nbytes * 8)
+    return replace(found, phones=correct_phones(found.phones, RECORDING, 0, prepared.edges))
+
+
+def recorded_pieces(prepared: PreparedRequest, source: Recorded, heard: TimedTranscript) -> Iterator[Piece]:
+    """Pieces of a recording that is heard, with its sound and marks; the face is at rest and has no channels."""
+    fps = float(prepared.fps)
+    n_frames = frame_count(heard.duration, fps)
+    if prepared.request.has_gestures:
+        prepared.timeline.check_duration(n_frames / fps)
+    timeline, marks = resolve_recording_marks(prepared.text, heard.phones, heard.words, prepared.request.language)
+    before = 0
+    for clip in recording_clips(source.audio, heard, n_frames, prepared.fps, volume=source.volume):
+        after = before + len(clip.motion)
+        begin, end = before / fps, after / fps
+        n_steps = RECORDING_STEPS * after // n_frames - RECORDING_STEPS * before // n_frames
+        yield Piece(
+            clip,
+            begin,
+            n_steps + (HEARING_STEPS if before == 0 else 0),
+            timeline.restrict(begin, end),
+            tuple(mark for mark in marks if begin <= mark.seconds < end),
+            mismatches=tuple(mismatch for mismatch in heard.mismatches if begin <= mismatch.begin < end),
+            transcript=heard.phones if before == 0 else None,
+        )
+        before = after
