@@ -23,13 +23,14 @@ from tts2face.processes.message import ERROR, EVENT, MORE, STOP, Message, read_m
 from tts2face.processes.parent import raised
 from tts2face.processes.program import Program
 from tts2face.serving.service import decoders
+from tts2face.serving.service.application import Mount, create_app
 from tts2face.serving.service.messages import SYNTHESISE, Work
-from tts2face.serving.service.pool import InputQueue, WarmProcess
 from tts2face.serving.service.preparation import Preparation
-from tts2face.serving.service.server import Mount, create_app
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
-from tts2face.serving.service.synthesis import TASKS, Synthesis
+from tts2face.serving.service.synthesis import Synthesis
+from tts2face.serving.service.tasks import TASKS
+from tts2face.serving.service.warm_process import InputQueue, WarmProcess
 from tts2face.session.session_cache import SessionCache
 
 START_S = 60.0

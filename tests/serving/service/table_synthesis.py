@@ -53,7 +53,7 @@ def handlers(**_: Any) -> Mapping[str, Handler]:
 
 if __name__ == "__main__":
     from cli.main import main
-    from tts2face.serving.service import pool
+    from tts2face.serving.service import warm_process
 
-    pool.PROGRAM = "tests.serving.service.table_synthesis:handlers"
+    warm_process.PROGRAM = "tests.serving.service.table_synthesis:handlers"
     main()

@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from tests.docs.blocks import DOCS
-from tts2face.serving.service.server import create_app
+from tts2face.serving.service.application import create_app
 from tts2face.serving.service.settings import ServiceSettings
 
 FILE = DOCS / "deploy/alerts.yaml"

@@ -14,7 +14,7 @@ from cli.main import run
 from lexicon.errors import DataError, InputError
 from tts2face.processes.message import EVENT, Message
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, RateLimits, add_key, find_key, read_keys, remove_key
+from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, add_key, find_key, read_keys, remove_key
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.places import (
     LIVE_COST,
@@ -26,6 +26,7 @@ from tts2face.serving.service.places import (
     Places,
 )
 from tts2face.serving.service.pool import BusyError, Pool, PoolSettings
+from tts2face.serving.service.rate_limits import RateLimits
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
 

@@ -9,13 +9,13 @@ import pytest
 
 from tests.processes.answered import answered
 from tts2face.processes.message import ERROR, RESULT
-from tts2face.serving.service import pool, synthesis
+from tts2face.serving.service import synthesis, warm_process
+from tts2face.serving.service.application import Mount, create_app
 from tts2face.serving.service.messages import SYNTHESISE, Work
 from tts2face.serving.service.places import LINES_COST, MOVIE_COST, SOUND_COST, work_cost
-from tts2face.serving.service.pool import WarmProcess
 from tts2face.serving.service.preparation import Preparation
-from tts2face.serving.service.server import Mount, create_app
 from tts2face.serving.service.settings import ServiceSettings
+from tts2face.serving.service.warm_process import WarmProcess
 from tts2face.session.session_cache import SessionCache
 from tts2face.types import Chunk
 
@@ -27,7 +27,7 @@ def test_the_end_of_a_process_is_not_taken_from_asyncio(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Asyncio warns of an unknown child process if something else has read its exit status."""
-    monkeypatch.setattr(pool, "PROGRAM", "tests.serving.service.table_synthesis:handlers")
+    monkeypatch.setattr(warm_process, "PROGRAM", "tests.serving.service.table_synthesis:handlers")
 
     async def run() -> None:
         process = WarmProcess({}, Preparation((), 1), lambda: None)

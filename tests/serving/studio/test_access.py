@@ -10,8 +10,8 @@ from starlette.testclient import TestClient, WebSocketDenialResponse
 
 from tests.running import eventually
 from tests.serving.service.in_process import another_client
-from tts2face.serving.service.exchange import POLICY
-from tts2face.serving.service.guard import COOKIE, cookie_key, set_cookie
+from tts2face.serving.service.browser_key import COOKIE, cookie_key, set_cookie
+from tts2face.serving.service.page_addresses import POLICY
 
 HTML = {"Accept": "text/html"}
 

@@ -4,6 +4,8 @@ import asyncio
 import logging
 from pathlib import Path
 
+from fastapi import Request as HttpRequest
+
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import LOCAL_KEY, NOBODY, ApiKey, find_key, read_keys
 from tts2face.serving.service.logs import log_event
@@ -97,3 +99,17 @@ class KeyRing:
 
 def _unauthorized(message: str) -> RefusedError:
     return RefusedError(401, "unauthorized", message, {"WWW-Authenticate": "Bearer"})
+
+
+def require_scope(request: HttpRequest, scope: str, what: str) -> ApiKey:
+    """Key of a request, which must have a scope; `what` names in the plural what needs it.
+
+    Raises
+    ------
+    RefusedError
+        The key does not have the scope.
+    """
+    key: ApiKey = request.state.key
+    if scope not in key.scopes:
+        raise RefusedError(403, "forbidden", f"{what} need a key with the scope {scope}; this one has none such")
+    return key

@@ -1,7 +1,4 @@
-"""A request and its answer: identity, headers, and what the log, the metrics and traces receive.
-
-Addresses of the studio's pages, and headers that keep them within this service.
-"""
+"""A request and its answer: identity, headers, and what the log, the metrics and traces receive."""
 
 import asyncio
 import json
@@ -17,46 +14,15 @@ from starlette.requests import ClientDisconnect
 
 from tts2face.serving.service.errors import RefusedError, error_body
 from tts2face.serving.service.logs import REQUEST_ID
+from tts2face.serving.service.page_addresses import is_page, page_headers
 from tts2face.serving.service.stages import STAGES, Stage, durations
 
 if TYPE_CHECKING:
     from tts2face.serving.service.keys import ApiKey
 
-PAGES = "/studio"
-REFERENCE = "/docs"
-RECORDINGS = f"{PAGES}/api/recordings"
-STYLES = f"{PAGES}/api/styles"
-TAKES = f"{PAGES}/api/takes"
-# NiceGUI has scripts and styles in its pages and compiles templates in the browser (Vue), hence 'unsafe-inline' and
-# 'unsafe-eval'. Nothing may come from, or go to, another host: no script, picture, font, frame, form or connection.
-POLICY = "; ".join([
-    "default-src 'self'", "script-src 'self' 'unsafe-inline' 'unsafe-eval'", "style-src 'self' 'unsafe-inline'",
-    "img-src 'self' data: blob:", "font-src 'self' data:", "media-src 'self' blob:", "connect-src 'self' blob: data:",
-    "worker-src 'self' blob:", "object-src 'none'", "base-uri 'none'", "form-action 'self'", "frame-ancestors 'none'",
-])  # fmt: skip
-PAGE_HEADERS = (
-    (b"content-security-policy", POLICY.encode()),
-    (b"referrer-policy", b"no-referrer"),
-    (b"permissions-policy", b"camera=(self), microphone=(self), geolocation=(), usb=()"),
-    (b"cross-origin-opener-policy", b"same-origin"),
-    (b"cross-origin-resource-policy", b"same-origin"),
-)
-
-
-def is_page(path: str) -> bool:
-    """Whether an address belongs to the studio."""
-    return path == PAGES or path.startswith(f"{PAGES}/")
-
-
-def page_headers(path: str) -> tuple[tuple[bytes, bytes], ...]:
-    """Further headers of an answer, if its address belongs to the studio."""
-    return PAGE_HEADERS if is_page(path) else ()
-
-
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
 Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
-
 REQUEST_ID_FORM = re.compile(rb"[A-Za-z0-9._-]{1,64}")
 HEADERS = ((b"x-content-type-options", b"nosniff"), (b"cache-control", b"no-store"))
 PROBES = frozenset({"/health", "/healthz", "/readyz", "/metrics"})  # are answered until the end, and not logged

@@ -1,94 +1,27 @@
-"""Checks of every request before any work: host, origin, key, limits; headers, log and metrics of every answer.
+"""Checks of every request before any work: host, origin, key, limits; headers, log and metrics of every answer."""
 
-Browsers as clients: a cookie in place of a header with the key, only for the studio's addresses.
-
-What a key may do.
-"""
-
-import asyncio
 import re
-import time
-from collections import deque
-from collections.abc import Awaitable, Callable, Mapping, MutableMapping
-from http.cookies import CookieError, SimpleCookie
-from typing import TYPE_CHECKING, Any
+from collections.abc import Awaitable, Callable
+from typing import TYPE_CHECKING
 from urllib.parse import parse_qs, urlsplit
 
-from fastapi import Request as HttpRequest
 from starlette.requests import ClientDisconnect
 from starlette.websockets import WebSocketDisconnect
 
+from tts2face.serving.service.browser_key import cookie_key, wants_login
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.exchange import (
-    CLIENT,
-    PAGES,
-    PROBES,
-    RECORDINGS,
-    REFERENCE,
-    STYLES,
-    TAKES,
-    Exchange,
-    Receive,
-    Scope,
-    Send,
-    draining,
-    is_page,
-)
+from tts2face.serving.service.exchange import CLIENT, PROBES, Exchange, Receive, Scope, Send, draining
+from tts2face.serving.service.incoming import Incoming
 from tts2face.serving.service.keys import NOBODY, ApiKey
 from tts2face.serving.service.origins import answer_headers, check_origin, preflight_headers
+from tts2face.serving.service.page_addresses import LOGIN_PATH, RECORDINGS, REFERENCE, STYLES, TAKES, is_page, is_static
 from tts2face.storage.files import is_disk_full
 
 if TYPE_CHECKING:
-    from tts2face.serving.service.exchange import Exchange
     from tts2face.serving.service.state import ServiceState
 
-
-__all__ = ["COOKIE", "LOGIN_PATH", "cookie_key", "is_page", "is_static", "set_cookie", "wants_login"]
-
-COOKIE = "tts2face_key"
-LOGIN_PATH = f"{PAGES}/login"
-STATIC_PATHS = (f"{PAGES}/_nicegui/", f"{PAGES}/_nicegui_ws/")  # libraries of a page, and its connection
-UPLOADS = f"{PAGES}/_nicegui/client/"
-COOKIE_S = 30 * 86_400
 BEARER = re.compile(r"^bearer\s+", re.IGNORECASE)  # names of schemes have no case: RFC 9110, 11.1
-
-
-def is_static(path: str) -> bool:
-    """Whether an address is that of a page's libraries or of its connection, which no limit of a key counts.
-
-    The connection of an open page is no request that a draining service waits for.
-    """
-    return path.startswith(STATIC_PATHS) and not path.startswith(UPLOADS)
-
-
-def cookie_key(headers: Mapping[bytes, bytes]) -> str:
-    """Key in the cookie of a request; empty if there is none."""
-    cookies: SimpleCookie = SimpleCookie()
-    try:
-        cookies.load(headers.get(b"cookie", b"").decode("latin-1"))
-    except CookieError:
-        return ""
-    return cookies[COOKIE].value if COOKIE in cookies else ""
-
-
-def set_cookie(key: str, *, is_secure: bool) -> str:
-    """Header ``Set-Cookie`` that keeps a key, or removes it if it is empty.
-
-    Scripts cannot read it, and no request that another site causes has it.
-    """
-    age = COOKIE_S if key else 0
-    secure = "; Secure" if is_secure else ""
-    return f"{COOKIE}={key}; Path={PAGES}; Max-Age={age}; HttpOnly; SameSite=Strict{secure}"
-
-
-def wants_login(request: "Exchange") -> bool:
-    """Whether a request without a key is that of a person who opens a page."""
-    wants_page = b"text/html" in request.headers.get(b"accept", b"")
-    return request.scope["type"] == "http" and request.method == "GET" and is_page(request.scope["path"]) and wants_page
-
-
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
-
 RETRY_S = 30  # for clients, while a disk is full
 OPEN_PATHS = frozenset({
     *(PROBES - {"/metrics"}), "/openapi.json", REFERENCE,
@@ -98,7 +31,6 @@ UNCOUNTED_PATHS = frozenset({*OPEN_PATHS, *PROBES, "/v1/hello"})
 VIDEO_PATH = "/v1/talkers/build"
 VIDEO_PUTS = (f"{RECORDINGS}/", f"{STYLES}/", f"{TAKES}/")
 CLOSE = {"Connection": "close"}
-READ_AHEAD_BYTES = 256 << 10  # of a client that wait for the application; then no more is read
 
 
 class Guard:
@@ -149,7 +81,7 @@ class Guard:
         settings, scope = self._state.settings, request.scope
         size = settings.video_mb if _brings_video(scope) else settings.body_mb
         longest_s = settings.body_s * max(1.0, size / settings.body_mb)
-        incoming = _Incoming(request, receive, size * 1e6, longest_s)
+        incoming = Incoming(request, receive, size * 1e6, longest_s)
         try:
             incoming.check()
             await self._app(scope, incoming.receive, request.send)
@@ -228,117 +160,3 @@ def _host_name(host: str) -> str:
         return urlsplit(f"//{host}").hostname or ""
     except ValueError:
         return ""
-
-
-class _Incoming:
-    """What a client sends, read ahead of the application, so that its leaving is noticed at once.
-
-    A body has limits of size and time; it is read from the first time that the application asks for it, so that a
-    client which waits for ``100 Continue`` sends nothing that is refused. Everything else is read from the start.
-    """
-
-    def __init__(self, request: Exchange, receive: Receive, max_bytes: float, max_s: float) -> None:
-        self._request, self._receive, self._max_bytes = request, receive, max_bytes
-        self._max_s, self._deadline = max_s, time.monotonic() + max_s
-        self._n_bytes, self._has_body = 0, False
-        self._messages: deque[MutableMapping[str, Any]] = deque()
-        self._n_waiting_bytes = 0  # of the messages
-        self._wrong: RefusedError | None = None
-        self._changed = asyncio.Event()  # a message has come, has been taken, or the end was reached
-        self._reading: asyncio.Task[None] | None = None
-
-    def check(self) -> None:
-        """Refuse a body whose stated length is too large; what has none is complete, however late it is asked for."""
-        headers = self._request.headers
-        length = headers.get(b"content-length", b"0")
-        if self._request.scope["type"] == "http":
-            self._has_body = length != b"0" or b"transfer-encoding" in headers
-            if not length.isdigit() or int(length) > self._max_bytes:
-                raise self._too_large()
-        if not self._has_body:
-            self._start()
-
-    async def receive(self) -> MutableMapping[str, Any]:
-        """Next message of the client; again and again the last one, which says that it has left."""
-        self._start()
-        while not self._messages:
-            if self._wrong is not None:
-                raise self._wrong
-            self._changed.clear()
-            await self._changed.wait()
-        message = self._messages[0]
-        if not _is_last(message):
-            self._messages.popleft()
-            self._n_waiting_bytes -= _n_bytes(message)
-            self._changed.set()
-        return message
-
-    def close(self) -> None:
-        """Read no more."""
-        if self._reading is not None:
-            self._reading.cancel()
-
-    def _start(self) -> None:
-        if self._reading is None:
-            self._reading = asyncio.create_task(self._read())
-
-    async def _read(self) -> None:
-        message: MutableMapping[str, Any] = {"type": ""}
-        while not _is_last(message):
-            try:
-                message = await self._next()
-            except RefusedError as wrong:
-                self._wrong = wrong
-            if self._wrong is None:
-                self._messages.append(message)
-                self._n_waiting_bytes += _n_bytes(message)
-            if _is_last(message):
-                self._request.leave()
-            self._changed.set()
-            if self._wrong is not None:
-                return
-            while self._n_waiting_bytes >= READ_AHEAD_BYTES:
-                self._changed.clear()
-                await self._changed.wait()
-
-    async def _next(self) -> MutableMapping[str, Any]:
-        if not self._has_body:
-            return await self._receive()
-        try:
-            message = await asyncio.wait_for(self._receive(), max(0.0, self._deadline - time.monotonic()))
-        except TimeoutError as late:
-            raise RefusedError(
-                408, "too_slow", f"the body did not arrive within {self._max_s:g} s; send it faster"
-            ) from late
-        if message["type"] == "http.request":
-            self._n_bytes += _n_bytes(message)
-            self._has_body = message.get("more_body", False)
-            if self._n_bytes > self._max_bytes:
-                raise self._too_large()
-        return message
-
-    def _too_large(self) -> RefusedError:
-        return RefusedError(413, "too_large", f"the body is larger than {self._max_bytes / 1e6:g} MB; send less")
-
-
-def _is_last(message: Mapping[str, Any]) -> bool:
-    return str(message["type"]).endswith(".disconnect")
-
-
-def _n_bytes(message: Mapping[str, Any]) -> int:
-    """Size of what a client has sent; of texts in characters."""
-    return len(message.get("body") or message.get("bytes") or message.get("text") or b"")
-
-
-def require_scope(request: HttpRequest, scope: str, what: str) -> ApiKey:
-    """Key of a request, which must have a scope; `what` names in the plural what needs it.
-
-    Raises
-    ------
-    RefusedError
-        The key does not have the scope.
-    """
-    key: ApiKey = request.state.key
-    if scope not in key.scopes:
-        raise RefusedError(403, "forbidden", f"{what} need a key with the scope {scope}; this one has none such")
-    return key

@@ -15,10 +15,10 @@ from tts2face.serving.batch.run import prune_unused
 from tts2face.serving.batch.store import open_store
 from tts2face.serving.service.errors import RefusedError, as_refused
 from tts2face.serving.service.job_views import message_of
-from tts2face.serving.service.keys import RateLimits
 from tts2face.serving.service.library import Library
 from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.pool import NICENESS
+from tts2face.serving.service.rate_limits import RateLimits
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.webhooks import Webhooks
 from tts2face.serving.work.blobs import open_blobs

@@ -1,31 +1,19 @@
 """Talkers, faces, palettes and dictionaries of the service: the shipped ones, and those that keys have uploaded.
 
 All methods block; routes call them in threads.
-
-Names that clients may use; a path from a client never reaches the file system.
-
-Pictures of the shipped talkers, faces and palettes, drawn once and kept in the data folder.
 """
 
-import asyncio
 import re
 import time
-from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
-from tts2face.models.face_names import default_face
-from tts2face.models.hair import parse_hair_colour
-from tts2face.picture.options import BLUR, COLOURS, STUDIO, TRANSPARENT
 from tts2face.request import OWN_FACE
-from tts2face.serving.batch.segment import file_hash
-from tts2face.serving.service.decoders import Decoders
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.settings import ServiceSettings
-from tts2face.serving.service.uploads import RESOURCE_TIMEOUT_S
 from tts2face.serving.work.blobs import BlobStore, open_blobs
 from tts2face.serving.work.database import database_url
 from tts2face.serving.work.resource_check import CONTENT, DICTIONARY, FACE, PICTURE, TALKER
@@ -39,11 +27,9 @@ from tts2face.serving.work.resources import (
     resource_from_folder,
 )
 from tts2face.serving.work.run import RESOURCES
-from tts2face.serving.work.uploaded_file import DRAW
 from tts2face.session import catalogue
 from tts2face.storage.files import translate_disk_errors
-from tts2face.storage.shipped import FORMER, find_file
-from tts2face.storage.temporary import Temporary
+from tts2face.storage.shipped import find_file
 
 NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,39}")
 # Names of models that clients of OpenAI and Kokoro send; all are the service's talker.
@@ -254,96 +240,3 @@ def _state_of(path: Path) -> tuple[int, int] | None:
 def plural(kind: str) -> str:
     """The word of a kind in addresses."""
     return "dictionaries" if kind == DICTIONARY else f"{kind}s"
-
-
-COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
-MODEL_KINDS = ("talker", "face", "palette")
-
-
-async def resolve_models(library: Library, key: ApiKey, models: Mapping[str, Any]) -> dict[str, Any]:
-    """Models of a request with the paths of uploads in place of their names.
-
-    Raises
-    ------
-    RefusedError
-        There is no such talker, face, palette or haircut for this key, or an uploaded face has no such identity.
-    """
-    resolved = dict(models)
-    _check_hair(models)
-    for kind in MODEL_KINDS:
-        name = models.get(kind)
-        if name is None or name in _served_names(kind):
-            continue
-        resolved[kind], description = await asyncio.to_thread(library.resolve, key, kind, str(name))
-        identity = models.get("identity")
-        if kind == FACE and identity is not None and identity not in description["identities"]:
-            offered = ", ".join(description["identities"]) or "none"
-            raise RefusedError(
-                400, "invalid_request", f"the face {name} has no identity {str(identity)[:60]!r}; it has: {offered}"
-            )
-    return resolved
-
-
-def _check_hair(models: Mapping[str, Any]) -> None:
-    haircut, colour = models.get("hair"), models.get("hair_color")
-    if haircut is not None:
-        face = str(models.get("face") or default_face(models.get("identity"), haircut))
-        known = [one.name for one in catalogue.haircuts_of(face)]
-        if haircut not in known:
-            raise RefusedError(
-                400, "invalid_request", f"there is no haircut {haircut[:60]!r}; the haircuts are {', '.join(known)}"
-            )
-    if colour is not None:
-        parse_hair_colour(colour[:60])
-
-
-async def resolve_dictionary(library: Library, key: ApiKey, fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Fields of a request with the path of their dictionary in place of its name; errors as `resolve_models`."""
-    if fields.get(DICTIONARY) is None:
-        return dict(fields)
-    path, _ = await asyncio.to_thread(library.resolve, key, DICTIONARY, str(fields[DICTIONARY]))
-    return {**fields, DICTIONARY: path}
-
-
-def check_voice(voice: str | None) -> None:
-    """Refuse voices that are not known by name."""
-    if voice is not None:
-        known = tuple(one.name for one in catalogue.voices() if one.languages)
-        if voice not in known:
-            raise RefusedError(
-                400, "invalid_request", f"there is no voice {voice[:60]!r}; the voices are {', '.join(known)}"
-            )
-
-
-def check_background(background: str) -> None:
-    """Refuse backgrounds that are neither a word nor a colour."""
-    if background not in {STUDIO, TRANSPARENT, BLUR, *COLOURS} and not COLOUR.fullmatch(background):
-        raise RefusedError(
-            400,
-            "invalid_request",
-            f"there is no background {background[:60]!r}; give studio, transparent, blur or #rrggbb",
-        )
-
-
-def _served_names(kind: str) -> tuple[str, ...]:
-    return (*shipped_names(kind), *FORMER.get(kind, {}), *((OWN_FACE,) if kind == FACE else ()))
-
-
-PICTURE_FORMAT = 1  # increased when the same file gives another picture
-_drawing = asyncio.Lock()  # one at a time
-
-
-async def shipped_picture(decoders: Decoders, data: Path, kind: str, name: str) -> Path:
-    """Path of the picture of a shipped model; drawn in a child process if it is not there yet."""
-    source = find_file(name, kind)
-    digest = await asyncio.to_thread(file_hash, source)
-    path = data / "pictures" / f"{kind}-{PICTURE_FORMAT}-{digest}.png"
-    async with _drawing:
-        if not path.exists():
-            with translate_disk_errors(path):
-                path.parent.mkdir(parents=True, exist_ok=True)
-                with Temporary(path) as temporary:
-                    arguments = f"{DRAW}{kind}", source, temporary.path, 0.0
-                    await decoders.decode("", arguments, name, RESOURCE_TIMEOUT_S)
-                    temporary.replace(path)
-    return path

@@ -1,22 +1,17 @@
-"""What a synthesis process is asked to make, and the parts of its results.
+"""Works of a synthesis process, and the parts of their results."""
 
-Words that would take a process for itself.
-"""
-
-import re
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from lexicon.errors import BackendError, InputError
+from lexicon.errors import BackendError
 from tts2face.processes.message import Message
 from tts2face.processes.threads import available_cores
 from tts2face.types import Chunk
 
 if TYPE_CHECKING:
     from tts2face.session.session import Session
-
 
 Inputs = deque[Message]  # that a task has not read yet
 SYNTHESISE, SERVE = "synthesise", "serve"  # calls of a synthesis process
@@ -38,7 +33,7 @@ class Work:
     Parameters
     ----------
     kind
-        Name of a task: one of `tts2face.serving.service.synthesis.TASKS`, or of a table given to the service.
+        Name of a task: one of `tts2face.serving.service.tasks.TASKS`, or of a table given to the service.
     models
         Fields of `tts2face.session.named_models.Models` that differ from their defaults.
     request, picture
@@ -96,22 +91,6 @@ class Line:
 # A part of a result, or a wait. The messages of a part have its ``seconds`` of speech and an ``event`` or bytes as
 # their payload, which are JSON if ``is_json``; the last message has ``seconds`` and ``cpu_s`` of the whole.
 Step = Chunk | Event | Line | Wait
+
+
 Task = Callable[["Session", Work, Inputs], Iterator[Step]]  # makes a result step by step
-
-
-MAX_WORD_CHARACTERS = 200  # 300 digits are 70 s of speech, made in one step of 7 s, during which all others wait
-_LONG_WORD = re.compile(rf"[!-~]{{{MAX_WORD_CHARACTERS + 1}}}|\d{{{MAX_WORD_CHARACTERS + 1}}}")
-
-
-def check_words(text: str) -> None:
-    """Refuse words and numbers of more than `MAX_WORD_CHARACTERS`; scripts without spaces are not concerned.
-
-    Raises
-    ------
-    InputError
-        There is such a word.
-    """
-    if (found := _LONG_WORD.search(text)) is not None:
-        raise InputError(
-            f"the text has a word of more than {MAX_WORD_CHARACTERS} characters, {found[0][:20]}...; put spaces into it"
-        )

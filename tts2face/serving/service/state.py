@@ -8,6 +8,9 @@ from contextlib import aclosing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fastapi import Request as HttpRequest
+from fastapi import WebSocket
+
 from lexicon.errors import Tts2faceError
 from tts2face.processes.message import RESULT, Message
 from tts2face.serving.service.access import KeyRing
@@ -16,20 +19,24 @@ from tts2face.serving.service.downloads import Downloads
 from tts2face.serving.service.errors import STATUS, RefusedError, as_refused
 from tts2face.serving.service.exchange import in_background, while_client_stays
 from tts2face.serving.service.job_service import JobService
-from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, RateLimits
+from tts2face.serving.service.keys import LOCAL_KEY, ApiKey
 from tts2face.serving.service.library import Library
 from tts2face.serving.service.logs import log_event
-from tts2face.serving.service.messages import QUALITY, SYNTHESISE, DefectError, Work, check_words
+from tts2face.serving.service.long_words import check_words
+from tts2face.serving.service.messages import QUALITY, SYNTHESISE, DefectError, Work
 from tts2face.serving.service.metrics import Metrics, quality_labels
-from tts2face.serving.service.pool import STREAM_PRIORITY, InputQueue, Pool, PoolSettings, work_call
+from tts2face.serving.service.pool import STREAM_PRIORITY, Pool, PoolSettings
 from tts2face.serving.service.preparation import Step
+from tts2face.serving.service.rate_limits import RateLimits
 from tts2face.serving.service.readiness import Readiness
 from tts2face.serving.service.result_cache import CACHED_KINDS, ResultCache
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.tracing import tracing_from_environment
+from tts2face.serving.service.warm_process import InputQueue, work_call
 
 if TYPE_CHECKING:
     from tts2face.serving.service.exchange import Exchange
+
 
 WARM_TEXT = "Hi."
 
@@ -231,3 +238,9 @@ def _folders(work: Work) -> set[Path]:
 def _log_spoken(message: Message) -> None:
     if text := message.content["event"].get("text"):
         log_event("text", text=text)
+
+
+def service_state(request: HttpRequest | WebSocket) -> ServiceState:
+    """State of the service that received a request."""
+    state: ServiceState = request.app.state.service
+    return state

@@ -11,8 +11,8 @@ from nicegui import app as pages_app
 from nicegui import ui
 
 from lexicon.errors import InputError
-from tts2face.serving.service.exchange import PAGES
-from tts2face.serving.service.server import NO_TELEMETRY, Mount
+from tts2face.serving.service.application import NO_TELEMETRY, Mount
+from tts2face.serving.service.page_addresses import PAGES
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.studio.pages import animate, frame, projects, puppet, reports, styles
 from tts2face.serving.studio.pages.record import add_record_page

@@ -15,8 +15,8 @@ from tts2face.picture.options import parse_size
 from tts2face.processes.message import Message
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
-from tts2face.serving.service.library import check_background, check_voice, resolve_models
 from tts2face.serving.service.messages import Work
+from tts2face.serving.service.named_values import check_background, check_voice, resolve_models
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.studio.palette_store import is_own_palette, own_palette
 from tts2face.serving.studio.project_store import ASSET, ASSETS

@@ -11,7 +11,7 @@ import pytest
 
 from tests.packages import needs
 from tests.running import HostService, RunningService
-from tts2face.serving.service.server import create_app
+from tts2face.serving.service.application import create_app
 from tts2face.serving.service.settings import ServiceSettings
 
 # Generated texts and pictures at the limits of the schema would take minutes to make: the server under test allows

@@ -156,9 +156,9 @@ HELD_PROGRAM = """
 import sys, threading
 from concurrent.futures import ThreadPoolExecutor
 from cli.main import main
-from tts2face.serving.service import pool, server
+from tts2face.serving.service import server, warm_process
 
-pool.PROGRAM = "tests.serving.service.table_synthesis:handlers"
+warm_process.PROGRAM = "tests.serving.service.table_synthesis:handlers"
 server.EXIT_S = 0.5
 ThreadPoolExecutor(1).submit(threading.Event().wait)  # is joined at the exit of Python
 main()

@@ -25,9 +25,9 @@ from tts2face.models.consent import PHOTO_TOOL, consent_record
 from tts2face.models.face_file import read_face
 from tts2face.photo import face_from_photo
 from tts2face.serving.service import decoders
+from tts2face.serving.service.application import create_app
 from tts2face.serving.service.keys import add_key
 from tts2face.serving.service.library import Library
-from tts2face.serving.service.server import create_app
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.work.blobs import open_blobs
 from tts2face.serving.work.database import database_url

@@ -17,10 +17,11 @@ from tts2face.interchange.exports.parts import Label
 from tts2face.picture.sound_stream import wav_header
 from tts2face.serving.service.client_names import Adjustments, choose_voice, limited_rate
 from tts2face.serving.service.errors import ErrorBody, RefusedError
-from tts2face.serving.service.library import resolve_dictionary
 from tts2face.serving.service.live_text import REFUSED_S, parse_message
+from tts2face.serving.service.named_values import resolve_dictionary
 from tts2face.serving.service.request_fields import described
-from tts2face.serving.service.routes.clips import service_state, timed_speech
+from tts2face.serving.service.routes.streams import timed_speech
+from tts2face.serving.service.state import service_state
 
 router = APIRouter(tags=["headtts"])
 

@@ -8,7 +8,7 @@ from fastapi.responses import JSONResponse, Response
 
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.readiness import FOR_STREAMS
-from tts2face.serving.service.routes.clips import service_state
+from tts2face.serving.service.state import service_state
 
 router = APIRouter(tags=["operation"])
 

@@ -19,13 +19,16 @@ from pydantic import BaseModel, ValidationError
 from starlette.datastructures import FormData, UploadFile
 
 from tts2face.serving.batch.segment import content_address
+from tts2face.serving.service.access import require_scope
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.guard import VIDEO_PATH, require_scope
+from tts2face.serving.service.guard import VIDEO_PATH
+from tts2face.serving.service.job_kinds.order import JobKind, JobOrder, Upload, expected_speech_s
+from tts2face.serving.service.job_kinds.schema import new_job_schema
+from tts2face.serving.service.job_kinds.table import JOB_KINDS
 from tts2face.serving.service.job_views import EXAMPLE_ID, JobDetail, JobPage, NewJobBody, job_detail, job_view
 from tts2face.serving.service.keys import ApiKey
-from tts2face.serving.service.options import JOB_KINDS, new_job_schema
-from tts2face.serving.service.orders import JobKind, JobOrder, Upload, expected_speech_s
-from tts2face.serving.service.routes.clips import error_event, service_state
+from tts2face.serving.service.routes.streams import error_event
+from tts2face.serving.service.state import service_state
 from tts2face.serving.service.uploads import MAX_TEXT_BYTES, upload_folder
 from tts2face.serving.service.webhooks import check_webhook
 from tts2face.serving.work.client import JobClient

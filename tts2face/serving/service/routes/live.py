@@ -11,11 +11,11 @@ from pydantic import Field, ValidationError
 
 from tts2face.processes.message import Message
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.library import check_voice, resolve_dictionary, resolve_models
 from tts2face.serving.service.live_text import REFUSED_S, SAMPLE_BYTES, SAMPLE_RATES, LiveText, Pace, parse_message
-from tts2face.serving.service.pool import InputQueue
+from tts2face.serving.service.named_values import check_voice, resolve_dictionary, resolve_models
 from tts2face.serving.service.request_fields import MODEL_FIELDS, PICTURE_FIELDS, StrictModel, options_model
 from tts2face.serving.service.state import ServiceState
+from tts2face.serving.service.warm_process import InputQueue
 
 router = APIRouter(tags=["live"])
 

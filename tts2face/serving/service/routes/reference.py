@@ -9,7 +9,7 @@ from fastapi import APIRouter
 from fastapi import Request as HttpRequest
 from fastapi.responses import HTMLResponse, Response
 
-from tts2face.serving.service.exchange import REFERENCE
+from tts2face.serving.service.page_addresses import REFERENCE
 
 router = APIRouter(include_in_schema=False)
 

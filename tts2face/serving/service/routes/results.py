@@ -9,7 +9,7 @@ from fastapi.responses import FileResponse, Response
 
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.job_views import HASH
-from tts2face.serving.service.routes.clips import service_state
+from tts2face.serving.service.state import service_state
 from tts2face.serving.work.client import JobClient
 from tts2face.serving.work.job_record import JobFile
 

@@ -10,7 +10,7 @@ from tts2face.gestures.timeline_file import timeline_json
 from tts2face.models.palette import FEATURES
 from tts2face.request import OWN_FACE
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.exchange import PAGES
+from tts2face.serving.service.page_addresses import PAGES
 from tts2face.serving.studio.components.stage import StageElement
 from tts2face.serving.studio.components.timeline import TimelineElement
 from tts2face.serving.studio.editing import Edit

@@ -24,11 +24,11 @@ from nicegui import Client, ui
 
 from lexicon.errors import Tts2faceError
 from tts2face.request import OWN_FACE
+from tts2face.serving.service.browser_key import set_cookie
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.exchange import PAGES
-from tts2face.serving.service.guard import LOGIN_PATH, set_cookie
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.library import Library, shipped_names
+from tts2face.serving.service.page_addresses import LOGIN_PATH, PAGES
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.studio.components.stage import StageElement
 from tts2face.serving.studio.components.timeline import TimelineElement

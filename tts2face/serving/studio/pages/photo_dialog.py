@@ -13,7 +13,7 @@ from typing import Any
 from nicegui import events, ui
 
 from tts2face.models.hair import EYE_COLOURS
-from tts2face.serving.service.routes.resources import (
+from tts2face.serving.service.sent_resources import (
     AVATAR,
     MAX_CONSENT,
     MAX_NAME,

@@ -8,8 +8,8 @@ from fastapi import Request as HttpRequest
 from nicegui import events, ui
 
 from tts2face import __version__
-from tts2face.serving.service.exchange import TAKES
 from tts2face.serving.service.keys import ApiKey
+from tts2face.serving.service.page_addresses import TAKES
 from tts2face.serving.studio.components.puppet import Puppet
 from tts2face.serving.studio.components.stage import StageElement
 from tts2face.serving.studio.importing import SOUND_SUFFIXES

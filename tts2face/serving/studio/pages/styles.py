@@ -21,8 +21,8 @@ from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import EXPRESSIONS, FEATURES
 from tts2face.models.palette_editing import StyleMix
 from tts2face.request import Request
-from tts2face.serving.service.exchange import STYLES
 from tts2face.serving.service.keys import ApiKey
+from tts2face.serving.service.page_addresses import STYLES
 from tts2face.serving.studio.components.recorder import STYLE as RECORDER_STYLE
 from tts2face.serving.studio.components.recorder import Recorder
 from tts2face.serving.studio.importing import SAMPLE_TEXT

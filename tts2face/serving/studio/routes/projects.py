@@ -14,7 +14,7 @@ from fastapi.responses import FileResponse, JSONResponse, Response
 
 from lexicon.errors import InputError
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.exchange import PAGES
+from tts2face.serving.service.page_addresses import PAGES
 from tts2face.serving.service.uploads import BLOCK_BYTES
 from tts2face.serving.studio.importing import import_file, import_text
 from tts2face.serving.studio.project_archive import archive

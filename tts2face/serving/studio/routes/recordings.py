@@ -11,7 +11,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse, JSONResponse, Response
 
 from lexicon.errors import InputError, Tts2faceError
-from tts2face.serving.service.exchange import RECORDINGS
+from tts2face.serving.service.page_addresses import RECORDINGS
 from tts2face.serving.studio.recorded_talker import CLIP, REPORT, TALKER
 from tts2face.serving.studio.recording_work import Recordings
 from tts2face.serving.studio.recordings import SUFFIXES, RecordingStore

@@ -11,7 +11,7 @@ from lexicon.errors import InputError
 from lexicon.values.json_text import parse_json
 from lexicon.values.records import checked
 from tts2face.models.palette_editing import StyleMix
-from tts2face.serving.service.exchange import STYLES
+from tts2face.serving.service.page_addresses import STYLES
 from tts2face.serving.studio.palette_store import FILE
 from tts2face.serving.studio.recordings import SUFFIXES
 from tts2face.serving.studio.routes.recordings import NO_STORE, uploaded_take

@@ -10,7 +10,7 @@ from fastapi import Request as HttpRequest
 from fastapi.responses import FileResponse, Response
 
 from lexicon.errors import InputError
-from tts2face.serving.service.exchange import TAKES
+from tts2face.serving.service.page_addresses import TAKES
 from tts2face.serving.studio.camera import follow_camera
 from tts2face.serving.studio.routes.recordings import receive_take, uploaded_take
 from tts2face.serving.studio.studio import face_answer

@@ -1,90 +1,19 @@
-"""What clients ask for as jobs: kinds, and orders that are being checked.
-
-Jobs of kind ``talker``: what clients send, and the checks before they are queued.
-"""
+"""Jobs of kind ``talker``: what clients send, and the checks before they are queued."""
 
 import asyncio
 import uuid
-from collections.abc import Awaitable, Callable, Mapping
-from contextlib import suppress
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
+from dataclasses import asdict
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.datastructures import UploadFile
 
-from lexicon.errors import InputError
-from lexicon.sentence_length import marked_silence_s
-from lexicon.ssml import parse_marks
 from tts2face.models.consent import states_consent
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.keys import ApiKey
-from tts2face.serving.service.state import ServiceState
-from tts2face.serving.service.uploads import UploadFolder
+from tts2face.serving.service.job_kinds.order import JobKind, JobOrder
 from tts2face.serving.work.client import JobClient
 from tts2face.serving.work.job_record import OPEN_STATES
 from tts2face.serving.work.resource_check import TALKER
-
-
-@dataclass(slots=True)
-class Upload:
-    """Files of a new job after their checks: local paths by the names that its function sees."""
-
-    folder: UploadFolder
-    files: dict[str, Path] = field(default_factory=dict)
-    n_cues: int = 0
-    seconds: float | None = None  # of the recording of a talker
-
-
-@dataclass(frozen=True, slots=True)
-class JobOrder:
-    """What a client has asked for, before it is a job."""
-
-    state: ServiceState
-    key: ApiKey
-    options: Any
-    upload: Upload
-
-
-CHARACTERS_PER_S, CUE_S = 15.0, 3.0  # of speech; what a job takes of its key's day before it is made
-
-
-def expected_speech_s(order: JobOrder) -> float:
-    """Seconds of speech that a job is expected to make."""
-    options = order.options
-    text = getattr(options, "text", "")
-    silent_s = sum(getattr(options, name, None) or 0.0 for name in ("idle", "listen"))
-    with suppress(InputError):  # of a text with wrong marks, which makes nothing
-        silent_s += marked_silence_s(parse_marks(text))
-    return len(text) / CHARACTERS_PER_S + silent_s + CUE_S * order.upload.n_cues
-
-
-AddFile = Callable[[JobOrder, str, UploadFile, int], Awaitable[None]]
-
-
-@dataclass(frozen=True, slots=True)
-class JobKind:
-    """A kind of jobs.
-
-    Parameters
-    ----------
-    scope
-        Scope of the keys that may ask for it.
-    model
-        Its options.
-    parts
-        Parts of a form with its files, their descriptions, and what checks one file and notes its path: gets the
-        order, the part's name, the file and its number from 1.
-    prepare
-        Checks an order; JSON for the function that executes it.
-    """
-
-    scope: str
-    model: type[BaseModel]
-    parts: Mapping[str, tuple[str, AddFile]]
-    prepare: Callable[[JobOrder], Awaitable[dict[str, Any]]]
-
 
 MAX_OPEN, MAX_LOOKED_AT = 4, 1000  # talkers in work of a key; its newest jobs that are looked at
 RECORDING = "recording"  # of the files of the job, which differ in their endings

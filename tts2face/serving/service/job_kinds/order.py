@@ -1,0 +1,90 @@
+"""The order of a job while it is checked, and the base of the kinds of jobs.
+
+A new kind of jobs:
+
+1. a module of this package with the model of its options, a function for each part of its form that checks the file
+   and notes its path in the order, and a function that checks the whole and returns the JSON of the job;
+2. a row of `JOB_KINDS` in ``table.py``; routes, quotas and the OpenAPI description follow;
+3. a row of `RUNNERS` in ``serving/work/kinds.py`` with the function that executes it.
+"""
+
+from collections.abc import Awaitable, Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+from starlette.datastructures import UploadFile
+
+from lexicon.errors import InputError
+from lexicon.sentence_length import marked_silence_s
+from lexicon.ssml import parse_marks
+from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.keys import ApiKey
+from tts2face.serving.service.state import ServiceState
+from tts2face.serving.service.uploads import UploadFolder
+
+CHARACTERS_PER_S, CUE_S = 15.0, 3.0  # of speech; what a job takes of its key's day before it is made
+
+
+@dataclass(slots=True)
+class Upload:
+    """Files of a new job after their checks: local paths by the names that its function sees."""
+
+    folder: UploadFolder
+    files: dict[str, Path] = field(default_factory=dict)
+    n_cues: int = 0
+    seconds: float | None = None  # of the recording of a talker
+
+
+@dataclass(frozen=True, slots=True)
+class JobOrder:
+    """What a client has asked for, before it is a job."""
+
+    state: ServiceState
+    key: ApiKey
+    options: Any
+    upload: Upload
+
+
+AddFile = Callable[[JobOrder, str, UploadFile, int], Awaitable[None]]
+
+
+@dataclass(frozen=True, slots=True)
+class JobKind:
+    """A kind of jobs.
+
+    Parameters
+    ----------
+    scope
+        Scope of the keys that may ask for it.
+    model
+        Its options.
+    parts
+        Parts of a form with its files, their descriptions, and what checks one file and notes its path: gets the
+        order, the part's name, the file and its number from 1.
+    prepare
+        Checks an order; JSON for the function that executes it.
+    """
+
+    scope: str
+    model: type[BaseModel]
+    parts: Mapping[str, tuple[str, AddFile]]
+    prepare: Callable[[JobOrder], Awaitable[dict[str, Any]]]
+
+
+def refuse_second(part: str, number: int) -> None:
+    """Refuse a part that may be sent once and was sent again."""
+    if number > 1:
+        raise RefusedError(422, "invalid_request", f"{part} was sent twice; send one")
+
+
+def expected_speech_s(order: JobOrder) -> float:
+    """Seconds of speech that a job is expected to make."""
+    options = order.options
+    text = getattr(options, "text", "")
+    silent_s = sum(getattr(options, name, None) or 0.0 for name in ("idle", "listen"))
+    with suppress(InputError):  # of a text with wrong marks, which makes nothing
+        silent_s += marked_silence_s(parse_marks(text))
+    return len(text) / CHARACTERS_PER_S + silent_s + CUE_S * order.upload.n_cues
