@@ -60,7 +60,7 @@ def import_character(  # noqa: PLR0913 - one parameter a flag
         {"the character": character, "--mapping": mapping, "--landmarks": landmarks, "--model": model},
     )
     from tts2face.interchange.characters.importing import import_face, save_face
-    from tts2face.interchange.characters.landmarks import landmark_table
+    from tts2face.interchange.characters.landmark_table import landmark_table
     from tts2face.interchange.characters.shapes import mapping_table
     from tts2face.storage.files import write_atomically
 
@@ -205,7 +205,7 @@ def show(
     """Draw a contact sheet of all shapes of a face."""
     check_file_name(out, "a picture", (".png",))
     refuse_overwriting({"--out": out}, {"the face": name})
-    from tts2face.interchange.characters.landmarks import draw_contact_sheet, draw_preview, png_bytes
+    from tts2face.interchange.characters.preview import draw_contact_sheet, draw_preview, png_bytes
     from tts2face.models.face_loading import load_face
     from tts2face.storage.files import write_atomically
 
@@ -233,7 +233,7 @@ def still(
     """Draw one picture of a face at rest, which needs nobody's consent if the face is a shipped one."""
     check_file_name(out, "a picture", (".png",))
     refuse_overwriting({"--out": out}, {"the face": name, "--hair": hair})
-    from tts2face.interchange.characters.landmarks import png_bytes
+    from tts2face.interchange.characters.preview import png_bytes
     from tts2face.picture.renderer import draw
     from tts2face.session.named_models import Models
     from tts2face.storage.files import write_atomically
@@ -257,7 +257,7 @@ def _check_outputs(outputs: Mapping[str, Path | None], inputs: Mapping[str, str 
 
 
 def _write_preview(preview: Path | None, made: "Face") -> None:
-    from tts2face.interchange.characters.landmarks import draw_preview, png_bytes
+    from tts2face.interchange.characters.preview import draw_preview, png_bytes
     from tts2face.storage.files import write_atomically
 
     if preview is not None:

@@ -93,7 +93,7 @@ def phones(
     from lexicon.dictionary import read_dictionary
     from lexicon.spoken_words import pronounce_marked
     from lexicon.ssml import parse_marks
-    from tts2face.interchange.exports.annotations import FORMATS
+    from tts2face.interchange.exports.pronunciation import FORMATS
 
     pronunciation = pronounce_marked(
         parse_marks(text, language), language, read_dictionary(dictionary) if dictionary else None

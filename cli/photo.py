@@ -107,7 +107,7 @@ Yes = Annotated[bool, switch("Download the face landmark model without asking, i
 
 def is_missing_model(error: BackendError) -> bool:
     """Whether an error is that the landmark model is not installed; its module is imported where it was raised."""
-    module = sys.modules.get("tts2face.video.tracking")
+    module = sys.modules.get("tts2face.video.networks")
     return module is not None and isinstance(error, module.MissingModelError)
 
 

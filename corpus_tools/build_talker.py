@@ -35,8 +35,8 @@ from lexicon.errors import DataError, InputError
 from tts2face.models.talker import NOT_STATED, Talker, load_talker, write_talker
 from tts2face.storage.files import write_atomically
 from tts2face.types import Progress
-from tts2face.video.take import BlendshapeReader
-from tts2face.video.tracking import find_bundle
+from tts2face.video.blendshapes import BlendshapeReader
+from tts2face.video.networks import find_bundle
 
 READING_STAGE = "reading recordings"  # name of the first stage
 NETWORK_STAGE = "learning phone network"

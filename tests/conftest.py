@@ -148,7 +148,7 @@ def face_model() -> Path:
     """Bundle of landmark models."""
     needs("ai_edge_litert", "cv2")
     from lexicon.errors import BackendError
-    from tts2face.video.tracking import find_bundle
+    from tts2face.video.networks import find_bundle
 
     try:
         return find_bundle()

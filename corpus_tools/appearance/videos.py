@@ -17,7 +17,7 @@ from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.video import CachedTracker
 from tts2face.models.landmarks import CHIN, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.video.media import read_frames
-from tts2face.video.pose import fill_gaps, resample_to_grid
+from tts2face.video.resampling import fill_gaps, resample_to_grid
 
 
 @dataclass(frozen=True, slots=True, eq=False)

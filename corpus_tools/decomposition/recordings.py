@@ -40,10 +40,11 @@ from tts2face.face.deformation import moved_landmarks, rest_landmarks
 from tts2face.lips.performer import match_shapes
 from tts2face.models.face import Face
 from tts2face.types import Progress, Trajectory, Waveform
+from tts2face.video.livelink import FaceCapture, read_livelink
 from tts2face.video.media import read_sound
-from tts2face.video.pose import head_angles, remove_pose, resample_to_grid, trim_and_fill
-from tts2face.video.take import FaceCapture, read_livelink
-from tts2face.video.tracking import find_bundle
+from tts2face.video.networks import find_bundle
+from tts2face.video.pose import head_angles, remove_pose
+from tts2face.video.resampling import resample_to_grid, trim_and_fill
 
 CAPTURE_SUFFIXES = frozenset({".c3d", ".csv"})
 LIVELINK_FIRST_COLUMN = "timecode"  # first column of a Live Link Face table

@@ -33,7 +33,7 @@ from tts2face.picture.occlusion import bake_occlusion
 from tts2face.processes.threads import available_cores
 from tts2face.storage.shipped import find_file
 from tts2face.types import Progress
-from tts2face.video.tracking import find_bundle
+from tts2face.video.networks import find_bundle
 
 Floats = NDArray[np.float64]
 

@@ -14,7 +14,8 @@ from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import DataError, InputError
 from lexicon.normalize import normalize
 from lexicon.values.tables import read_table
-from tts2face.interchange.subtitles.reader import read_subtitles, read_text
+from tts2face.interchange.subtitles.decoding import read_text
+from tts2face.interchange.subtitles.reader import read_subtitles
 from tts2face.sound.word_lattice import PronouncedWords, Pronunciations
 
 SUBTITLE_SUFFIXES = (".srt", ".vtt", ".ass", ".ssa", ".ttml")  # in order of preference

@@ -29,7 +29,8 @@ from tts2face.lips.exemplar import ExemplarModel, build_exemplar_model, speech_t
 from tts2face.models.landmarks import lip_opening
 from tts2face.models.talker import ShapeModel, load_talker
 from tts2face.sound.features import intensity
-from tts2face.video.pose import PoseFreeLandmarks, head_angles, remove_pose, resample_to_grid, trim_and_fill
+from tts2face.video.pose import PoseFreeLandmarks, head_angles, remove_pose
+from tts2face.video.resampling import resample_to_grid, trim_and_fill
 
 TRACK_SUFFIX = ".npz"  # of a file of tracked landmarks in place of a video, without sound
 TIME_TOLERANCE_S = 1e-6  # seconds

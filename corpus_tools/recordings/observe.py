@@ -17,7 +17,7 @@ from corpus_tools.recordings.video import CachedTracker
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, InputError
 from tts2face.types import Progress
-from tts2face.video.tracking import find_bundle
+from tts2face.video.networks import find_bundle
 
 STEPS_PER_VIDEO = 100  # of progress for each video
 TRACKING_SHARE = 0.8  # of a video's work

@@ -18,7 +18,8 @@ from tts2face.storage.array_cache import read_kept
 from tts2face.storage.content_store import content_hash
 from tts2face.storage.tensors import write_tensors
 from tts2face.video.media import TimedFrame, read_frames, read_media_info
-from tts2face.video.tracking import MODEL_SHA256, Tracking
+from tts2face.video.networks import MODEL_SHA256
+from tts2face.video.tracking import Tracking
 
 if TYPE_CHECKING:
     from tts2face.video.streaming import StreamingTracker

@@ -29,7 +29,7 @@ from tts2face.picture.renderer import mesh_renderer
 from tts2face.storage.shipped import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.types import Progress, Trajectory
-from tts2face.video.take import BLENDSHAPES, BlendshapeReader
+from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.tracking import FaceTracker
 
 N_UTTERANCES = 40  # of the talker whose poses the face takes

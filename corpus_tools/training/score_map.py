@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tts2face.models.networks import N_SCORES, ScoreMap, logistic, mouth_scores
 from tts2face.models.talker import Talker, speech_channels
 from tts2face.types import Trajectory
-from tts2face.video.take import BLENDSHAPES, BlendshapeReader
+from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 
 N_UNITS = 24
 DECAY = 1e-3  # of the weights of both layers: steep maps are hard to invert

@@ -20,7 +20,7 @@ from tests.bench.appearance_measures import measure_appearance
 from tts2face.models.talker import write_talker
 from tts2face.picture.options import Picture
 from tts2face.picture.own_face import draw_video_frame, own_face_renderer
-from tts2face.video.tracking import find_bundle
+from tts2face.video.networks import find_bundle
 
 
 def main() -> None:

@@ -24,7 +24,7 @@ from tests.corpus_tools.decomposition.weight_errors import approximation_error
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.models.palette import GESTURE_FPS
-from tts2face.video.tracking import find_bundle
+from tts2face.video.networks import find_bundle
 
 EPSILONS = (0.0, 0.1, 0.25, 0.5, 1.0)
 

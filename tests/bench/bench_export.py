@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import tts2face
-from tts2face.interchange.exports.curves import ARKIT_SHAPES, build_arkit_projection
+from tts2face.interchange.exports.arkit import ARKIT_SHAPES, build_arkit_projection
 from tts2face.interchange.exports.parts import Target
 from tts2face.interchange.exports.table import FORMATS
 from tts2face.types import concatenate_clips

@@ -39,9 +39,10 @@ from tests.bench.bench_recording_limits import (
 from tts2face.sound.features import intensity
 from tts2face.types import Waveform
 from tts2face.video.media import TimedFrame, read_frames, read_sound
-from tts2face.video.pose import remove_pose, trim_and_fill
+from tts2face.video.networks import find_bundle
+from tts2face.video.pose import remove_pose
+from tts2face.video.resampling import trim_and_fill
 from tts2face.video.streaming import StreamingTracker
-from tts2face.video.tracking import find_bundle
 
 PICTURES_OF = 3  # every third recording's pictures are tracked again
 TRIMMED_S = 0.21  # of the beginning; no whole number of steps

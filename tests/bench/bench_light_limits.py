@@ -18,8 +18,8 @@ from corpus_tools.recordings.observe import observe
 from corpus_tools.recordings.video import MEASURES, measure_light
 from corpus_tools.run_options import RunOptions
 from tests.bench.bench_recording_limits import Pictures, lip_correlations, retrack
+from tts2face.video.networks import find_bundle
 from tts2face.video.streaming import StreamingTracker
-from tts2face.video.tracking import find_bundle
 
 RNG = np.random.default_rng(0)
 

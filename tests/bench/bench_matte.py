@@ -20,7 +20,8 @@ from tts2face.photo.matte import HEAD_END, part_background
 from tts2face.photo.photograph import Photograph
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import draw
-from tts2face.video.tracking import FaceTracker, LandmarkNetwork, find_segmenter
+from tts2face.video.networks import LandmarkNetwork, find_segmenter
+from tts2face.video.tracking import FaceTracker
 
 SIDE, NEAR, BAD = 640, 0.25, 0.08  # px, of the eye distance, and error of a bad matte
 DRAWN = ("ada", "ben", "noor", "zuri", "mara", "tomas")

@@ -15,10 +15,11 @@ from tts2face.picture.film import write_clips
 from tts2face.picture.options import Picture
 from tts2face.session.performance import retarget_take, take_clips
 from tts2face.session.session import Session
+from tts2face.video.blendshapes import BlendshapeReader
 from tts2face.video.media import read_frames, read_media_info, read_sound
 from tts2face.video.pose import head_angles, remove_pose
 from tts2face.video.streaming import StreamingTracker
-from tts2face.video.take import BlendshapeReader, Take, read_take
+from tts2face.video.take import Take, read_take
 from tts2face.video.tracking import FaceTracker
 
 

@@ -37,9 +37,10 @@ from tts2face.models.landmarks import lip_opening
 from tts2face.sound.alignment import Aligner
 from tts2face.types import Waveform
 from tts2face.video.media import TimedFrame, read_frames, read_sound
-from tts2face.video.pose import remove_pose, trim_and_fill
+from tts2face.video.networks import find_bundle
+from tts2face.video.pose import remove_pose
+from tts2face.video.resampling import trim_and_fill
 from tts2face.video.streaming import StreamingTracker
-from tts2face.video.tracking import find_bundle
 
 Samples = NDArray[np.float32]
 Pictures = list[NDArray[np.uint8]]

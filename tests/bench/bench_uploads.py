@@ -19,7 +19,7 @@ from tts2face.processes.program import Program
 from tts2face.serving.work.talker_job import BUILDER, LIMITS, TOOL
 from tts2face.serving.work.uploaded_file import DECODE, program
 from tts2face.storage.shipped import find_file
-from tts2face.video.tracking import find_bundle
+from tts2face.video.networks import find_bundle
 
 TEXT = "We were away a year ago. Bob may move. The boy will buy a pie for you. She saw the ship near the shore."
 

@@ -8,7 +8,7 @@ from corpus_tools.recordings.sound import AlignedSpeech
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.types import Waveform
-from tts2face.video.pose import fill_gaps, resample_to_grid, trim_and_fill
+from tts2face.video.resampling import fill_gaps, resample_to_grid, trim_and_fill
 
 FPS = 25.0
 

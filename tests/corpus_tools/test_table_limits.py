@@ -11,7 +11,7 @@ from corpus_tools.recordings.folder import find_recordings
 from corpus_tools.studies.evaluation.tracks import read_tracks
 from lexicon.errors import DataError
 from lexicon.values.tables import LARGEST_TABLE_BYTES
-from tts2face.video.take import read_livelink
+from tts2face.video.livelink import read_livelink
 
 
 @pytest.mark.parametrize(

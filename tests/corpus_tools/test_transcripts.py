@@ -15,7 +15,7 @@ from corpus_tools.recordings.folder import (
     read_transcript,
 )
 from lexicon.errors import DataError
-from tts2face.interchange.subtitles.reader import MAX_BYTES, read_text
+from tts2face.interchange.subtitles.decoding import MAX_BYTES, read_text
 
 SRT = """1
 00:00:01,000 --> 00:00:02,500

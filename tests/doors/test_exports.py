@@ -11,12 +11,12 @@ import tts2face
 from cli.main import run
 from lexicon.errors import DataError, InputError
 from tests.world import World
-from tts2face.interchange.exports.curves import ARKIT_SHAPES
+from tts2face.interchange.exports.arkit import ARKIT_SHAPES
 from tts2face.interchange.exports.table import FORMATS
 from tts2face.models.face import Face
 from tts2face.session.session import Session
 from tts2face.types import Clip
-from tts2face.video.take import read_livelink
+from tts2face.video.livelink import read_livelink
 
 SMALL = {"size": "64x64", "fps": 5}
 OWN = [f"all{one.suffixes[0]}" for one in FORMATS if one.package is None]

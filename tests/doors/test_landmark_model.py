@@ -14,7 +14,7 @@ from PIL import Image
 from cli import photo as photo_command
 from cli.main import app, run
 from lexicon.errors import BackendError
-from tts2face.video import setup_models, tracking
+from tts2face.video import networks, setup_models
 
 
 class Terminal(io.StringIO):
@@ -27,9 +27,9 @@ def photo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A picture without a face, on a machine without the model."""
     path = tmp_path / "me.png"
     Image.fromarray(np.random.default_rng(0).integers(0, 255, (90, 90, 3), np.uint8)).save(path)
-    monkeypatch.setattr(tracking, "user_cache", lambda: tmp_path / "cache")
-    monkeypatch.setattr(tracking, "BUNDLING_PACKAGES", ())
-    monkeypatch.delenv(tracking.MODEL_VARIABLE, raising=False)
+    monkeypatch.setattr(networks, "user_cache", lambda: tmp_path / "cache")
+    monkeypatch.setattr(networks, "BUNDLING_PACKAGES", ())
+    monkeypatch.delenv(networks.MODEL_VARIABLE, raising=False)
     photo_command.agreed.cache_clear()
     return path
 

@@ -8,7 +8,7 @@ from tests.face.people import LIT
 from tts2face.models.face_loading import load_face
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
-from tts2face.video.take import BLENDSHAPES
+from tts2face.video.blendshapes import BLENDSHAPES
 
 SET = {
     "jawOpen": ({"jawOpen": 0.8}, ("jawOpen",)),
@@ -21,7 +21,7 @@ SET = {
 
 @pytest.fixture(scope="module")
 def networks():
-    from tts2face.video.take import BlendshapeReader
+    from tts2face.video.blendshapes import BlendshapeReader
     from tts2face.video.tracking import FaceTracker
 
     try:

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import BackendError
+from tts2face.video import networks as model
 from tts2face.video import setup_models as setup
-from tts2face.video import tracking as model
 from tts2face.video.setup_models import fetch_bundle, set_up_segmenter
 
 CONTENT, PERSONS = b"a bundle", b"a network"

@@ -25,7 +25,7 @@ from tts2face.photo.teeth import read_teeth
 from tts2face.request import REALISTIC_FACE
 from tts2face.storage.content_store import FolderStore
 from tts2face.storage.user_folders import user_cache
-from tts2face.video.tracking import find_segmenter
+from tts2face.video.networks import find_segmenter
 
 
 def face_from_photo(  # noqa: PLR0913 - one parameter an option
@@ -95,7 +95,7 @@ def _made(
 
 def _without_background(seen: PhotographedFace, reader: PhotoReader, name: Path) -> PhotographedFace:
     """An opaque picture in two layers, person and background, if they can be told apart."""
-    from tts2face.video.tracking import LandmarkNetwork, find_segmenter
+    from tts2face.video.networks import LandmarkNetwork, find_segmenter
 
     if seen.picture.alpha is not None:
         return seen

@@ -18,8 +18,8 @@ from tts2face.models.landmarks import (
     eye_aperture,
 )
 from tts2face.photo.photograph import Photograph, read_photograph, split_number
+from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.pose import head_angles, rigid_points, similarity_transforms
-from tts2face.video.take import BLENDSHAPES, BlendshapeReader
 from tts2face.video.tracking import MIN_CONTRAST, MIN_SCORE, Crop, FaceTracker, crop_around
 
 LIPS = sorted(set(LIP_LANDMARKS))

@@ -44,7 +44,8 @@ from tts2face.source import NATURAL
 from tts2face.types import Trajectory, YieldTurn, keep_on, resting_head
 
 if TYPE_CHECKING:
-    from tts2face.video.take import FaceCapture, Take
+    from tts2face.video.livelink import FaceCapture
+    from tts2face.video.take import Take
 
 
 NO_PALETTE = "this face was prepared without a palette and has no gestures; prepare it with a palette"

@@ -32,9 +32,9 @@ from tts2face.sound.features import FEATURE_RATE
 from tts2face.sound.listener import StreamingAudioMap
 from tts2face.source import Idle, Listening, Spoken
 from tts2face.types import Trajectory, exact_rate
+from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.media import TimedFrame
 from tts2face.video.pose import head_angles, remove_pose
-from tts2face.video.take import BLENDSHAPES, BlendshapeReader
 from tts2face.video.tracking import FaceTracker
 
 CALIBRATION_S = 5.0  # long enough for the lips to close and open and the eyes to blink

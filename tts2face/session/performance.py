@@ -17,9 +17,11 @@ from tts2face.session.outputs import OutputFiles, WrittenClip
 from tts2face.session.recording import clip_bounds
 from tts2face.session.shared_models import SessionModels
 from tts2face.types import SOUND_RATE, Clip, Progress, Speech, Waveform, exact_rate
+from tts2face.video.blendshapes import BlendshapeReader
+from tts2face.video.livelink import read_livelink
 from tts2face.video.media import read_media_info, read_sound
 from tts2face.video.streaming import StreamingTracker
-from tts2face.video.take import BlendshapeReader, Take, read_livelink, read_take
+from tts2face.video.take import Take, read_take
 
 CAPTURE_SUFFIX = ".csv"
 CAPTURE_FPS = 30.0  # default frame rate of captures, whose own is higher than a video needs

@@ -41,8 +41,9 @@ def _expressions(request: Request) -> tuple[ExpressionSpan, ...]:
     if not isinstance(source, Recorded):
         raise InputError("--expression video needs a recording with pictures of the person; add --audio clip.mp4")
     from tts2face.lips.performer import held_smile
+    from tts2face.video.blendshapes import BlendshapeReader
     from tts2face.video.streaming import StreamingTracker
-    from tts2face.video.take import BlendshapeReader, read_take
+    from tts2face.video.take import read_take
 
     take = read_take(source.audio, StreamingTracker(), BlendshapeReader(), seconds=SMILE_S)
     smile = held_smile(take.landmarks, take.scores)

@@ -14,7 +14,7 @@ from pathlib import Path
 from lexicon.errors import BackendError
 from tts2face.processes.wheels import download_wheel
 from tts2face.storage.user_folders import user_cache
-from tts2face.video.tracking import (
+from tts2face.video.networks import (
     MODEL_NAME,
     MODEL_PATTERN,
     SEGMENTER_NAME,

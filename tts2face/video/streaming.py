@@ -26,6 +26,7 @@ SMOOTHING_REACH = 4.0  # standard deviations at which the smoothing kernel of th
 FACE_COUNT_INTERVAL_S = 0.5  # between counts of the faces in a picture
 CHANGE_STEP = 2  # every second pixel of every second row is compared with the previous picture
 MAX_PREFETCHED_FRAMES = 4  # pictures that are decoded and followed in advance
+FRAME_TIMEOUT_S = 10.0  # longest time without a picture, after which the capture ends
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,9 +148,6 @@ def _enlarge(points: NDArray[np.float32], scale: float) -> NDArray[np.float32]:
         return points
     centre = np.array([0.5, 0.5, 0.0], np.float32)
     return np.asarray((points + centre) / np.float32(scale) - centre, np.float32)
-
-
-FRAME_TIMEOUT_S = 10.0  # longest time without a picture, after which the capture ends
 
 
 class CaptureDevice:

@@ -15,7 +15,7 @@ from tts2face.lips.performer import match_shapes
 from tts2face.models.face_loading import load_face
 from tts2face.sound.features import intensity
 from tts2face.sound.pauses import cut_at_pauses
-from tts2face.video.take import read_livelink
+from tts2face.video.livelink import read_livelink
 
 LIVELINK_SUFFIX = ".csv"
 MAX_UTTERANCE_S = 6.0  # cut at pauses into utterances of about a sentence, which the bootstrap resamples

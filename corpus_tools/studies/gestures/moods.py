@@ -27,7 +27,7 @@ from tts2face.picture.options import Picture
 from tts2face.session.session import Session
 from tts2face.storage.files import write_atomically
 from tts2face.types import Progress
-from tts2face.video.take import BLENDSHAPES, BlendshapeReader
+from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.tracking import FaceTracker
 
 SENTENCES = (

@@ -24,10 +24,10 @@ from tts2face.models.networks import SCORE_SHAPES, mouth_scores
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
 from tts2face.types import Progress, Trajectory
+from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.media import TimedFrame
+from tts2face.video.networks import find_bundle
 from tts2face.video.streaming import StreamingTracker
-from tts2face.video.take import BLENDSHAPES, BlendshapeReader
-from tts2face.video.tracking import find_bundle
 
 READING_STAGE, MIMICKING_STAGE = "reading recordings", "reading the face"
 SIZE_PX = 256  # of the pictures of the face; the tracker's crop has as many pixels

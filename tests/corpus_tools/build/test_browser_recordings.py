@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tts2face.video.media import read_frames, read_media_info, read_sound
-from tts2face.video.pose import resample_to_grid
+from tts2face.video.resampling import resample_to_grid
 
 RATE = 48_000
 KINDS = {

@@ -21,7 +21,7 @@ from tts2face.models.networks import N_SCORES, SCORE_SHAPES, logistic
 from tts2face.models.talker import load_talker
 from tts2face.storage.shipped import find_file
 from tts2face.storage.tensors import read_tensors
-from tts2face.video.take import BlendshapeReader
+from tts2face.video.blendshapes import BlendshapeReader
 
 NAMES = ("jawOpen", "mouthClose", "mouthPucker", "mouthSmileLeft", "mouthSmileRight")
 MIRROR = [0, 1, 2, 4, 3]

@@ -22,7 +22,7 @@ from tts2face.lips.performer import match_shapes
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.types import Trajectory, Waveform
-from tts2face.video.take import read_livelink
+from tts2face.video.livelink import read_livelink
 
 
 def still(n_frames: int, fps: float) -> FaceRecording:

@@ -10,9 +10,10 @@ from tests.corpus_tools.films import join_clips
 from tts2face.lips.performer import build_performer_retargeter
 from tts2face.models.face_loading import load_face
 from tts2face.session.live import CALIBRATION_S, LiveCapture, LivePose, track_poses
+from tts2face.video.blendshapes import BlendshapeReader
 from tts2face.video.media import TimedFrame, read_frames
 from tts2face.video.streaming import StreamingTracker
-from tts2face.video.take import BlendshapeReader, read_take
+from tts2face.video.take import read_take
 from tts2face.video.tracking import FaceTracker
 
 FPS = 25.0

@@ -14,7 +14,7 @@ from lexicon import errors
 from tests.docs.blocks import lines_that_need_a_person
 from tests.packages import needs
 from tts2face.video.media import read_sound
-from tts2face.video.tracking import find_bundle
+from tts2face.video.networks import find_bundle
 
 SMALL = ["--size", "64x64", "--fps", "5"]
 FOLDERS = {"recordings": 6, "few": 2}  # numbers of recordings

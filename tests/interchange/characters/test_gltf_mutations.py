@@ -18,8 +18,8 @@ from tests.interchange.characters.made import (
     write_character_file,
     write_landmarks,
 )
+from tts2face.interchange.characters.gltf_reader import read_gltf_character
 from tts2face.interchange.characters.importing import import_face
-from tts2face.interchange.characters.readers import read_gltf_character
 from tts2face.models.face import Face, Texture
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 

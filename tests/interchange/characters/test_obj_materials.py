@@ -9,7 +9,7 @@ from PIL import Image
 from lexicon.errors import DataError
 from tts2face.interchange.characters.atlas import coverage
 from tts2face.interchange.characters.character import BLEND, OPAQUE
-from tts2face.interchange.characters.readers import read_libraries
+from tts2face.interchange.characters.obj_materials import read_libraries
 
 LIBRARY = """# comment
 newmtl skin

@@ -8,7 +8,8 @@ import pytest
 from lexicon.errors import DataError
 from tts2face.interchange.characters.atlas import CUTOUT, build_atlas, coverage, fill_uncovered, triangle_opacity
 from tts2face.interchange.characters.character import BLEND, MASK, Material
-from tts2face.interchange.characters.shapes import ARKIT_SHAPES, ShapeSource, guess_mapping
+from tts2face.interchange.characters.shape_names import ARKIT_SHAPES, guess_mapping
+from tts2face.interchange.characters.shapes import ShapeSource
 from tts2face.interchange.characters.surface_points import (
     _barycentric,
     _Projection,

@@ -6,7 +6,7 @@ import pytest
 from lexicon.sequence import PhoneSequence, WordSpan
 from tests.picture.tiny_face import tiny_face
 from tts2face.face.shape_transfer import append_shapes
-from tts2face.interchange.exports.curves import ARKIT_SHAPES
+from tts2face.interchange.exports.arkit import ARKIT_SHAPES
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, exact_rate, first_sample
 
 RATE = 16_000

@@ -13,11 +13,12 @@ from tests.interchange.exports.made import arkit_clip, made_clip, made_stream, t
 from tests.packages import package
 from tests.picture.tiny_face import tiny_face
 from tts2face.face.shape_transfer import append_shapes
-from tts2face.interchange.exports.curves import ARKIT_SHAPES, build_arkit_projection, eye_angles, timecode
+from tts2face.interchange.exports.arkit import ARKIT_SHAPES, build_arkit_projection
+from tts2face.interchange.exports.livelink import eye_angles, timecode
 from tts2face.interchange.exports.parts import Target
 from tts2face.models.face_loading import load_face
 from tts2face.types import Clip, Trajectory
-from tts2face.video.take import read_livelink
+from tts2face.video.livelink import read_livelink
 
 STEP = 0.6e-6  # half of the last of six decimals, and rounding to 32 bits
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tts2face.interchange.exports.stage_surfaces import decimate
+from tts2face.interchange.exports.decimation import decimate
 
 
 def grid(n):

@@ -99,7 +99,7 @@ def test_wave_reads_the_sound(tmp_path):
 
 
 def test_sound_beyond_four_gigabytes_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("tts2face.interchange.exports.annotations.MAX_SAMPLES", RATE)
+    monkeypatch.setattr("tts2face.interchange.exports.sound.MAX_SAMPLES", RATE)
     with pytest.raises(InputError, match=r"a.wav would have more than 4 GB, 0 hours; export shorter clips"):
         tts2face.export(made_stream(2), tmp_path / "a.wav")
     assert not list(tmp_path.iterdir())

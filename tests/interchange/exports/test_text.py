@@ -12,7 +12,8 @@ from parselmouth.praat import call
 from lexicon.errors import InputError
 from lexicon.pronounce import pronounce
 from lexicon.sequence import PhoneSequence, WordSpan, nominal_phones
-from tts2face.interchange.exports.annotations import FORMATS, NOMINAL_NOTE, textgrid
+from tts2face.interchange.exports.pronunciation import FORMATS, NOMINAL_NOTE
+from tts2face.interchange.exports.textgrid import textgrid
 
 
 def _tier(grid: Any, number: int) -> list[tuple[float, float, str]]:

@@ -11,7 +11,7 @@ import pytest
 import tts2face
 from lexicon.errors import BackendError, InputError
 from tests.interchange.exports.made import FACE, RATE, format_parameter, made_clip, made_stream, silent_clip
-from tts2face.interchange.exports.curves import ARKIT_SHAPES
+from tts2face.interchange.exports.arkit import ARKIT_SHAPES
 from tts2face.interchange.exports.parts import FrameGrid
 from tts2face.interchange.exports.table import FORMATS
 from tts2face.picture.film import write_clips

@@ -10,7 +10,7 @@ from tts2face.face.deformation import moved_landmarks
 from tts2face.lips.performer import build_performer_retargeter
 from tts2face.models.networks import SCORE_SHAPES
 from tts2face.types import Trajectory
-from tts2face.video.take import BLENDSHAPES
+from tts2face.video.blendshapes import BLENDSHAPES
 
 TEXT = "We were away a year ago, but Bob may move five big maps."
 

@@ -12,7 +12,7 @@ from tts2face.models.face_loading import load_face
 from tts2face.photo.face_from_photo import face_from_photo
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import draw, mesh_renderer
-from tts2face.video.tracking import SEGMENTER_NAME, find_segmenter
+from tts2face.video.networks import SEGMENTER_NAME, find_segmenter
 
 SIDE = 480
 RIM_PX = 30
@@ -92,7 +92,7 @@ def test_a_person_whose_surroundings_look_like_him_is_not_cut_out(
 def test_without_the_segmentation_model_it_is_said(
     photo: Path, face_model: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tts2face.video.tracking.is_segmenter", lambda _: False)
+    monkeypatch.setattr("tts2face.video.networks.is_segmenter", lambda _: False)
     said: list[str] = []
     face = face_from_photo(photo, consent="drawn", model=face_model, on_warning=said.append)
     assert face.light.view.alpha is None

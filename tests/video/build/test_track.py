@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from lexicon.errors import BackendError, DataError, InputError
-from tts2face.video import tracking as model
+from tts2face.video import networks as model
+from tts2face.video.blendshapes import BLENDSHAPES, INPUT_LANDMARKS, BlendshapeReader
 from tts2face.video.media import read_frames
-from tts2face.video.take import BLENDSHAPES, INPUT_LANDMARKS, BlendshapeReader
 from tts2face.video.tracking import Crop, FaceTracker, crop_around, smooth_crops
 
 

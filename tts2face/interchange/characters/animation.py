@@ -20,8 +20,8 @@ from tts2face.interchange.characters.character import (
     character_file,
     read_binding,
 )
+from tts2face.interchange.characters.gltf_reader import read_gltf_character
 from tts2face.interchange.characters.head_mesh import mapped_targets, source_weights
-from tts2face.interchange.characters.readers import read_gltf_character
 from tts2face.interchange.characters.shapes import ShapeMapping
 from tts2face.interchange.gltf.nodes import NodeTree, read_nodes
 from tts2face.interchange.gltf.reader import GltfFile, read_gltf
@@ -40,9 +40,11 @@ HEAD_NODE = "tts2face_head"
 # segmental motions of the healthy female head-neck complex during dynamic head axial rotation, 2021, C2 to T1).
 NECK_SHARE = 0.4
 MAX_OFFSET_MM = 2.0  # between the origin of an eye bone and the centre of its eyeball, up to which it only rotates
-
 FloatArray = NDArray[np.float64]
 Track = tuple[int, str, FloatArray]
+ANIMATION = "tts2face"
+BOTH_SIDES_SHARE = 0.5  # of each of two shapes that one morph target for both sides gets
+RIDGE = 0.02  # of the mean curvature: keeps replaced shapes from adding large opposite weights
 
 
 class BoneTracks:
@@ -155,11 +157,6 @@ def _quaternions(rotations: FloatArray) -> FloatArray:
 def _orthonormal(matrix: FloatArray) -> FloatArray:
     scaled = matrix[:3, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)
     return np.asarray(scaled, np.float64)
-
-
-ANIMATION = "tts2face"
-BOTH_SIDES_SHARE = 0.5  # of each of two shapes that one morph target for both sides gets
-RIDGE = 0.02  # of the mean curvature: keeps replaced shapes from adding large opposite weights
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,8 +19,8 @@ from tts2face.models.face import Face
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-
 OPAQUE, MASK, BLEND = "OPAQUE", "MASK", "BLEND"
+KEY = "character"  # of the face's metadata
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,9 +138,6 @@ def linear(points: FloatArray, matrix: FloatArray) -> FloatArray:
         return moved
     moved = points @ matrix[:3, :3].T
     return moved
-
-
-KEY = "character"  # of the face's metadata
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,11 @@ from tts2face.numeric.arrays import ordered_product, smoothstep
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+MOVED_SHARE = 0.1  # of a shape's largest displacement: vertices that it clearly moves
+NECK_SHARE = 0.55  # of the height of the moved face: length of neck kept below it
+WIDTH_SHARE = 1.8  # of the same height: width kept on each side of its middle
+BLEND_SHARE = 0.03  # of the same height: half width of the blend between the two halves of a divided shape
+LEFT_EYE, RIGHT_EYE = 1, 2  # values of `HeadMesh.eye_of`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,13 +73,6 @@ def cut_triangles(triangles: IntArray, heights: FloatArray) -> Cut:
         np.concatenate([triangles[kept], *divided]),
         np.concatenate([kept, rows[tip], rows[base], rows[base]]),
     )
-
-
-MOVED_SHARE = 0.1  # of a shape's largest displacement: vertices that it clearly moves
-NECK_SHARE = 0.55  # of the height of the moved face: length of neck kept below it
-WIDTH_SHARE = 1.8  # of the same height: width kept on each side of its middle
-BLEND_SHARE = 0.03  # of the same height: half width of the blend between the two halves of a divided shape
-LEFT_EYE, RIGHT_EYE = 1, 2  # values of `HeadMesh.eye_of`
 
 
 @dataclass(frozen=True, slots=True, eq=False)

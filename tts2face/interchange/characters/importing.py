@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from lexicon.errors import BackendError, DataError, InputError
 from tts2face.interchange.characters.character import KEY, Character, CharacterBinding, character_file, read_binding
 from tts2face.interchange.characters.eyeballs import mark_eyeballs
+from tts2face.interchange.characters.gltf_reader import read_gltf_character
 from tts2face.interchange.characters.head_mesh import (
     HeadMesh,
     build_head_mesh,
@@ -22,16 +23,17 @@ from tts2face.interchange.characters.head_mesh import (
     moved_box,
     source_weights,
 )
+from tts2face.interchange.characters.landmark_table import read_landmark_table
 from tts2face.interchange.characters.landmarks import (
     SKIN,
     CharacterViews,
     LocatedLandmarks,
     locate_landmarks,
     part_triangles,
-    read_landmark_table,
 )
-from tts2face.interchange.characters.readers import read_gltf_character, read_obj_folder
-from tts2face.interchange.characters.shapes import ShapeMapping, guess_mapping, read_mapping
+from tts2face.interchange.characters.obj_reader import read_obj_folder
+from tts2face.interchange.characters.shape_names import guess_mapping
+from tts2face.interchange.characters.shapes import ShapeMapping, read_mapping
 from tts2face.interchange.characters.surface import (
     Placement,
     add_gaze_shapes,

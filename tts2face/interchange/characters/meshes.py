@@ -29,9 +29,12 @@ from tts2face.storage.pictures import MAX_DECODING_BYTES, decoding_bytes
 TRIANGLES, STRIP, FAN = 4, 5, 6
 MAX_VERTICES = 2_000_000  # of all meshes; a film character has 200,000
 MAX_TARGETS = 1000  # morph targets of a mesh
-
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+MAX_IMAGE_PIXELS = 8192 * 8192
+MAX_IMAGE_SIDE = 2048  # pixels; larger images are reduced
+FORMATS = ("PNG", "JPEG", "WEBP")
+KTX2 = b"\xabKTX 20\xbb"
 
 
 def read_pieces(file: GltfFile, tree: NodeTree) -> Iterator[MaterialPiece]:
@@ -183,12 +186,6 @@ class _Primitive:
         if missing:
             raise DataError(f"{skin.place}: bone {missing[0]} is not part of the scene; export the character again")
         return np.stack([tree.world[int(bone)] for bone in bones]) @ inverse if len(bones) else inverse
-
-
-MAX_IMAGE_PIXELS = 8192 * 8192
-MAX_IMAGE_SIDE = 2048  # pixels; larger images are reduced
-FORMATS = ("PNG", "JPEG", "WEBP")
-KTX2 = b"\xabKTX 20\xbb"
 
 
 class MaterialReader:

@@ -26,7 +26,7 @@ from tts2face.interchange.characters.atlas import CUTOUT, Atlas, build_atlas, sr
 from tts2face.interchange.characters.character import OPAQUE, Character, Material
 from tts2face.interchange.characters.eyeballs import eyeball_centres, fit_sphere, gaze_turns
 from tts2face.interchange.characters.head_mesh import LEFT_EYE, RIGHT_EYE, HeadMesh
-from tts2face.interchange.characters.shapes import ARKIT_SHAPES, VISEME_PREFIX
+from tts2face.interchange.characters.shape_names import ARKIT_SHAPES, VISEME_PREFIX
 from tts2face.models.face import VERTEX_COLOURS, Eye, Face, FacePart, Texture
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT
 
@@ -64,8 +64,9 @@ IRIS_RAD, PUPIL_RAD = 0.50, 0.20  # angles of plain irises and pupils from the l
 IRIS, PUPIL = (86, 104, 96), (18, 16, 16)  # sRGB
 MIN_BALL_VERTICES = 12  # of an eyeball that is painted
 UNPAINTED = 0.9  # least linear value of each channel of a white material
-
 FloatArray = NDArray[np.float64]
+TRUE_EYE_DISTANCES_MM = (60.0, 140.0)  # outer corners; other sizes are scaled to the default head's
+MIN_GAP_MM = 3.0  # by which the lips must part at weight 1 of some shape
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -236,10 +237,6 @@ def add_gaze_shapes(head: HeadMesh) -> HeadMesh:
 def is_plain(material: Material) -> bool:
     """Whether a material is white without an image, so that `PLAIN` colours replace it."""
     return material.image is None and min(material.colour[:3]) > UNPAINTED and material.alpha_mode == OPAQUE
-
-
-TRUE_EYE_DISTANCES_MM = (60.0, 140.0)  # outer corners; other sizes are scaled to the default head's
-MIN_GAP_MM = 3.0  # by which the lips must part at weight 1 of some shape
 
 
 def place_face(face: Face, character: Character, head: HeadMesh, provisional: Placement) -> Face:

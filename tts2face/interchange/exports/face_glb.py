@@ -2,8 +2,6 @@
 
 Metres; y up, the face looks along +z, x to its own left, as glTF prescribes. The first shapes of the face are the morph
 targets, in the order of the clip's channels; head pose and gaze are rotations of joints.
-
-Animation of an imported face as the character's own .glb file.
 """
 
 from typing import Any
@@ -12,16 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.interchange.characters.animation import animate_character
-from tts2face.interchange.characters.character import character_file, has_binding, read_binding
-from tts2face.interchange.exports.parts import FormatWriter, Part, Target
+from tts2face.interchange.exports.parts import Part, Target
+from tts2face.interchange.exports.skeleton import HEAD, Skeleton, build_skeleton
 from tts2face.interchange.exports.surfaces import (
-    HEAD,
     MM_PER_M,
     ExportSurface,
     MorphTargets,
-    Skeleton,
-    build_skeleton,
     divide_surface,
     linear_colours,
     morph_targets,
@@ -33,9 +27,7 @@ from tts2face.interchange.exports.surfaces import (
 from tts2face.interchange.gltf.container import INDICES, VERTICES, GltfBuffer
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import continuous_quaternions
-from tts2face.storage.output_paths import refuse_overwriting
 from tts2face.storage.spool import Spool
-from tts2face.types import HEAD_CHANNELS, Trajectory
 
 MESH_NODE, FIRST_JOINT = 0, 1
 GENERATOR = "tts2face"
@@ -215,38 +207,3 @@ def _nodes(skeleton: Skeleton, buffer: GltfBuffer) -> dict[str, Any]:
         "inverseBindMatrices": buffer.add_accessor(inverse),
     }
     return {"nodes": nodes, "skins": [skin]}
-
-
-class CharacterGlbWriter:
-    """Keeps frames in temporary files, and writes the character's file when their number is known."""
-
-    def __init__(self, target: Target) -> None:
-        if target.face is None:
-            raise InputError(f"{target.name} holds the character of the face; give the face, as in face=session.face")
-        source = character_file(read_binding(target.face))  # a missing file is reported with the first clip
-        refuse_overwriting({"the export": target.path.with_name(target.name)}, {"the character": source})
-        self._target, self._face = target, target.face
-        self._motion, self._head = Spool(len(target.channels)), Spool(len(HEAD_CHANNELS))
-
-    def add(self, part: Part) -> None:
-        """Append frames."""
-        self._motion.add(part.motion)
-        self._head.add(part.head)
-
-    def finish(self) -> None:
-        """Write the file."""
-        fps = float(self._target.fps)
-        motion = Trajectory(self._target.channels, np.array(self._motion.rows(), np.float32), fps)
-        head = Trajectory(HEAD_CHANNELS, np.array(self._head.rows(), np.float32), fps)
-        self._target.path.write_bytes(animate_character(motion, head, self._face).content)
-
-    def close(self) -> None:
-        """Remove the temporary files."""
-        self._motion.close()
-        self._head.close()
-
-
-def make_glb_writer(target: Target) -> FormatWriter:
-    """Writer of the character's own file for a face that was imported from one, otherwise of the face's mesh."""
-    is_imported = target.face is not None and has_binding(target.face)
-    return CharacterGlbWriter(target) if is_imported else FaceGlbWriter(target)

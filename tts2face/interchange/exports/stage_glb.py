@@ -15,15 +15,9 @@ from numpy.typing import NDArray
 
 from tts2face.face.deformation import landmark_positions
 from tts2face.face.rest_light import in_rest_light
+from tts2face.interchange.exports.skeleton import HEAD, Skeleton, build_skeleton
 from tts2face.interchange.exports.stage_surfaces import stage_surfaces
-from tts2face.interchange.exports.surfaces import (
-    HEAD,
-    MM_PER_M,
-    ExportSurface,
-    Skeleton,
-    build_skeleton,
-    linear_colours,
-)
+from tts2face.interchange.exports.surfaces import MM_PER_M, ExportSurface, linear_colours
 from tts2face.interchange.gltf.container import INDICES, VERTICES, GltfBuffer
 from tts2face.models.face import Face, Texture
 from tts2face.models.light import Lamps, Photographed

@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, InputError
 from tts2face.interchange.exports.parts import Part, Target
+from tts2face.interchange.exports.skeleton import HEAD, Skeleton, build_skeleton
 from tts2face.interchange.exports.surfaces import (
-    HEAD,
     ExportSurface,
-    Skeleton,
-    build_skeleton,
     divide_surface,
     linear_colours,
     morph_targets,

@@ -1,36 +1,11 @@
-"""SubRip and WebVTT: blocks of lines that begin with a line of times.
-
-SubStation Alpha: ASS and SSA.
-
-Instants of subtitle files in seconds.
-"""
+"""SubRip and WebVTT: blocks of lines that begin with a line of times."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
+from tts2face.interchange.subtitles.clock import HAS_ARROW, TIMING, clock_seconds
 from tts2face.interchange.subtitles.cues import SubtitleWarning, WrittenCue
-
-# Hours may be missing; point, comma or colon before the fraction; spaces inside, as faulty converters write them.
-_CLOCK = r"(?:(-)\s*)?(?:(\d{1,6})\s*:\s*)?(\d{1,2})\s*:\s*(\d{1,2})(?:\s*[.,:;]\s*(\d{1,9}))?"
-CLOCK = re.compile(_CLOCK)
-_ARROW = r"\s*(?:-{1,3}\s*>|–+\s*>|—+\s*>|→)\s*"
-TIMING = re.compile(rf"^\s*{_CLOCK}{_ARROW}(?:{_CLOCK})?(.*)$")
-HAS_ARROW = re.compile(r"-{1,2}\s?>|[–—]>|→")
-
-
-def clock_seconds(sign: str | None, hours: str | None, minutes: str, seconds: str, fraction: str | None) -> float:
-    """Seconds of a clock reading; the fraction is decimal, whatever its number of digits."""
-    whole = int(hours or 0) * 3600 + int(minutes) * 60 + int(seconds)
-    value = whole + float(f"0.{fraction or 0}")
-    return -value if sign else value
-
-
-def parse_clock(written: str) -> float | None:
-    """Seconds of a clock reading such as ``0:01:02.50``; None if it cannot be read."""
-    match = CLOCK.fullmatch(written.strip())
-    return None if match is None else clock_seconds(*match.groups())
-
 
 _NUMBER = re.compile(r"\s*\d{1,9}\s*")
 _UNSPOKEN_BLOCK = re.compile(r"(?:NOTE|STYLE|REGION)(?:\s|$)")  # W3C WebVTT, 4.1
@@ -146,74 +121,3 @@ def _take_label(block: _Block, following: _Block, *, are_ids_words: bool) -> Non
 
 def _cue(block: _Block) -> WrittenCue:
     return WrittenCue(block.begin_s or 0.0, block.end_s, "\n".join(block.lines).strip(), block.line)
-
-
-ASS_FIELDS: tuple[str, ...] = (
-    "layer",
-    "start",
-    "end",
-    "style",
-    "name",
-    "marginl",
-    "marginr",
-    "marginv",
-    "effect",
-    "text",
-)
-SSA_FIELDS: tuple[str, ...] = ("marked", *ASS_FIELDS[1:])
-_SECTION = re.compile(r"\s*\[([^\]]+)\]\s*$")
-_DRAWING = re.compile(r"\\p[1-9]")  # a text in drawing mode holds coordinates, no words
-_LINE_BREAK = re.compile(r"\\[Nn]")
-
-
-def read_substation(lines: Sequence[str]) -> tuple[list[WrittenCue], list[SubtitleWarning]]:
-    """Cues of the dialogue lines; comments, drawings and all other sections are left out."""
-    cues: list[WrittenCue] = []
-    warnings: list[SubtitleWarning] = []
-    section, fields = "", ASS_FIELDS
-    for number, line in enumerate(lines, start=1):
-        heading = _SECTION.match(line)
-        if heading:
-            section = heading[1].strip().lower()
-            if section in {"v4 styles", "v4+ styles"}:
-                fields = SSA_FIELDS if section == "v4 styles" else ASS_FIELDS
-            continue
-        kind, colon, rest = line.strip().partition(":")
-        if not colon:
-            continue
-        if kind.lower() == "format" and section == "events":
-            fields = _format_fields(rest, number, warnings) or fields
-        elif kind.lower() == "dialogue":
-            cue = _dialogue(rest, fields, number, warnings)
-            if cue is not None:
-                cues.append(cue)
-    return cues, warnings
-
-
-def _format_fields(written: str, number: int, warnings: list[SubtitleWarning]) -> tuple[str, ...] | None:
-    fields = tuple("name" if one.strip().lower() == "actor" else one.strip().lower() for one in written.split(","))
-    if {"start", "end", "text"} <= set(fields) and fields[-1] == "text":
-        return fields
-    warnings.append(SubtitleWarning(number, "this Format line lacks Start, End or Text at its end; it is not used"))
-    return None
-
-
-def _dialogue(written: str, fields: Sequence[str], number: int, warnings: list[SubtitleWarning]) -> WrittenCue | None:
-    values = written.split(",", len(fields) - 1)
-    if len(values) < len(fields):
-        warnings.append(SubtitleWarning(number, f"this line has {len(values)} of {len(fields)} fields; it is left out"))
-        return None
-    found: Mapping[str, str] = dict(zip(fields, values, strict=True))
-    begin, end = parse_clock(found["start"]), parse_clock(found["end"])
-    if begin is None:
-        warnings.append(
-            SubtitleWarning(number, f"the start {found['start'].strip()[:20]!r} cannot be read; the cue is left out")
-        )
-        return None
-    if end is None:
-        warnings.append(
-            SubtitleWarning(number, f"the end {found['end'].strip()[:20]!r} cannot be read; it is estimated")
-        )
-    text = "" if _DRAWING.search(found["text"]) else _LINE_BREAK.sub("\n", found["text"]).replace("\\h", " ")
-    style = found.get("style", "").strip().lstrip("*")
-    return WrittenCue(begin, end, text, number, speaker=found.get("name", "").strip(), style=style)

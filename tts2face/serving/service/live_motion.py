@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.interchange.exports.curves import ARKIT_SHAPES, arkit_projection
+from tts2face.interchange.exports.arkit import ARKIT_SHAPES, arkit_projection
 from tts2face.serving.service.messages import Line
 from tts2face.types import Clip, Trajectory
 

@@ -75,7 +75,7 @@ def follow(call: Call) -> dict[str, Any]:
     """
     from tts2face.models.face_loading import load_face
     from tts2face.session.live import CALIBRATION_S, track_poses
-    from tts2face.video.take import BlendshapeReader
+    from tts2face.video.blendshapes import BlendshapeReader
     from tts2face.video.tracking import FaceTracker
 
     face, pictures = load_face("head"), Pictures(call)

@@ -20,7 +20,7 @@ from tts2face.session.comparison import MotionPart, compare_motion, map_channels
 from tts2face.session.project import Project
 from tts2face.source import Recorded
 from tts2face.types import HEAD_CHANNELS, Chunk, Trajectory
-from tts2face.video.take import read_livelink
+from tts2face.video.livelink import read_livelink
 
 if TYPE_CHECKING:
     from tts2face.session.session import Session

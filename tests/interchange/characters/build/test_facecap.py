@@ -11,9 +11,9 @@ from tests.interchange.exports import programs
 from tests.packages import package
 from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.interchange.characters.animation import write_character
+from tts2face.interchange.characters.gltf_reader import read_gltf_character
 from tts2face.interchange.characters.importing import ImportedFace, import_face
-from tts2face.interchange.characters.readers import read_gltf_character
-from tts2face.interchange.characters.shapes import ARKIT_SHAPES, guess_mapping
+from tts2face.interchange.characters.shape_names import ARKIT_SHAPES, guess_mapping
 from tts2face.session.session import Session
 
 

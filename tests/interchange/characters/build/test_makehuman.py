@@ -11,8 +11,8 @@ from tts2face.face.deformation import landmark_motion, landmark_positions, scatt
 from tts2face.face.shape_transfer import eye_distance
 from tts2face.interchange.characters.animation import write_character
 from tts2face.interchange.characters.importing import ImportedFace, import_face
-from tts2face.interchange.characters.landmarks import landmark_table
-from tts2face.interchange.characters.shapes import ARKIT_SHAPES
+from tts2face.interchange.characters.landmark_table import landmark_table
+from tts2face.interchange.characters.shape_names import ARKIT_SHAPES
 from tts2face.models.face import Face
 
 BONES = {

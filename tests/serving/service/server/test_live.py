@@ -12,7 +12,7 @@ import websockets
 
 import tts2face
 from tests.running import RunningService, eventually
-from tts2face.interchange.exports.curves import arkit_projection
+from tts2face.interchange.exports.arkit import arkit_projection
 from tts2face.serving.service.live import AHEAD_S
 
 WORDS = ["Hello", "there,", "how", "are", "you?", "I", "am", "well.", "And"]

@@ -34,7 +34,7 @@ from tts2face.serving.work.database import database_url
 from tts2face.serving.work.resources import ResourceTable, StoredResource
 from tts2face.serving.work.run import RESOURCES
 from tts2face.storage.tensors import read_tensors, write_tensors
-from tts2face.video.tracking import MissingModelError
+from tts2face.video.networks import MissingModelError
 
 WORDS = b"Siobhan  SH IH0 V AO1 N\n"
 OTHER_WORDS = b"Nguyen  N UW1 Y EH0 N\n"

@@ -1,0 +1,47 @@
+"""Animation of an imported face as the character's own .glb file."""
+
+import numpy as np
+
+from lexicon.errors import InputError
+from tts2face.interchange.characters.animation import animate_character
+from tts2face.interchange.characters.character import character_file, has_binding, read_binding
+from tts2face.interchange.exports.face_glb import FaceGlbWriter
+from tts2face.interchange.exports.parts import FormatWriter, Part, Target
+from tts2face.storage.output_paths import refuse_overwriting
+from tts2face.storage.spool import Spool
+from tts2face.types import HEAD_CHANNELS, Trajectory
+
+
+class CharacterGlbWriter:
+    """Keeps frames in temporary files, and writes the character's file when their number is known."""
+
+    def __init__(self, target: Target) -> None:
+        if target.face is None:
+            raise InputError(f"{target.name} holds the character of the face; give the face, as in face=session.face")
+        source = character_file(read_binding(target.face))  # a missing file is reported with the first clip
+        refuse_overwriting({"the export": target.path.with_name(target.name)}, {"the character": source})
+        self._target, self._face = target, target.face
+        self._motion, self._head = Spool(len(target.channels)), Spool(len(HEAD_CHANNELS))
+
+    def add(self, part: Part) -> None:
+        """Append frames."""
+        self._motion.add(part.motion)
+        self._head.add(part.head)
+
+    def finish(self) -> None:
+        """Write the file."""
+        fps = float(self._target.fps)
+        motion = Trajectory(self._target.channels, np.array(self._motion.rows(), np.float32), fps)
+        head = Trajectory(HEAD_CHANNELS, np.array(self._head.rows(), np.float32), fps)
+        self._target.path.write_bytes(animate_character(motion, head, self._face).content)
+
+    def close(self) -> None:
+        """Remove the temporary files."""
+        self._motion.close()
+        self._head.close()
+
+
+def make_glb_writer(target: Target) -> FormatWriter:
+    """Writer of the character's own file for a face that was imported from one, otherwise of the face's mesh."""
+    is_imported = target.face is not None and has_binding(target.face)
+    return CharacterGlbWriter(target) if is_imported else FaceGlbWriter(target)
