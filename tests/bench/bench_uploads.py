@@ -16,7 +16,7 @@ from tests.interchange.characters.made import write_character_file
 from tts2face import Session
 from tts2face.processes.async_parent import call_once
 from tts2face.processes.program import Program
-from tts2face.serving.work.talker_job import BUILDER, LIMITS, TOOL
+from tts2face.serving.work.talker_build import BUILDER, LIMITS, TOOL
 from tts2face.serving.work.uploaded_file import DECODE, program
 from tts2face.storage.shipped import find_file
 from tts2face.video.networks import find_bundle

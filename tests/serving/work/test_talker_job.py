@@ -11,7 +11,7 @@ from corpus_tools.tools.talker import BuildOrder
 from lexicon.errors import DataError
 from tests.models.made import write_made_talker
 from tests.serving.work.stub_builder import MADE, ORDER
-from tts2face.serving.work import talker_job
+from tts2face.serving.work import talker_build
 from tts2face.serving.work.blobs import open_blobs
 from tts2face.serving.work.connection import DatabaseAwayError
 from tts2face.serving.work.database import database_url
@@ -30,7 +30,7 @@ def events() -> list[dict[str, Any]]:
 @pytest.fixture
 def run(tmp_path: Path, events: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch) -> Run:
     """Function that executes a job."""
-    monkeypatch.setattr(talker_job, "BUILDER", "tests.serving.work.stub_builder:HANDLERS")
+    monkeypatch.setattr(talker_build, "BUILDER", "tests.serving.work.stub_builder:HANDLERS")
     (tmp_path / "a.mp4").write_bytes(b"video")
     write_made_talker(tmp_path / MADE, has_face=False)
     blobs = open_blobs(tmp_path / "store", "resources")
@@ -90,7 +90,7 @@ def test_a_full_quota_is_said(run: Run, tmp_path: Path) -> None:
 
 
 def test_a_builder_that_dies_is_said(run: Run) -> None:
-    with pytest.raises(DataError, match="needs too much memory or time; send a shorter or smaller one"):
+    with pytest.raises(DataError, match="the recording needs too much memory or time; record it shorter"):
         run("dies")
 
 

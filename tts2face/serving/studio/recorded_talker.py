@@ -3,8 +3,6 @@
 import os
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -13,7 +11,7 @@ from lexicon.errors import BackendError
 from tts2face.processes.async_parent import call_once
 from tts2face.processes.child import Call, Handler
 from tts2face.processes.program import ProcessLimits, Program
-from tts2face.serving.work.talker_job import BUILDER, CPU_S, CPU_S_PER_S, LIMITS, SLOWNESS
+from tts2face.serving.work.talker_build import TOOL, TalkerBuild
 from tts2face.serving.work.tools import run_tool
 
 TALKER, REPORT, CLIP = "talker.talker", "report.html", "first.mp4"  # files in the folder of a recording
@@ -42,13 +40,11 @@ async def build_talker(folder: Path, *, name: str, consent: str, n_takes: int, o
     for old in (TALKER, REPORT, CLIP, MADE):
         (folder / old).unlink(missing_ok=True)
     shutil.rmtree(folder / CHECKED, ignore_errors=True)
-    cpu_s = int(CPU_S + CPU_S_PER_S * SECONDS_A_TAKE * n_takes)
-    order = {
-        "folder": str(folder), "name": name, "provenance": {"name": name}, "consent": consent,
-        "with_appearance": True, "with_report": find_spec("matplotlib") is not None, "max_bytes": MAX_TALKER_BYTES,
-    }  # fmt: skip
-    program = Program(BUILDER, replace(LIMITS, cpu_s=cpu_s))
-    result = await run_tool(program, BUILDER, order, on_message, what="the recording", timeout_s=SLOWNESS * cpu_s)
+    seconds = SECONDS_A_TAKE * n_takes
+    build = TalkerBuild(folder, name, consent, {"name": name}, seconds, MAX_TALKER_BYTES)
+    result = await run_tool(
+        build.program, TOOL, build.order, on_message, what="the recording", timeout_s=build.timeout_s
+    )
     os.replace(folder / MADE, folder / TALKER)
     shutil.rmtree(folder / CHECKED, ignore_errors=True)
     refused = "; ".join(f"{take}: {reason}" for take, reason in result["refused"][:N_SHOWN])

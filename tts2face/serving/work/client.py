@@ -9,8 +9,8 @@ from tts2face.serving.work.blobs import BlobStore
 from tts2face.serving.work.changes import Ending, JobChanges
 from tts2face.serving.work.connection import JobDatabase, Transaction
 from tts2face.serving.work.job_record import CANCELLED, JobRecord, NewJob
-from tts2face.serving.work.queues import APPLICATION, APPLICATION_VERSION, JOB_QUEUE, JOB_WORKFLOW, QUEUE, TALKER_QUEUE
-from tts2face.serving.work.resource_check import TALKER
+from tts2face.serving.work.kinds import KINDS
+from tts2face.serving.work.queues import APPLICATION, APPLICATION_VERSION, JOB_WORKFLOW, QUEUE
 from tts2face.serving.work.segment_queue import ACTIVE, JOBS_PER_QUERY
 from tts2face.serving.work.table import JobTable
 from tts2face.serving.work.usage import UsageTable
@@ -75,7 +75,7 @@ class JobClient:
         def enqueue(change: Transaction, n_waiting: int) -> None:
             put_missing()
             options = {
-                "queue_name": TALKER_QUEUE if new.kind == TALKER else JOB_QUEUE,
+                "queue_name": KINDS[new.kind].queue,
                 "workflow_name": JOB_WORKFLOW,
                 "workflow_id": new.id,
                 "app_version": APPLICATION_VERSION,

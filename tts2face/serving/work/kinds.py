@@ -1,21 +1,29 @@
-"""Kinds of jobs."""
+"""The list of kinds of durable work, and what the function of a kind gets and returns.
+
+The next kind:
+
+1. its function in a module of this room, ``NAME_job.py``: it may run again after any death, so that whatever it stores
+   has a name by content, or is replaced;
+2. its row in `KINDS`, with a queue of `PLACES` if it computes for minutes;
+3. what clients send, and its checks, as a `JobKind` of `tts2face.serving.service.orders` in `JOB_KINDS` (`options`);
+4. a test of the function with a `JobTask` made by hand (``tests/serving/work/test_talker_job.py``).
+
+Work of the studio, which changes what an open page shows, is a `WorkKind` of `tts2face.serving.studio.work`.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from lexicon.errors import DataError
 from tts2face.serving.batch.engine import Engine
 from tts2face.serving.batch.store import Store
 from tts2face.serving.work.blobs import BlobStore
+from tts2face.serving.work.queues import JOB_QUEUE, TALKER_QUEUE
 
-RUNNERS: Mapping[str, str] = {
-    "clip": "tts2face.serving.work.clip_job:run_clip",
-    "subtitles": "tts2face.serving.work.subtitles_job:run_subtitles",
-    "talker": "tts2face.serving.work.talker_job:run_talker",
-}  # name of a kind: module and function
 # No HTML: a report that ran as a page of the service could use the key of its reader.
 MEDIA_TYPES = {
     ".mp4": "video/mp4", ".webm": "video/webm", ".mov": "video/quicktime", ".json": "application/json",
@@ -24,13 +32,36 @@ MEDIA_TYPES = {
 }  # fmt: skip
 
 
+@dataclass(frozen=True, slots=True)
+class JobKind:
+    """A kind of jobs.
+
+    Parameters
+    ----------
+    run
+        Module and function, which gets a `JobTask` and returns `Products`; imported by the worker that needs it.
+    queue
+        One of `PLACES`: how many of the kind a worker executes at once.
+    """
+
+    run: str
+    queue: str = JOB_QUEUE
+
+
+KINDS: Mapping[str, JobKind] = MappingProxyType({
+    "clip": JobKind("tts2face.serving.work.clip_job:run_clip"),
+    "subtitles": JobKind("tts2face.serving.work.subtitles_job:run_subtitles"),
+    "talker": JobKind("tts2face.serving.work.talker_job:run_talker", TALKER_QUEUE),
+})  # fmt: skip
+
+
 class JobCancelledError(Exception):
     """The job was cancelled or deleted while it ran."""
 
 
 @dataclass(frozen=True, slots=True)
 class JobTask:
-    """What a function of `RUNNERS` gets.
+    """A job as the function of its kind gets it.
 
     Parameters
     ----------
@@ -86,9 +117,9 @@ def find_runner(kind: str) -> Callable[[JobTask], Products]:
     DataError
         This version has no such kind.
     """
-    if kind not in RUNNERS:
+    if kind not in KINDS:
         raise DataError(f"this worker cannot execute jobs of kind {kind!r}; install the version of the service")
-    module, name = RUNNERS[kind].split(":")
+    module, name = KINDS[kind].run.split(":")
     runner: Callable[[JobTask], Products] = getattr(import_module(module), name)
     return runner
 

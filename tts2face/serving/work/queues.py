@@ -1,11 +1,18 @@
-"""Names of what DBOS keeps: queues, workflows and the version of the application."""
+"""What DBOS keeps: its application, its workflows, and its queues with their places."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
 
 from tts2face.serving.batch.segment import SEGMENT_FORMAT
 
-QUEUE = "tts2face-segments"
 APPLICATION = "tts2face"
 APPLICATION_VERSION = f"segments-{SEGMENT_FORMAT}"  # pinned: workers of equal segments share their work
-WORKFLOW = "render_segment"
+WORKFLOW, JOB_WORKFLOW = "render_segment", "run_job"
 WORK = "work"  # call of the process of a worker
-JOB_QUEUE, JOB_WORKFLOW = "tts2face-jobs", "run_job"  # of the service; a job waits for its segments
-TALKER_QUEUE = "tts2face-talkers"  # of jobs that compute for minutes; they never occupy the places of others
+QUEUE, JOB_QUEUE, TALKER_QUEUE = "tts2face-segments", "tts2face-jobs", "tts2face-talkers"
+# Places of each queue in each worker (`worker_concurrency`; `concurrency` would count the jobs of the dead, too).
+PLACES: Mapping[str, int] = MappingProxyType({
+    QUEUE: 2,  # one segment is rendered, one waits, so that no time is lost between them
+    JOB_QUEUE: 4,  # jobs mostly wait for their segments; they never occupy the places of segments
+    TALKER_QUEUE: 1,  # a build takes a core and 1 GB for minutes; it never occupies the places of other jobs
+})  # fmt: skip

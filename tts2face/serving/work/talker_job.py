@@ -6,23 +6,19 @@ import time
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError
 from tts2face.processes.message import Message
-from tts2face.processes.parent import Child, ChildEndedError
-from tts2face.processes.program import ProcessLimits, Program
+from tts2face.processes.parent import Child
 from tts2face.serving.work.connection import DatabaseAwayError
 from tts2face.serving.work.kinds import JobTask, Product, Products
 from tts2face.serving.work.resource_check import TALKER
 from tts2face.serving.work.resources import ResourceTable, Usage, keep_files, over_quota, resource_from_folder
+from tts2face.serving.work.talker_build import TOOL, TalkerBuild
+from tts2face.serving.work.tools import limits_of
 
-BUILDER = TOOL = "talker"  # the program, and its handler
-LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=0, file_bytes=2 << 30, n_files=256)
-CPU_S, CPU_S_PER_S = 1200, 40  # of any recording, and for each of its seconds; 256 x 256 pixels take 1 s a second
-SLOWNESS = 5.0  # elapsed time in units of the processor time, on a machine that has other work
 AWAY_S = 2.0  # between tries to reach the database
 N_SHOWN_NOTES = 20  # refused parts, and warnings, that are reported
 
@@ -68,26 +64,23 @@ def _place(source: Path, target: Path) -> None:
 def _build(task: JobTask) -> Mapping[str, Any]:
     """Run the builder; its result."""
     asked = task.request
-    cpu_s = int(CPU_S + CPU_S_PER_S * float(asked["seconds"]))
-    order = {
-        "folder": str(task.folder), "name": asked["name"], "provenance": asked["provenance"],
-        "consent": asked["consent"], "with_appearance": asked["appearance"],
-        "with_report": find_spec("matplotlib") is not None, "max_bytes": asked["limits"]["n_bytes"],
-    }  # fmt: skip
+    build = TalkerBuild(
+        task.folder, asked["name"], asked["consent"], asked["provenance"], float(asked["seconds"]),
+        asked["limits"]["n_bytes"], asked["appearance"],
+    )  # fmt: skip
 
-    def tell(event: Message) -> None:
+    def report(event: Message) -> None:
         with suppress(DatabaseAwayError):
             task.report({"type": "progress", **event.content})
 
-    def look() -> None:
+    def check() -> None:
         with suppress(DatabaseAwayError):
             task.check()
 
-    child = Child(Program(BUILDER, replace(LIMITS, cpu_s=cpu_s)))
+    child = Child(build.program)
     try:
-        return child.call(TOOL, order, on_event=tell, look=look, timeout_s=SLOWNESS * cpu_s).content
-    except ChildEndedError as ended:
-        raise DataError("the recording needs too much memory or time; send a shorter or smaller one") from ended
+        with limits_of("the recording"):
+            return child.call(TOOL, build.order, on_event=report, look=check, timeout_s=build.timeout_s).content
     finally:
         child.close()
 

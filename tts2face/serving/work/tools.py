@@ -3,7 +3,8 @@
 They read files of strangers: each has limits of memory, time and files, and no network, and ends with the server.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -38,9 +39,16 @@ async def run_tool(
     timeout_s: float,
 ) -> Mapping[str, Any]:  # fmt: skip
     """Result of one order of a tool in a child of its own; errors as `run_take_tool`."""
-    try:
+    with limits_of(what):
         return await call_once(
             program, kind, order, on_event=lambda event: on_message(**event.content), timeout_s=timeout_s
         )
+
+
+@contextmanager
+def limits_of(what: str) -> Iterator[None]:
+    """The one sentence about a tool that its limits have ended, as a `DataError`; `what` was given to it."""
+    try:
+        yield
     except ChildEndedError as ended:
         raise DataError(f"{what} needs too much memory or time; record it shorter, or with smaller pictures") from ended

@@ -26,10 +26,8 @@ from tts2face.serving.work.pauses import EnginePauses
 from tts2face.serving.work.queues import (
     APPLICATION,
     APPLICATION_VERSION,
-    JOB_QUEUE,
     JOB_WORKFLOW,
-    QUEUE,
-    TALKER_QUEUE,
+    PLACES,
     WORK,
     WORKFLOW,
 )
@@ -43,9 +41,6 @@ MAX_LOOKS_PER_S = 200.0  # of all workers together: with more than 40, each look
 MAX_DEATHS = 8  # of workers that had the same segment; then it counts as failed
 ALL_WORK_S = 60.0  # between two looks at all running work
 MAX_JOB_DEATHS = 30  # of workers that executed the same job of the service, which lasts longer than a segment
-N_TAKEN = 2  # segments that a worker holds: one is rendered, one waits, so that no time is lost between them
-N_JOBS = 4  # of the service, which mostly wait for their segments; they never occupy the places of segments
-N_TALKERS = 1  # built at a time: each takes a core and 1 GB
 # Connections of a worker to the database: two stay open, besides that of its heartbeats.
 CONNECTIONS = {"pool_size": 2, "max_overflow": 3}
 
@@ -119,7 +114,7 @@ class Worker:
                 "executor_id": self.executor_id,
                 "log_level": "ERROR",
                 "enable_otlp": False,
-                "max_executor_threads": N_TAKEN + N_JOBS + N_TALKERS + 2,
+                "max_executor_threads": sum(PLACES.values()) + 2,
                 "run_migrations": False,
                 "use_listen_notify": False,  # a connection that nothing here needs
                 "db_engine_kwargs": dict(CONNECTIONS),
@@ -163,7 +158,7 @@ class Worker:
             workers.beat(self.executor_id, self._place)
             DBOS.launch()
             self._look_s = poll_interval(len(workers.alive()))
-            for queue, n_places in ((QUEUE, N_TAKEN), (JOB_QUEUE, N_JOBS), (TALKER_QUEUE, N_TALKERS)):
+            for queue, n_places in PLACES.items():
                 DBOS.register_queue(queue, worker_concurrency=n_places, polling_interval_sec=self._look_s)
         except (sqlalchemy.exc.SQLAlchemyError, dbos_error.DBOSException) as away:
             raise BackendError(f"the worker cannot start: {database_reason(away)}; check the database") from away
@@ -241,7 +236,7 @@ class Worker:
         alive = set(workers.alive())
         workers.return_later()
         wanted = self._look_s = poll_interval(len(alive))
-        for name in (QUEUE, JOB_QUEUE, TALKER_QUEUE):
+        for name in PLACES:
             queue = DBOS.retrieve_queue(name)
             if queue is not None and not 0.8 < wanted / queue.polling_interval_sec < 1.25:
                 queue.set_polling_interval_sec(wanted)

@@ -11,7 +11,7 @@ from tts2face.serving.work.connection import (
     open_engine,
     repeat_creation,
 )
-from tts2face.serving.work.queues import APPLICATION_VERSION, JOB_QUEUE, QUEUE, TALKER_QUEUE
+from tts2face.serving.work.queues import APPLICATION_VERSION, PLACES
 
 BEAT_S = 1.5  # between two heartbeats of a worker
 DEAD_AFTER_S = 6.0  # without a heartbeat; with the interval of looking this is below 10 s
@@ -23,7 +23,7 @@ _BEAT = """
 INSERT INTO tts2face_workers (executor_id, beat, place) VALUES (:id, {now}, :place)
 ON CONFLICT (executor_id) DO UPDATE SET beat = {now}"""
 _FROM_LATER = "UPDATE tts2face_workers SET beat = {now} WHERE beat > {now} + 1"  # by a clock that was set back since
-_QUEUES = ", ".join(f"'{name}'" for name in (QUEUE, JOB_QUEUE, TALKER_QUEUE))
+_QUEUES = ", ".join(f"'{name}'" for name in PLACES)
 _WAITS = f"status = 'ENQUEUED' AND queue_name IN ({_QUEUES})"  # condition of the engine's rows
 AHEAD_S = 60.0  # by which clocks of machines may differ
 
