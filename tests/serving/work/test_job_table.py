@@ -21,6 +21,7 @@ from tts2face.serving.work.client import JobClient
 from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
 from tts2face.serving.work.job_record import JobFile, NewJob
+from tts2face.serving.work.queues import WORKFLOWS
 from tts2face.serving.work.run import JobRunner, job_blobs
 from tts2face.serving.work.segment_queue import _enqueue_options, open_client
 from tts2face.serving.work.table import OtherBodyError, QueueFullError
@@ -44,6 +45,14 @@ def changes(database: str) -> Iterator[JobChanges]:
 
 def new_job(owner: str = "ann", **fields: Any) -> NewJob:
     return replace(NewJob(uuid.uuid4().hex, owner, "clip", {"text": "Hi."}, "0" * 64), **fields)
+
+
+def take(client: JobClient, changes: JobChanges, name: str, status: str = "PENDING") -> None:
+    """Let a worker take a job: what the engine notes, and then the worker."""
+    workflows = WORKFLOWS[client._database.kind]
+    with client._database.transaction(is_change=True) as change:
+        assert change.run(f"UPDATE {workflows} SET status = :status WHERE workflow_uuid = :id", id=name, status=status)
+    changes.begin(name)
 
 
 def ended(client: JobClient, changes: JobChanges, *contents: bytes, owner: str = "ann") -> str:
@@ -101,14 +110,14 @@ def test_waiting_jobs_of_an_owner_are_limited(client: JobClient, changes: JobCha
     with pytest.raises(QueueFullError, match="the key ann has 2 waiting jobs"):
         client.submit(new_job(), 2)
     assert client.submit(new_job("bob"), 2)[1]
-    changes.begin(first.id)
+    take(client, changes, first.id)
     assert client.submit(new_job(), 2)[1]
 
 
 def test_pages_follow_each_other(client: JobClient, changes: JobChanges) -> None:
     names = [client.submit(new_job())[0].id for _ in range(5)]
     client.submit(new_job("bob"))
-    changes.begin(names[0])
+    take(client, changes, names[0])
     pages, before = [], None
     while page := client.table.page("ann", None, before, 2):
         pages.append([one.id for one in page])
@@ -139,6 +148,55 @@ def test_a_job_ends_once(client: JobClient, changes: JobChanges) -> None:
     assert [one.content.get("state", "progress") for one in events] == ["running", "progress", "done"]
     assert [one.number for one in events] == [2, 3, 4]
     assert not may_follow
+
+
+def test_whether_a_job_waits_or_runs_is_what_the_engine_says(client: JobClient, changes: JobChanges) -> None:
+    name = client.submit(new_job())[0].id
+    found = []
+    for status in ("PENDING", "ENQUEUED", "PENDING"):  # taken, returned after the death of the worker, taken again
+        take(client, changes, name, status)
+        found.append(client.table.get(name))
+    assert [one.state for one in found if one is not None] == ["running", "waiting", "running"]
+    assert len({one.started for one in found if one is not None}) == 1  # when the first worker took it
+    assert [one.content["state"] for one in client.table.events(name, 0)[0]] == ["waiting", "running"]
+
+
+OLD_TABLE = """CREATE TABLE tts2face_jobs (
+    id VARCHAR(64) PRIMARY KEY, key_name VARCHAR(200) NOT NULL, kind VARCHAR(40) NOT NULL, state VARCHAR(10) NOT NULL,
+    request TEXT NOT NULL, idempotency_key VARCHAR(255), body_hash VARCHAR(64) NOT NULL,
+    created DOUBLE PRECISION NOT NULL, started DOUBLE PRECISION, finished DOUBLE PRECISION,
+    n_done INTEGER NOT NULL DEFAULT 0, n_all INTEGER NOT NULL DEFAULT 0, error TEXT,
+    webhook TEXT, webhook_state VARCHAR(10), webhook_due DOUBLE PRECISION, webhook_tries INTEGER NOT NULL DEFAULT 0,
+    UNIQUE (key_name, idempotency_key))"""
+
+
+def test_a_database_whose_jobs_had_states_of_their_own_is_brought_up_to_date(database: str, tmp_path: Path) -> None:
+    url = database_url(database)
+    old = JobDatabase(url)
+    with old.transaction() as change:
+        change.run(OLD_TABLE)
+        change.run("CREATE INDEX tts2face_jobs_by_state ON tts2face_jobs (state, created)")
+        for number, state in enumerate(("waiting", "running", "done", "failed", "cancelled")):
+            change.run(
+                "INSERT INTO tts2face_jobs (id, key_name, kind, state, request, body_hash, created) "
+                "VALUES (:id, 'ann', 'clip', :state, '{}', '0', :created)",
+                id=state, state=state, created=float(number),
+            )  # fmt: skip
+    old.close()
+    threads = [threading.Thread(target=prepare_database, args=(url,)) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    client = JobClient(url, open_blobs(tmp_path / "store", "results"))
+    try:
+        found = {one.id: one.state for one in client.table.page("ann", None, None, 9)}
+        ends = {name: name for name in ("done", "failed", "cancelled")}
+        assert found == ends | {"waiting": "waiting", "running": "waiting"}  # as they are in no queue
+        assert sorted(client.table.open_jobs()) == ["running", "waiting"]
+        assert client.submit(new_job())[1]
+    finally:
+        client.close()
 
 
 def test_cancelling_ends_the_segments_that_only_this_job_uses(
@@ -202,8 +260,9 @@ def test_old_jobs_are_found_by_their_age(client: JobClient, changes: JobChanges)
 def test_jobs_are_counted_by_state(client: JobClient, changes: JobChanges) -> None:
     ended(client, changes)
     client.submit(new_job())
+    take(client, changes, client.submit(new_job())[0].id)
     counts, age_s = client.table.counts()
-    assert counts == {"waiting": 1, "running": 0, "done": 1, "failed": 0, "cancelled": 0}
+    assert counts == {"waiting": 1, "running": 1, "done": 1, "failed": 0, "cancelled": 0}
     assert 0.0 <= age_s < 60.0
 
 

@@ -1,11 +1,11 @@
-"""Changes of the state of jobs: begin, progress and end; each end happens once."""
+"""Changes of jobs by whoever executes them: taken, progress and end; each end happens once."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from tts2face.serving.work.connection import JobDatabase
-from tts2face.serving.work.job_record import OPEN_STATES, JobFile, JobRecord
+from tts2face.serving.work.job_record import JobFile, JobRecord
 from tts2face.serving.work.table import INPUT, IS_OPEN, OUTPUT, JobTable, insert_files, remove_unused
 
 
@@ -26,13 +26,13 @@ class JobChanges:
         self.table = JobTable(database)
 
     def begin(self, job_id: str) -> JobRecord | None:
-        """Note that a job runs, also when another worker has begun it before; None if it has ended or was deleted."""
+        """The job that a worker has taken, noted if it is the first one; None if it has ended or was deleted."""
         with self._database.transaction(is_change=True) as change:
-            n_begun = change.run(
-                f"UPDATE tts2face_jobs SET state = 'running', started = {self._database.now} "
-                "WHERE id = :id AND state = 'waiting'", id=job_id,
+            n_first = change.run(
+                f"UPDATE tts2face_jobs SET started = {self._database.now} "
+                f"WHERE id = :id AND {IS_OPEN} AND started IS NULL", id=job_id,
             )  # fmt: skip
-            if n_begun:
+            if n_first:
                 self.table.add_event(change, job_id, {"type": "state", "state": "running"})
         found = self.table.get(job_id)
         return found if found is not None and found.is_open else None
@@ -40,7 +40,7 @@ class JobChanges:
     def is_open(self, job_id: str) -> bool:
         """Whether a job waits or runs."""
         with self._database.transaction() as look:
-            return look.value("SELECT state FROM tts2face_jobs WHERE id = :id", id=job_id) in OPEN_STATES
+            return bool(look.value(f"SELECT 1 FROM tts2face_jobs WHERE id = :id AND {IS_OPEN}", id=job_id))
 
     def note_segments(self, job_id: str, addresses: Iterable[str]) -> None:
         """Note which segments a job needs."""
@@ -88,7 +88,7 @@ class JobChanges:
         """
         with self._database.transaction(is_change=True) as change:
             n_ended = change.run(
-                f"UPDATE tts2face_jobs SET state = :state, error = :error, finished = {self._database.now}, "
+                f"UPDATE tts2face_jobs SET ending = :state, error = :error, finished = {self._database.now}, "
                 "webhook_due = CASE WHEN webhook IS NULL THEN NULL ELSE 0 END "
                 f"WHERE id = :id AND {IS_OPEN}", id=job_id, state=ending.state, error=ending.error,
             )  # fmt: skip

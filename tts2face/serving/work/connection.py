@@ -117,6 +117,13 @@ class Transaction:
         """Rows of a query."""
         return list(self.connection.execute(self._sql(statement), values))
 
+    def columns(self, table: str) -> frozenset[str]:
+        """Names of the columns of a table; none if there is no such table."""
+        import sqlalchemy
+
+        found = sqlalchemy.inspect(self.connection)
+        return frozenset(one["name"] for one in found.get_columns(table)) if found.has_table(table) else frozenset()
+
     def value(self, statement: str, **values: Any) -> Any:
         """First value of a query; None without a row."""
         return self.connection.execute(self._sql(statement), values).scalar()

@@ -52,7 +52,15 @@ class NewJob:
 
 @dataclass(frozen=True, slots=True)
 class JobRecord:
-    """A job in the database; times are seconds since 1970 by its clock."""
+    """A job in the database; times are seconds since 1970 by its clock.
+
+    Parameters
+    ----------
+    state
+        Its ending; of an open job what DBOS says of its workflow.
+    started
+        When a worker first took it; DBOS forgets this when another one takes it over, and when it is cancelled.
+    """
 
     id: str
     key_name: str
@@ -91,3 +99,8 @@ def record_from_row(row: Any) -> JobRecord:
     """The record of a row with `COLUMNS`."""
     values = dict(zip(COLUMNS, row, strict=True))
     return JobRecord(**{**values, "request": json.loads(values["request"])})
+
+
+def event_from_row(row: Any) -> JobEvent:
+    """The event of a row with its number, time and content."""
+    return JobEvent(row[0], row[1], json.loads(row[2]))

@@ -6,22 +6,25 @@ from dataclasses import replace
 from typing import Any
 
 from lexicon.errors import BackendError, InputError
-from tts2face.serving.work.connection import JobDatabase, Transaction, create_tables
+from tts2face.serving.work.connection import JobDatabase, Transaction, create_tables, repeat_creation
 from tts2face.serving.work.job_record import (
     COLUMNS,
     OPEN_STATES,
     STATES,
+    WAITING,
     JobEvent,
     JobFile,
     JobRecord,
     NewJob,
+    event_from_row,
     record_from_row,
 )
+from tts2face.serving.work.queues import WORKFLOWS
 
 INPUT, OUTPUT = "input", "output"  # roles of files
 _TABLES = (
     """CREATE TABLE IF NOT EXISTS tts2face_jobs (
-    id VARCHAR(64) PRIMARY KEY, key_name VARCHAR(200) NOT NULL, kind VARCHAR(40) NOT NULL, state VARCHAR(10) NOT NULL,
+    id VARCHAR(64) PRIMARY KEY, key_name VARCHAR(200) NOT NULL, kind VARCHAR(40) NOT NULL, ending VARCHAR(10),
     request TEXT NOT NULL, idempotency_key VARCHAR(255), body_hash VARCHAR(64) NOT NULL,
     created DOUBLE PRECISION NOT NULL, started DOUBLE PRECISION, finished DOUBLE PRECISION,
     n_done INTEGER NOT NULL DEFAULT 0, n_all INTEGER NOT NULL DEFAULT 0, error TEXT,
@@ -35,12 +38,23 @@ _TABLES = (
     PRIMARY KEY (job_id, number))""",
     """CREATE TABLE IF NOT EXISTS tts2face_job_segments (
     job_id VARCHAR(64) NOT NULL, address VARCHAR(64) NOT NULL, PRIMARY KEY (job_id, address))""",
-    "CREATE INDEX IF NOT EXISTS tts2face_jobs_by_state ON tts2face_jobs (state, created)",
+    "CREATE INDEX IF NOT EXISTS tts2face_jobs_by_ending ON tts2face_jobs (ending, created)",
     "CREATE INDEX IF NOT EXISTS tts2face_job_files_by_hash ON tts2face_job_files (sha256)",
     "CREATE INDEX IF NOT EXISTS tts2face_job_segments_by_address ON tts2face_job_segments (address)",
 )
-_SELECT = f"SELECT {', '.join(COLUMNS)} FROM tts2face_jobs"
-IS_OPEN = f"state IN {OPEN_STATES}"  # condition of a query
+# Tables of versions whose jobs had a state of their own beside that of DBOS.
+_MIGRATION = (
+    "ALTER TABLE tts2face_jobs ADD COLUMN ending VARCHAR(10)",
+    f"UPDATE tts2face_jobs SET ending = state WHERE state NOT IN {OPEN_STATES}",
+    "DROP INDEX IF EXISTS tts2face_jobs_by_state",
+    "ALTER TABLE tts2face_jobs DROP COLUMN state",
+)
+IS_OPEN = "ending IS NULL"  # condition of a query
+# The ending belongs to the results, and is written with them; whether an open job waits or runs is what DBOS says.
+# A workflow that has ended without its job counts as running until `JobRunner.end_abandoned`.
+_STATE = """CASE WHEN j.ending IS NOT NULL THEN j.ending
+    WHEN w.status IS NULL OR w.status IN ('ENQUEUED', 'DELAYED') THEN 'waiting' ELSE 'running' END"""
+_SHOWN = ", ".join(f"{_STATE} AS state" if name == "state" else f"j.{name}" for name in COLUMNS)
 CHILD_TABLES = ("tts2face_job_files", "tts2face_job_events", "tts2face_job_segments")
 
 
@@ -63,10 +77,22 @@ class JobTable:
 
     def __init__(self, database: JobDatabase) -> None:
         self.database = database
+        self._jobs = f"tts2face_jobs j LEFT JOIN {WORKFLOWS[database.kind]} w ON w.workflow_uuid = j.id"
+        self._select = f"SELECT {_SHOWN} FROM {self._jobs}"
 
     def create(self) -> None:
-        """Create the tables where they are missing; several processes may do so at once."""
+        """Create the tables or bring them up to date; several processes may do so at once."""
+        repeat_creation(self._migrate)
         create_tables(self.database, _TABLES)
+
+    def _migrate(self) -> None:
+        with self.database.transaction() as look:
+            names = look.columns("tts2face_jobs")
+        if "state" in names:
+            with self.database.transaction(is_change=True) as change:
+                if "state" in change.columns("tts2face_jobs"):  # no other process was faster
+                    for statement in _MIGRATION:
+                        change.run(statement)
 
     def submit(
         self, new: NewJob, enqueue: Callable[[Transaction, int], None], max_waiting: int | None = None
@@ -95,15 +121,15 @@ class JobTable:
             found = self._with_key(change, new)
             if found is not None:
                 return found, False
-            query = "SELECT count(*) FROM tts2face_jobs WHERE key_name = :key AND state = 'waiting'"
-            n_waiting = int(change.value(query, key=new.key_name))
+            condition = f"j.key_name = :key AND j.{IS_OPEN} AND {_STATE} = 'waiting'"
+            n_waiting = int(change.value(f"SELECT count(*) FROM {self._jobs} WHERE {condition}", key=new.key_name))
             if max_waiting is not None and n_waiting >= max_waiting:
                 raise QueueFullError(
                     f"the key {new.key_name} has {max_waiting} waiting jobs; wait until some have ended"
                 )
             change.run(
-                "INSERT INTO tts2face_jobs (id, key_name, kind, state, request, idempotency_key, body_hash, created, "
-                "webhook, webhook_state) VALUES (:id, :key, :kind, 'waiting', :request, :idempotency, :hash, "
+                "INSERT INTO tts2face_jobs (id, key_name, kind, request, idempotency_key, body_hash, created, "
+                "webhook, webhook_state) VALUES (:id, :key, :kind, :request, :idempotency, :hash, "
                 f"{self.database.now}, :webhook, :webhook_state)",
                 id=new.id, key=new.key_name, kind=new.kind, request=json.dumps(new.request, ensure_ascii=False),
                 idempotency=new.idempotency_key, hash=new.body_hash, webhook=new.webhook,
@@ -117,7 +143,7 @@ class JobTable:
     def get(self, job_id: str) -> JobRecord | None:
         """A job with its files; None if there is none."""
         with self.database.transaction() as look:
-            found = look.rows(f"{_SELECT} WHERE id = :id", id=job_id)
+            found = look.rows(f"{self._select} WHERE j.id = :id", id=job_id)
             return _with_files(look, record_from_row(found[0])) if found else None
 
     def page(self, key_name: str | None, state: str | None, before: str | None, limit: int) -> list[JobRecord]:
@@ -132,15 +158,15 @@ class JobTable:
         """
         conditions, values = ["1 = 1"], dict[str, Any](limit=limit)
         if key_name is not None:
-            conditions.append("key_name = :key")
+            conditions.append("j.key_name = :key")
             values["key"] = key_name
         if state is not None:
-            conditions.append("state = :state")
+            conditions.append(f"{_STATE} = :state")
             values["state"] = state
         if before is not None:
-            conditions.append("(created, id) < (SELECT created, id FROM tts2face_jobs WHERE id = :before)")
+            conditions.append("(j.created, j.id) < (SELECT created, id FROM tts2face_jobs WHERE id = :before)")
             values["before"] = before
-        query = f"{_SELECT} WHERE {' AND '.join(conditions)} ORDER BY created DESC, id DESC LIMIT :limit"
+        query = f"{self._select} WHERE {' AND '.join(conditions)} ORDER BY j.created DESC, j.id DESC LIMIT :limit"
         with self.database.transaction() as look:
             return [record_from_row(row) for row in look.rows(query, **values)]
 
@@ -148,15 +174,15 @@ class JobTable:
         """Events of a job with larger numbers, and whether it may have further ones."""
         query = "SELECT number, time, content FROM tts2face_job_events WHERE job_id = :id AND number > :after "
         with self.database.transaction() as look:
-            is_open = look.value("SELECT state FROM tts2face_jobs WHERE id = :id", id=job_id) in OPEN_STATES
+            is_open = bool(look.value(f"SELECT 1 FROM tts2face_jobs WHERE id = :id AND {IS_OPEN}", id=job_id))
             rows = look.rows(f"{query} ORDER BY number LIMIT :limit", id=job_id, after=after, limit=limit)
-        return [JobEvent(row[0], row[1], json.loads(row[2])) for row in rows], is_open or len(rows) == limit
+        return [event_from_row(row) for row in rows], is_open or len(rows) == limit
 
     def file_of(self, sha256: str, key_name: str | None) -> JobFile | None:
         """Result of a hash in a job of an owner, or of anybody; None if there is none."""
         query = (
             "SELECT f.name, f.sha256, f.media_type, f.n_bytes FROM tts2face_job_files f JOIN tts2face_jobs j "
-            "ON j.id = f.job_id WHERE f.sha256 = :hash AND f.role = 'output' AND j.state = 'done'"
+            "ON j.id = f.job_id WHERE f.sha256 = :hash AND f.role = 'output' AND j.ending = 'done'"
         )
         query += "" if key_name is None else " AND j.key_name = :key"
         with self.database.transaction() as look:
@@ -166,9 +192,12 @@ class JobTable:
     def counts(self) -> tuple[dict[str, int], float]:
         """Numbers of jobs by state, and the age of the oldest waiting one in seconds."""
         with self.database.transaction() as look:
-            rows = look.rows("SELECT state, count(*) FROM tts2face_jobs GROUP BY state")
-            query = f"SELECT {self.database.now} - min(created) FROM tts2face_jobs WHERE state = 'waiting'"
-            return dict.fromkeys(STATES, 0) | {row[0]: row[1] for row in rows}, float(look.value(query) or 0.0)
+            query = f"SELECT ending, count(*), 0.0 FROM tts2face_jobs WHERE NOT {IS_OPEN} GROUP BY ending"
+            rows = look.rows(query)
+            age = f"{self.database.now} - min(j.created)"
+            rows += look.rows(f"SELECT {_STATE}, count(*), {age} FROM {self._jobs} WHERE j.{IS_OPEN} GROUP BY 1")
+        ages = {row[0]: float(row[2]) for row in rows}
+        return dict.fromkeys(STATES, 0) | {row[0]: row[1] for row in rows}, ages.get(WAITING, 0.0)
 
     def open_jobs(self) -> list[str]:
         """Names of all waiting and running jobs."""
@@ -212,14 +241,12 @@ class JobTable:
             f"{self.database.now}, :content)", id=job_id, content=json.dumps(content, ensure_ascii=False),
         )  # fmt: skip
 
-    @staticmethod
-    def _with_key(change: Transaction, new: NewJob) -> JobRecord | None:
+    def _with_key(self, change: Transaction, new: NewJob) -> JobRecord | None:
         """The job that has the idempotency key of a new one."""
         if new.idempotency_key is None:
             return None
-        found = change.rows(
-            f"{_SELECT} WHERE key_name = :key AND idempotency_key = :value", key=new.key_name, value=new.idempotency_key
-        )
+        query = f"{self._select} WHERE j.key_name = :key AND j.idempotency_key = :value"
+        found = change.rows(query, key=new.key_name, value=new.idempotency_key)
         if not found:
             return None
         record = record_from_row(found[0])
@@ -227,9 +254,8 @@ class JobTable:
             raise OtherBodyError("this Idempotency-Key was sent with another body before; use a new one")
         return _with_files(change, record)
 
-    @staticmethod
-    def _read(look: Transaction, job_id: str) -> JobRecord:
-        return _with_files(look, record_from_row(look.rows(f"{_SELECT} WHERE id = :id", id=job_id)[0]))
+    def _read(self, look: Transaction, job_id: str) -> JobRecord:
+        return _with_files(look, record_from_row(look.rows(f"{self._select} WHERE j.id = :id", id=job_id)[0]))
 
 
 def insert_files(change: Transaction, job_id: str, role: str, files: Sequence[JobFile]) -> None:

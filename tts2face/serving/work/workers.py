@@ -11,7 +11,7 @@ from tts2face.serving.work.connection import (
     open_engine,
     repeat_creation,
 )
-from tts2face.serving.work.queues import APPLICATION_VERSION, PLACES
+from tts2face.serving.work.queues import APPLICATION_VERSION, PLACES, WORKFLOWS
 
 BEAT_S = 1.5  # between two heartbeats of a worker
 DEAD_AFTER_S = 6.0  # without a heartbeat; with the interval of looking this is below 10 s
@@ -28,14 +28,10 @@ _WAITS = f"status = 'ENQUEUED' AND queue_name IN ({_QUEUES})"  # condition of th
 AHEAD_S = 60.0  # by which clocks of machines may differ
 
 
-def _engine_table(kind: str) -> str:
-    return "workflow_status" if kind == "sqlite" else "dbos.workflow_status"
-
-
 def _waiting_query(kind: str) -> str:
     """Query for one job of this version that waits in a queue, in the engine's table."""
     version = f"application_version = '{APPLICATION_VERSION}'"
-    return f"SELECT 1 FROM {_engine_table(kind)} WHERE {_WAITS} AND {version} LIMIT 1"
+    return f"SELECT 1 FROM {WORKFLOWS[kind]} WHERE {_WAITS} AND {version} LIMIT 1"
 
 
 class Workers:
@@ -47,7 +43,7 @@ class Workers:
         self._sql = sqlalchemy.text
         self._now = NOW[database_kind(url)]
         self._waiting = _waiting_query(database_kind(url))
-        self._table = _engine_table(database_kind(url))
+        self._table = WORKFLOWS[database_kind(url)]
         self._database_error = sqlalchemy.exc.SQLAlchemyError
         self._engine = open_engine(url)
         self._looking: Any = None
