@@ -28,7 +28,7 @@ async def receive_message(stream: asyncio.StreamReader) -> Message | None:
 
 @dataclass(slots=True, eq=False)
 class _Answers:
-    """What came of a call and its caller has not read yet; None at the end of the child."""
+    """Messages of a call that its caller has not read yet; None at the end of the child."""
 
     id: int
     on_paused: Callable[[bool], None]
@@ -44,7 +44,9 @@ class _Running:
     def __init__(
         self, process: asyncio.subprocess.Process, errors: IO[bytes] | None, on_released: Callable[[float], None]
     ) -> None:
-        self.process, self._errors, self._on_released = process, errors, on_released
+        self.process = process
+        self._errors = errors
+        self._on_released = on_released
         self.why = ""  # it ended
         self._calls: dict[int, _Answers] = {}
         self.reading = asyncio.create_task(self._read())

@@ -47,7 +47,10 @@ class Call:
     """
 
     def __init__(self, message: Message, out: BinaryIO, changed: threading.Condition) -> None:
-        self.name, self.content, self.payload, self.id = message.kind, message.content, message.payload, message.id
+        self.name = message.kind
+        self.content = message.content
+        self.payload = message.payload
+        self.id = message.id
         self.changed, self.inputs = changed, deque[Message]()
         self.is_paused = self.is_stopped = False
         self._out = out
@@ -169,7 +172,7 @@ def answer(call: Call, handlers: Mapping[str, Handler]) -> None:
     except StoppedError:
         call.send(Message(ERROR, {"errors": [], "message": "the call was stopped"}))
     except Tts2faceError as error:
-        names = [one.__name__ for one in type(error).__mro__ if issubclass(one, Tts2faceError)]
+        names = [kind.__name__ for kind in type(error).__mro__ if issubclass(kind, Tts2faceError)]
         call.send(Message(ERROR, {"errors": names, "message": call.shown(error)}))
     else:
         call.send(found if isinstance(found, Message) else Message(RESULT, found))

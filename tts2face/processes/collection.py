@@ -4,7 +4,7 @@ import gc
 
 
 def pause_collection() -> None:
-    """Stop the search for garbage: what imports and loads makes none, and each search looks at all of it."""
+    """Stop the search for garbage: what imports and loads makes none, and each search visits all of it."""
     gc.disable()
 
 

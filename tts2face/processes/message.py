@@ -6,9 +6,16 @@ from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
 # Kinds of messages: calls have the name of their handler.
-MORE, PAUSE, GO, STOP = "more", "pause", "go", "stop"  # to a child, of a live call: a further input, or its control
+# to a child, of a live call: a further input, or its control
+MORE = "more"
+PAUSE = "pause"
+GO = "go"
+STOP = "stop"
 CONTROLS = frozenset({MORE, PAUSE, GO, STOP})
-EVENT, RESULT, ERROR = "event", "result", "error"  # from a child, of a call
+# from a child, of a call
+EVENT = "event"
+RESULT = "result"
+ERROR = "error"
 
 MAX_LINE_BYTES = 16 << 20
 MAX_PAYLOAD_BYTES = 256 << 20

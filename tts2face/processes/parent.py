@@ -23,7 +23,7 @@ from tts2face.processes.message import (
 )
 from tts2face.processes.program import Program
 
-LOOK_S = 1.0  # between two looks of a caller who waits
+CHECK_S = 1.0  # between two checks of a caller who waits
 KILL_AGAIN_S = 0.05
 END_S = 1.0  # until a process that has closed its output must have ended
 MAX_SHOWN_CHARACTERS = 300  # of the standard error of a child that ended
@@ -38,17 +38,17 @@ class ChildEndedError(BackendError):
 
 def raised(message: Message) -> Tts2faceError:
     """The error of a message, by the first of its names that is known here."""
-    known = {one.__name__: one for one in _kinds(Tts2faceError)}
+    known = {kind.__name__: kind for kind in _kinds(Tts2faceError)}
     kind = next((known[name] for name in message.content["errors"] if name in known), BackendError)
     return kind(message.content["message"])
 
 
 def _kinds(kind: type[Tts2faceError]) -> Iterator[type[Tts2faceError]]:
     """Errors that are made from their message alone."""
-    for one in kind.__subclasses__():
-        if one.__init__ is Tts2faceError.__init__:
-            yield one
-        yield from _kinds(one)
+    for narrower in kind.__subclasses__():
+        if narrower.__init__ is Tts2faceError.__init__:
+            yield narrower
+        yield from _kinds(narrower)
 
 
 def ended_error(kind: str, why: str) -> ChildEndedError:
@@ -96,7 +96,7 @@ class Child:
 
     def call(
         self, kind: str, content: Mapping[str, Any], payload: bytes = b"", *, on_event: OnEvent | None = None,
-        look: Callable[[], object] | None = None, timeout_s: float = float("inf"),
+        check: Callable[[], object] | None = None, timeout_s: float = float("inf"),
     ) -> Message:  # fmt: skip
         """Result of a call.
 
@@ -104,8 +104,8 @@ class Child:
         ----------
         on_event
             Called with each event.
-        look
-            Called at least every `LOOK_S`; what it raises ends the child and the call.
+        check
+            Called at least every `CHECK_S`; what it raises ends the child and the call.
 
         Raises
         ------
@@ -127,10 +127,10 @@ class Child:
                     child.stdin.write(Message(kind, content, payload, self._n_calls).encoded())  # type: ignore[union-attr]
                     child.stdin.flush()  # type: ignore[union-attr]
                 while time.monotonic() < deadline:
-                    if look is not None:
-                        look()
+                    if check is not None:
+                        check()
                     try:
-                        message = self._messages.get(timeout=min(LOOK_S, deadline - time.monotonic()))
+                        message = self._messages.get(timeout=min(CHECK_S, deadline - time.monotonic()))
                     except queue.Empty:
                         continue
                     if message is None:
@@ -206,7 +206,7 @@ def _receive(file: IO[bytes], messages: "queue.SimpleQueue[Message | None]") -> 
 
 
 def answer_of(message: Message) -> Message:
-    """A message; raises the error that it tells."""
+    """A message; raises the error that it holds."""
     if message.kind == ERROR:
         raise raised(message)
     return message

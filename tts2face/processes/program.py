@@ -1,4 +1,4 @@
-"""What a child process runs: handlers of ours, or a tool of a package above this one or of a stranger.
+"""Program of a child process: handlers of ours, or a tool of a package above this one or of a stranger.
 
 Processes that read files of strangers: limits of memory, time and files, no network, no credentials.
 """

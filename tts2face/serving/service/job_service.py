@@ -35,8 +35,11 @@ from tts2face.storage.files import translate_disk_errors
 Value = TypeVar("Value")
 RETRY_S = 2.0  # between two tries to open the database
 RETRY_AFTER_S = 5  # for clients, while the database cannot be reached
-SUPERVISE_S, RESTART_S = 0.5, 10.0  # between two looks at the workers, and after they ended again and again
-SHARE_S, STATISTICS_S, SWEEP_S = 0.5, 5.0, 3600.0  # between two looks
+SUPERVISE_S, RESTART_S = 0.5, 10.0  # between two checks of the workers, and after they ended again and again
+# seconds between two times
+SHARE_S = 0.5
+STATISTICS_S = 5.0
+SWEEP_S = 3600.0
 PROBE_S = 3.0  # of the database for /readyz
 DAY_S = 86_400.0
 MIN_AGE_S = DAY_S  # of files and segments: a younger one may belong to a job that is being queued or planned
@@ -57,7 +60,9 @@ class JobService:
     """
 
     def __init__(self, settings: ServiceSettings, library: Library, limits: RateLimits) -> None:
-        self._settings, self._library, self._limits = settings, library, limits
+        self._settings = settings
+        self._library = library
+        self._limits = limits
         self._name = uuid.uuid4().hex  # of this server
         self._client: JobClient | None = None
         self._reason = ""  # why the database cannot be reached

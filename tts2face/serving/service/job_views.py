@@ -85,7 +85,7 @@ def job_view(record: JobRecord) -> Job:
 
 def job_detail(record: JobRecord) -> JobDetail:
     """A job with its results."""
-    return JobDetail(**_fields(record), results=[_file(one) for one in record.outputs])
+    return JobDetail(**_fields(record), results=[_file(file) for file in record.outputs])
 
 
 def _fields(record: JobRecord) -> Mapping[str, Any]:
@@ -99,9 +99,13 @@ def _fields(record: JobRecord) -> Mapping[str, Any]:
     }
 
 
-def _file(one: JobFile) -> ResultFile:
+def _file(file: JobFile) -> ResultFile:
     return ResultFile(
-        name=one.name, url=f"/v1/results/{one.sha256}", sha256=one.sha256, media_type=one.media_type, bytes=one.n_bytes
+        name=file.name,
+        url=f"/v1/results/{file.sha256}",
+        sha256=file.sha256,
+        media_type=file.media_type,
+        bytes=file.n_bytes,
     )
 
 

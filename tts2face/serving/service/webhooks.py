@@ -29,21 +29,18 @@ from tts2face.serving.work.job_record import JobRecord
 
 CALL_S = 10.0  # of a whole call, however often its receiver sends a byte; services that receive webhooks answer in 5
 CONNECT_S = 4.0  # to one address of a host
-LOOK_S = 1.0  # between two looks at the messages that are due, while none ends
-PLACES, KEY_PLACES, HOST_PLACES = 64, 2, 8  # calls at the same time: of all, of a key, to a host
+POLL_S = 1.0  # between two polls of the messages that are due, while none ends
+# calls at the same time: of all, of a key, to a host
+PLACES = 64
+KEY_PLACES = 2
+HOST_PLACES = 8
 HEAD_BYTES, BLOCK_BYTES = 16 << 10, 4 << 10  # of an answer, of which only the status counts
 PORTS = {"https": 443, "http": 80}
 Value = TypeVar("Value")
 
 
 def check_webhook(url: str, settings: ServiceSettings) -> None:
-    """Refuse a webhook whose host is not in the setting `webhook_hosts`.
-
-    Raises
-    ------
-    RefusedError
-        With the reason.
-    """
+    """Refuse a webhook whose host is not in the setting `webhook_hosts`."""
     try:
         parts = urlsplit(url)
         place = host_of(parts)
@@ -113,13 +110,7 @@ async def _read_status(reader: asyncio.StreamReader, sender: h11.Connection) -> 
 
 
 async def _connect(parts: SplitResult) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
-    """Connection to the first address of a URL's host that answers.
-
-    Raises
-    ------
-    OSError
-        None does.
-    """
+    """Connection to the first address of a URL's host that answers."""
     name, port = str(parts.hostname), parts.port or PORTS[parts.scheme]
     secured = {"ssl": _tls(), "server_hostname": name} if parts.scheme == "https" else {}
     for address in await _addresses(name, port):
@@ -141,7 +132,7 @@ async def _addresses(name: str, port: int) -> list[str]:
         if not found.done():
             found.set_result(addresses)
 
-    def look() -> None:
+    def resolve() -> None:
         addresses: list[str] = []
         with suppress(OSError, UnicodeError):
             infos = socket.getaddrinfo(name, port, type=socket.SOCK_STREAM)
@@ -149,7 +140,7 @@ async def _addresses(name: str, port: int) -> list[str]:
         with suppress(RuntimeError):  # the loop has ended meanwhile
             loop.call_soon_threadsafe(tell, addresses)
 
-    threading.Thread(target=look, name="webhooks", daemon=True).start()
+    threading.Thread(target=resolve, name="webhooks", daemon=True).start()
     return await found
 
 
@@ -177,7 +168,9 @@ class Webhooks:
     """
 
     def __init__(self, settings: ServiceSettings, call: Call, message_of: Callable[[JobRecord], bytes]) -> None:
-        self._settings, self._call, self._message_of = settings, call, message_of
+        self._settings = settings
+        self._call = call
+        self._message_of = message_of
         self._sending: dict[asyncio.Task[None], WebhookDelivery] = {}
 
     async def run(self) -> None:
@@ -198,34 +191,34 @@ class Webhooks:
     async def _wait(self) -> None:
         """Wait until a place is free, or a moment."""
         if self._sending:
-            timeout_s = LOOK_S if len(self._sending) < PLACES else None
+            timeout_s = POLL_S if len(self._sending) < PLACES else None
             await asyncio.wait(self._sending, timeout=timeout_s, return_when=asyncio.FIRST_COMPLETED)
         else:
-            await asyncio.sleep(LOOK_S)
+            await asyncio.sleep(POLL_S)
 
     async def _begin(self) -> int:
         """Begin to send those due messages that have a place; their number."""
-        keys = Counter(one.key_name for one in self._sending.values())
+        keys = Counter(delivery.key_name for delivery in self._sending.values())
         if keys.total() >= PLACES:
             return 0
         busy = [name for name, n_places in keys.items() if n_places >= KEY_PLACES]
         due = await self._call(partial(JobClient.due_webhooks, busy=busy))
         chosen = self._with_places(due, keys)
-        for one in await self._call(partial(JobClient.take_webhooks, due=chosen)) if chosen else ():
-            task = asyncio.create_task(self._deliver(one))
-            self._sending[task] = one
+        for delivery in await self._call(partial(JobClient.take_webhooks, due=chosen)) if chosen else ():
+            task = asyncio.create_task(self._deliver(delivery))
+            self._sending[task] = delivery
             task.add_done_callback(self._sending.pop)
         return len(chosen)
 
     def _with_places(self, due: list[WebhookDelivery], keys: Counter[str]) -> list[WebhookDelivery]:
         """Those of some messages that have a place: of all, of their key and of their host."""
         chosen: list[WebhookDelivery] = []
-        hosts = Counter(host_of(urlsplit(one.url)) for one in self._sending.values())
-        for one in due:
-            host = host_of(urlsplit(one.url))
-            if keys[one.key_name] < KEY_PLACES and hosts[host] < HOST_PLACES and keys.total() < PLACES:
-                chosen.append(one)
-                keys[one.key_name] += 1
+        hosts = Counter(host_of(urlsplit(delivery.url)) for delivery in self._sending.values())
+        for delivery in due:
+            host = host_of(urlsplit(delivery.url))
+            if keys[delivery.key_name] < KEY_PLACES and hosts[host] < HOST_PLACES and keys.total() < PLACES:
+                chosen.append(delivery)
+                keys[delivery.key_name] += 1
                 hosts[host] += 1
         return chosen
 

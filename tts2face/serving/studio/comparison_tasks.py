@@ -31,7 +31,9 @@ SILENT_RATE = 24_000  # Hz, of recorded motion, which has no sound of its own
 
 def recordings(session: "Session", work: Work, _: Inputs) -> Iterator[Event]:
     """Names of the talker's recordings with their words."""
-    spoken = [[one.name, " ".join(word.text for word in one.words)] for one in session.talker.utterances]
+    spoken = [
+        [utterance.name, " ".join(word.text for word in utterance.words)] for utterance in session.talker.utterances
+    ]
     yield Event({"type": "recordings", "recordings": spoken})
 
 
@@ -75,11 +77,13 @@ def _recorded(session: "Session", options: Mapping[str, Any], project: Project) 
     if n_frames < 1:
         raise InputError(f"the recording ends before its second {offset:g}; give a smaller offset")
     times = offset + np.arange(n_frames) / fps
-    return FaceMotion(*(replace(one, values=one.at(times), fps=fps) for one in (found.face, found.head)))
+    return FaceMotion(
+        *(replace(trajectory, values=trajectory.at(times), fps=fps) for trajectory in (found.face, found.head))
+    )
 
 
 def _utterance_motion(talker: Talker, name: str, face: AnimatedFace) -> FaceMotion:
-    found = next((one for one in talker.utterances if one.name == name), None)
+    found = next((utterance for utterance in talker.utterances if utterance.name == name), None)
     if found is None:
         raise InputError(f"the talker has no recording {name[:40]!r}; choose one from the list")
     head = Trajectory(HEAD_CHANNELS, found.head, talker.fps)
@@ -114,10 +118,10 @@ def measure(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Made:
-    """A piece of the project: its text, begin and duration in seconds, motion (T, K) and phones."""
+    """A piece of the project: its text, start and duration in seconds, motion (T, K) and phones."""
 
     text: str
-    begin: float
+    start: float
     seconds: float
     motion: NDArray[np.float32]
     phones: PhoneSequence
@@ -126,10 +130,10 @@ class _Made:
 def _parts(made: Sequence[_Made], reference: Trajectory, sentences: Sequence[Any], fps: float) -> list[MotionPart]:
     """Parts with the same times if the sentences allow it, else those of equal sentences."""
     if not sentences or _is_same_time(made, sentences):
-        found = [_part_of_same_time(one, reference, fps) for one in made]
+        found = [_part_of_same_time(piece, reference, fps) for piece in made]
     else:
         found = _parts_of_equal_sentences(made, reference, list(sentences), fps)
-    found = [one for one in found if len(one.motion) and len(one.reference)]
+    found = [part for part in found if len(part.motion) and len(part.reference)]
     if not found:
         raise InputError("the project and what it is compared with have no sentence in common; compare the same text")
     return found
@@ -137,19 +141,19 @@ def _parts(made: Sequence[_Made], reference: Trajectory, sentences: Sequence[Any
 
 def _is_same_time(made: Sequence[_Made], sentences: Sequence[Any]) -> bool:
     """Whether all sentences have the same times; the one of a recording spans all its pieces."""
-    end = made[-1].begin + made[-1].seconds
+    end = made[-1].start + made[-1].seconds
     if len(sentences) == 1 and not sentences[0][0]:
         return abs(float(sentences[0][3]) - end) <= DTW_BAND_S
     return len(made) == len(sentences) and all(
-        one.text == text and max(abs(one.begin - begin), abs(one.begin + one.seconds - end)) <= DTW_BAND_S
-        for one, (text, _, begin, end) in zip(made, sentences, strict=True)
+        piece.text == text and max(abs(piece.start - start), abs(piece.start + piece.seconds - end)) <= DTW_BAND_S
+        for piece, (text, _, start, end) in zip(made, sentences, strict=True)
     )
 
 
-def _part_of_same_time(one: _Made, reference: Trajectory, fps: float) -> MotionPart:
-    times = one.begin + np.arange(len(one.motion)) / fps
+def _part_of_same_time(piece: _Made, reference: Trajectory, fps: float) -> MotionPart:
+    times = piece.start + np.arange(len(piece.motion)) / fps
     n = int((times < reference.duration).sum())
-    return MotionPart(reference.at(times[:n]), one.motion[:n], one.phones)
+    return MotionPart(reference.at(times[:n]), piece.motion[:n], piece.phones)
 
 
 def _parts_of_equal_sentences(
@@ -157,12 +161,12 @@ def _parts_of_equal_sentences(
 ) -> list[MotionPart]:
     """Each sentence with the first one of the reference that has its text and is not taken."""
     found = []
-    for one in made:
-        same = next((theirs for theirs in sentences if theirs[0] == one.text and one.text), None)
+    for piece in made:
+        same = next((theirs for theirs in sentences if theirs[0] == piece.text and piece.text), None)
         if same is not None:
             sentences.remove(same)
             times = np.arange(same[2], same[3], 1 / fps)
-            found.append(MotionPart(reference.at(times), one.motion, one.phones, is_same_time=False))
+            found.append(MotionPart(reference.at(times), piece.motion, piece.phones, is_same_time=False))
     return found
 
 

@@ -27,7 +27,9 @@ class OwnedFolders:
     """
 
     def __init__(self, folder: Path, entry: str, noun: str) -> None:
-        self._folder, self._entry, self._noun = folder, entry, noun
+        self._folder = folder
+        self._entry = entry
+        self._noun = noun
 
     def make(self, owner: str, *parts: str) -> Path:
         """A new folder of an owner, with folders in it."""

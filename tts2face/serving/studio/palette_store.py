@@ -22,7 +22,9 @@ SHIPPED = str(Models().palette)
 MY_STYLES = "my-styles"  # name of the palette for clients
 FILE = f"{MY_STYLES}.palette"
 MAX_OWN_STYLES = 50
-TAKE, CACHE, MADE = "take", "cache", "made.palette"
+TAKE = "take"
+CACHE = "cache"
+MADE = "made.palette"
 SUFFIXES = frozenset({".webm", ".mp4", ".mov", ".mkv", ".avi", ".mpg", ".csv"})  # of takes
 
 
@@ -107,13 +109,7 @@ class PaletteStore:
         return next((file for file in self.take_folder(owner).glob("take.*") if file.suffix in SUFFIXES), None)
 
     def put_take(self, owner: str, source: Path, suffix: str, sound: Path | None = None) -> Path:
-        """Keep a file, which is moved, as the take in place of an earlier one; the sound of a table is copied.
-
-        Raises
-        ------
-        InputError
-            Its ending is not one of `SUFFIXES`.
-        """
+        """Keep a file, which is moved, as the take in place of an earlier one; the sound of a table is copied."""
         if suffix not in SUFFIXES:
             raise InputError(f"a take {suffix[:10]!r} cannot be read; give {', '.join(sorted(SUFFIXES))}")
         self.delete_take(owner)

@@ -105,7 +105,9 @@ def bundle(preview: Preview, memory: PieceMemory, earlier: Preview | None) -> by
     first_heard, last_heard = _changed(
         preview.pieces, earlier.pieces if earlier is not None and is_same_sound else (), _sound_key
     )
-    motions, heads, sounds = [], [], []
+    motions = []
+    heads = []
+    sounds = []
     for number, piece in enumerate(preview.pieces):
         content = memory.get(piece["digest"])
         if content is None:
@@ -136,7 +138,9 @@ def read_bundle(content: bytes) -> tuple[dict[str, Any], np.ndarray, np.ndarray,
     """Header, motion (n, K), head pose (n, 6) and samples of `bundle`."""
     (length,) = struct.unpack_from("<I", content)
     header = json.loads(content[4 : 4 + length])
-    n, n_channels, at = header["n"], len(header["channels"]), 4 + length
+    n = header["n"]
+    n_channels = len(header["channels"])
+    at = 4 + length
     motion = np.frombuffer(content, "<f4", n * n_channels, at).reshape(n, n_channels)
     at += motion.nbytes
     head = np.frombuffer(content, "<f4", n * N_HEAD, at).reshape(n, N_HEAD)
@@ -158,7 +162,7 @@ def _changed(new: Sequence[Mapping[str, Any]], old: Sequence[Mapping[str, Any]],
     while first < min(len(new), len(old)) and new_keys[first] == old_keys[first]:
         first += 1
     last = len(new)
-    if sum(one[1] for one in new_keys) == sum(one[1] for one in old_keys):
+    if sum(n for _, n in new_keys) == sum(n for _, n in old_keys):
         at = len(old)
         while last > first and at > first and new_keys[last - 1] == old_keys[at - 1]:
             last, at = last - 1, at - 1
@@ -172,20 +176,20 @@ def _timing(preview: Preview) -> dict[str, Any]:
     sentences: list[Any] = []
     is_recording = bool(preview.pieces) and "transcript" in preview.pieces[0]
     for piece in preview.pieces:
-        begin = piece["begin"]
+        first_s = piece["begin"]
         if not (is_recording and sentences):
             timed = piece.get("transcript", piece)
-            end = preview.duration if is_recording else begin + piece["seconds"]
+            end = preview.duration if is_recording else first_s + piece["seconds"]
             at = len(sentences)
-            sentences.append([piece["text"], piece["occurrence"], round(begin, 6), round(end, 6)])
+            sentences.append([piece["text"], piece["occurrence"], round(first_s, 6), round(end, 6)])
             phones += [
-                [label, round(begin + a, 6), round(begin + b, 6), at, index]
+                [label, round(first_s + a, 6), round(first_s + b, 6), at, index]
                 for index, (label, a, b) in enumerate(
                     zip(timed["phones"], timed["edges"], timed["edges"][1:], strict=False)
                 )
             ]
         words += [
-            [text, round(begin + a, 6), round(begin + b, 6), len(sentences) - 1, is_doubtful]
+            [text, round(first_s + a, 6), round(first_s + b, 6), len(sentences) - 1, is_doubtful]
             for text, a, b, is_doubtful in piece["words"]
         ]
     return {"words": words, "phones": phones, "sentences": sentences}

@@ -28,7 +28,7 @@ class ProjectPreview:
     Parameters
     ----------
     stream
-        Messages of a work.
+        Messages of an order.
     memory
         Contents of pieces, shared by all projects.
     on_change
@@ -50,7 +50,9 @@ class ProjectPreview:
         on_speech: Callable[[float], None] = lambda _: None,
     ) -> None:
         self._stream, self._memory = stream, memory
-        self._on_change, self._on_fit, self._on_speech = on_change, on_fit, on_speech
+        self._on_change = on_change
+        self._on_fit = on_fit
+        self._on_speech = on_speech
         self._revisions: OrderedDict[int, Preview] = OrderedDict()
         self._task: asyncio.Task[None] | None = None
         self._changed = asyncio.Event()
@@ -106,7 +108,9 @@ class ProjectPreview:
             self._changed.set()
 
     async def _make(self, work: Work) -> None:
-        loop, pieces, fps = asyncio.get_running_loop(), list[dict[str, Any]](), 30.0
+        loop = asyncio.get_running_loop()
+        pieces = list[dict[str, Any]]()
+        fps = 30.0
         before, shown_at = self.current, loop.time()
         async with aclosing(self._stream(work)) as messages:  # type: ignore[type-var]
             async for event, content in events_of(messages):
@@ -133,8 +137,8 @@ class ProjectPreview:
     def _show_part(self, before: Preview, pieces: list[dict[str, Any]], fps: float) -> None:
         """Show new pieces before the old rest if that has the same frames, or alone if nothing was there before."""
         rest = before.pieces[len(pieces) :]
-        lengths = [one["n_frames"] for one in pieces]
-        fits = lengths == [one["n_frames"] for one in before.pieces[: len(pieces)]] and fps == before.fps
+        lengths = [piece["n_frames"] for piece in pieces]
+        fits = lengths == [piece["n_frames"] for piece in before.pieces[: len(pieces)]] and fps == before.fps
         has_channels = bool(before.pieces) and pieces[0]["channels"] == before.pieces[0]["channels"]
         if rest and fits and has_channels:
             self._publish(Preview(0, fps, (*pieces, *rest)))
@@ -172,5 +176,5 @@ def _sound(piece: Mapping[str, Any]) -> str:
 
 
 def _has_ended(wrong: Exception) -> bool:
-    """Whether the process of a work ended, which says nothing about the work."""
+    """Whether the process ended, which says nothing about what it was asked for."""
     return isinstance(wrong, ChildEndedError) or isinstance(wrong.__cause__, ChildEndedError)

@@ -25,7 +25,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 ASSET = re.compile(r"[a-z0-9][a-z0-9-]{0,40}\.[a-z0-9]{1,5}")
-PROJECT, HISTORY, ASSETS, RENDERS = "project.json", "history.json", "assets", "renders"
+PROJECT = "project.json"
+HISTORY = "history.json"
+ASSETS = "assets"
+RENDERS = "renders"
 WORDS = "words"  # folder of pronunciations that users keep for all their projects
 MAX_HISTORY_BYTES = 4_000_000  # older steps beyond are not kept over a restart
 
@@ -57,8 +60,8 @@ class ProjectStore:
     def entries(self, owner: str) -> list[ProjectEntry]:
         """Projects of an owner, those changed last first; a damaged one has its id as name."""
         return [
-            ProjectEntry(one.name, _name(one / PROJECT), (one / PROJECT).stat().st_mtime, _size(one))
-            for one in self._projects.of(owner)
+            ProjectEntry(folder.name, _name(folder / PROJECT), (folder / PROJECT).stat().st_mtime, _size(folder))
+            for folder in self._projects.of(owner)
         ]
 
     def folder(self, number: str, owner: str) -> Path:
@@ -87,7 +90,9 @@ class ProjectStore:
         try:
             content = parse_json(read_text(folder / HISTORY, LARGEST_JSON_BYTES), HISTORY)
             past, future = (
-                tuple(Step(parse_project(one["project"], HISTORY, folder), str(one["topic"])) for one in content[part])
+                tuple(
+                    Step(parse_project(step["project"], HISTORY, folder), str(step["topic"])) for step in content[part]
+                )
                 for part in ("past", "future")
             )
         except (OSError, DataError, KeyError, TypeError):
@@ -135,16 +140,10 @@ class ProjectStore:
         return dict(line.split(" ", 1) for line in lines if " " in line)
 
     def keep_word(self, owner: str, word: str, phones: str) -> None:
-        """Keep a pronunciation for new projects, or drop it if `phones` is empty.
-
-        Raises
-        ------
-        DataError
-            It is invalid.
-        """
-        words = {one: written for one, written in self.words(owner).items() if one.lower() != word.lower()}
+        """Keep a pronunciation for new projects, or drop it if `phones` is empty."""
+        words = {known: written for known, written in self.words(owner).items() if known.lower() != word.lower()}
         words |= {word: phones} if phones else {}
-        text = "".join(f"{one} {written}\n" for one, written in sorted(words.items()))
+        text = "".join(f"{known} {written}\n" for known, written in sorted(words.items()))
         parse_dictionary(text, "your pronunciations")
         file = self._words_file(owner)
         with translate_disk_errors(file):

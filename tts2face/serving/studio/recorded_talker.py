@@ -14,7 +14,10 @@ from tts2face.processes.program import ProcessLimits, Program
 from tts2face.serving.work.talker_build import TOOL, TalkerBuild
 from tts2face.serving.work.tools import run_tool
 
-TALKER, REPORT, CLIP = "talker.talker", "report.html", "first.mp4"  # files in the folder of a recording
+# files in the folder of a recording
+TALKER = "talker.talker"
+REPORT = "report.html"
+CLIP = "first.mp4"
 MADE, CHECKED = "made.talker", "checked"  # as the builder names them
 MAX_TALKER_BYTES = 500e6
 SECONDS_A_TAKE = 10.0  # at most, for the limit of time

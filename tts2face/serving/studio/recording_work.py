@@ -35,7 +35,10 @@ TOOL_LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=100_000, file_bytes=1 <<
 ANSWER_S = 120.0  # of one order, with the loading of the networks
 IDLE_S = 300.0
 MAX_SENTENCE_CHARACTERS = 300
-BUILD, SAY, CHECK = "build", "say", "check"  # tasks of the work on a recording, and the kind of work on its takes
+# tasks of the work on a recording, and the kind of work on its takes
+BUILD = "build"
+SAY = "say"
+CHECK = "check"
 WORK, ORDER = "recording", "work.json"  # kind of work, and its order in the folder of a recording
 AT_ONCE = 5  # recordings of an owner
 BUILDS = Shares(1, 1, 1000)  # talkers that are built: each takes a core and 1 GB for up to an hour

@@ -20,9 +20,17 @@ from tts2face.serving.studio.owned_folders import OwnedFolders, _owner
 from tts2face.storage.files import translate_disk_errors, write_atomically
 
 SUFFIXES = {"video/webm": ".webm", "video/mp4": ".mp4"}  # as MediaRecorder writes them
-PROMPTS, MANIFEST, CACHE = "prompts.json", "manifest.json", "cache"
-ACCEPTED_FOLDER, UNCHECKED_FOLDER, REFUSED_FOLDER = "recordings", "unchecked", "refused"
-CHECKING, GOOD, WEAK, REFUSED = "checking", "good", "weak", "refused"  # states of a take
+PROMPTS = "prompts.json"
+MANIFEST = "manifest.json"
+CACHE = "cache"
+ACCEPTED_FOLDER = "recordings"
+UNCHECKED_FOLDER = "unchecked"
+REFUSED_FOLDER = "refused"
+# states of a take
+CHECKING = "checking"
+GOOD = "good"
+WEAK = "weak"
+REFUSED = "refused"
 FOLDERS = {
     CHECKING: UNCHECKED_FOLDER, GOOD: ACCEPTED_FOLDER, WEAK: ACCEPTED_FOLDER, REFUSED: REFUSED_FOLDER,
 }  # fmt: skip
@@ -116,13 +124,7 @@ class RecordingStore:
         return {int(at): Take(**take) for at, take in sorted(self._read(number)["takes"].items())}
 
     def add_take(self, number: str, at: int, content: Path, media_type: str) -> Take:
-        """Take of a prompt, which replaces an earlier one; the file `content` is moved.
-
-        Raises
-        ------
-        InputError
-            There is no such prompt, or the file is of another kind than those of `SUFFIXES`.
-        """
+        """Take of a prompt, which replaces an earlier one; the file `content` is moved."""
         prompts = self.prompts(number)["prompts"]
         if not 0 <= at < len(prompts):
             raise InputError(f"there is no prompt {at + 1}; there are {len(prompts)}")
@@ -188,7 +190,7 @@ class RecordingStore:
         ]
 
     def transcript(self, number: str, at: int) -> str | None:
-        """What is said in a take, in English; None in other languages, whose phones are recognised."""
+        """Words of a take, in English; None in other languages, whose phones are recognised."""
         prompts = self.prompts(number)
         is_english = str(prompts.get("language", ENGLISH)).partition("-")[0] == ENGLISH
         return str(prompts["prompts"][at]["text"]) if is_english else None

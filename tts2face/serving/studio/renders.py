@@ -31,7 +31,7 @@ FILE = re.compile(f"({ID})-(.+)")
 class Renders:
     """Files of all projects; at most one of each owner is made at a time.
 
-    The first of the files of a work is the one that is downloaded, by its title; `done` and `of` are seconds of the
+    The first of the files of a render is the one that is downloaded, by its title; `done` and `of` are seconds of the
     clip.
     """
 
@@ -64,7 +64,7 @@ class Renders:
 
     def of_project(self, owner: str, folder: Path) -> list[BackgroundWork]:
         """Files of a project by its folder, those made before this server began too."""
-        known = {one.id: one for one in self._work.of(RENDER, owner) if one.order.parents[1] == folder}
+        known = {render.id: render for render in self._work.of(RENDER, owner) if render.order.parents[1] == folder}
         for path in sorted((folder / RENDERS).glob("*")):
             found = FILE.fullmatch(path.name)
             if found is not None and found[1] not in known and not path.name.endswith(".part"):
@@ -80,9 +80,9 @@ class Renders:
         InputError
             There is none.
         """
-        for one in self.of_project(owner, folder):
-            if one.id == number:
-                return one
+        for render in self.of_project(owner, folder):
+            if render.id == number:
+                return render
         raise InputError(f"there is no file {number[:20]!r} of this project; choose one from its list")
 
     def cancel(self, render: BackgroundWork) -> None:
@@ -119,7 +119,11 @@ def formats() -> dict[str, str]:
     """Formats of files with what they hold."""
     films = dict.fromkeys(MOVIE_KINDS, "film")
     sounds = {name: "the sound" for name in SOUND_KINDS if name not in {"pcm", "wav"}}
-    return {**films, **sounds, **{one.suffixes[0][1:]: one.summary for one in all_formats() if one.is_installed}}
+    return {
+        **films,
+        **sounds,
+        **{form.suffixes[0][1:]: form.summary for form in all_formats() if form.is_installed},
+    }
 
 
 def _plan(title: str, form: str) -> tuple[str, str, dict[str, str]]:

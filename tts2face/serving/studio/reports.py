@@ -42,11 +42,13 @@ KINDS: Mapping[str, tuple[str, str]] = MappingProxyType(  # the kind of model, a
 class Reports:
     """Reports of all owners; at most one of each owner is made at a time.
 
-    The content of a work has the ``kind`` of the report and the ``model``.
+    The content of an order has the ``kind`` of the report and the ``model``.
     """
 
     def __init__(self, state: ServiceState, folder: Path, work: WorkList) -> None:
-        self._state, self._folder, self._work = state, folder / "reports", work
+        self._state = state
+        self._folder = folder / "reports"
+        self._work = work
         late = "the report took too long; try it on a faster machine"
         orders = f"reports/{ID}.json"
         work.register(WorkKind(REPORT, orders, self._make, _prepare, max_open=MAX_OPEN, noun="reports", late=late))
@@ -70,12 +72,12 @@ class Reports:
 
     def of_owner(self, owner: str) -> list[BackgroundWork]:
         """Reports of an owner, the newest first; those made before this server began too."""
-        found = {one.id: one for one in self._work.of(REPORT, owner)}
+        found = {report.id: report for report in self._work.of(REPORT, owner)}
         for entry in self._folder.glob(f"{ID}/{ENTRY}"):
             kept = None if entry.parent.name in found else _read(entry)
             if kept is not None and kept.owner == owner:
                 found[kept.id] = kept
-        return sorted(found.values(), key=lambda one: -one.created)
+        return sorted(found.values(), key=lambda report: -report.created)
 
     def find(self, owner: str, number: str) -> BackgroundWork:
         """A report of an owner.
@@ -85,9 +87,9 @@ class Reports:
         InputError
             There is none.
         """
-        for one in self.of_owner(owner):
-            if one.id == number:
-                return one
+        for report in self.of_owner(owner):
+            if report.id == number:
+                return report
         raise InputError(f"there is no report {number[:20]!r}; choose one from the list")
 
     def page(self, report: BackgroundWork) -> Path:

@@ -19,7 +19,10 @@ if TYPE_CHECKING:
 
 
 SPOKEN = "Hello there, nice to see you."
-N_TILES, TILE_PX, EVERY = 20, 144, 3  # tiles of a swatch, and frames of the clip from one to the next
+# tiles of a swatch, and frames of the clip from one to the next
+N_TILES = 20
+TILE_PX = 144
+EVERY = 3
 MIXED = "mixed here"  # name of a style that no palette holds yet
 QUALITY = 70
 

@@ -64,7 +64,7 @@ class Styles:
         studio.work.register(WorkKind(WORK, orders, self._run, end=self._end, stage="starting", late=late))
 
     def take_state(self, key: ApiKey) -> TakeState:
-        """What is known of the key's take; one that came before the server started is checked anew."""
+        """State of the key's take; one that came before the server started is checked anew."""
         work = self._studio.work.get(self._order(key.name))
         if key.name not in self._found and work is None and self.store.take(key.name) is not None:
             work = self._start(key, {"task": CHECKING})
@@ -75,13 +75,7 @@ class Styles:
         return TakeState(doing, work.stage, work.done, work.of, state, advice)
 
     async def add_take(self, key: ApiKey, source: Path, suffix: str, sound: Path | None = None) -> None:
-        """Check a new take, which replaces an earlier one; the file is moved, the sound of a table is copied.
-
-        Raises
-        ------
-        InputError
-            The key may not build, or the file is of another kind.
-        """
+        """Check a new take, which replaces an earlier one; the file is moved, the sound of a table is copied."""
         self.check_scope(key)
         await self._end_work(key)
         await asyncio.to_thread(self.store.put_take, key.name, source, suffix, sound)
@@ -136,7 +130,7 @@ class Styles:
         # Projects first: none has a style or a palette that is gone.
         await self._revise(key, await self.users(key, name), lambda project: style_names.drop_style(project, name))
         if await asyncio.to_thread(self.store.own_names, key.name) == (name,):
-            await self._revise(key, await self._projects(key, lambda one: True), _with_shipped)
+            await self._revise(key, await self._projects(key, lambda project: True), _with_shipped)
         await self._change(key, lambda palette: remove_style(palette, name))
 
     async def users(self, key: ApiKey, name: str) -> list[ProjectEntry]:
@@ -144,13 +138,7 @@ class Styles:
         return await self._projects(key, lambda project: name in style_names.used_styles(project))
 
     async def swatch(self, key: ApiKey, name: str) -> Path:
-        """File of the moving picture of a style; made at its first use.
-
-        Raises
-        ------
-        InputError
-            There is no such style.
-        """
+        """File of the moving picture of a style; made at its first use."""
         palette = await asyncio.to_thread(self.store.read, key.name)
         path = self.store.swatch(key.name, palette.require(name))
         async with self._drawing.setdefault(path, asyncio.Lock()):
@@ -218,8 +206,8 @@ class Styles:
     async def _change(self, key: ApiKey, change: Callable[[Palette], Palette]) -> None:
         await asyncio.to_thread(self.store.change, key.name, change)
         self._drawn.pop(key.name, None)
-        for one in self._studio.open_projects(key):
-            one.tell_styles()
+        for workspace in self._studio.open_projects(key):
+            workspace.tell_styles()
 
     async def _check_own(self, key: ApiKey, name: str) -> None:
         if name not in await asyncio.to_thread(self.store.own_names, key.name):
@@ -228,7 +216,7 @@ class Styles:
     async def _projects(self, key: ApiKey, uses: Callable[[Project], bool]) -> list[ProjectEntry]:
         """Projects with the own palette of which something holds; an open one as it is now."""
         own, found = self.store.path(key.name), []
-        present = {one.id: one.project for one in self._studio.open_projects(key)}
+        present = {workspace.id: workspace.project for workspace in self._studio.open_projects(key)}
         for entry in await self._studio.entries(key):
             try:
                 project = (

@@ -16,9 +16,12 @@ from tts2face.serving.studio.owned_folders import OwnedFolders
 from tts2face.serving.work.job_record import FAILED
 from tts2face.storage.files import write_atomically
 
-ENTRY, TABLE, SOUND, PREVIEW, FILM, VIDEO = (
-    "take.json", "take.csv", "sound.wav", "preview.bin", "film.mp4", "video",
-)  # fmt: skip
+ENTRY = "take.json"
+TABLE = "take.csv"
+SOUND = "sound.wav"
+PREVIEW = "preview.bin"
+FILM = "film.mp4"
+VIDEO = "video"
 READING, READY = "reading", "ready"  # states of a take, besides FAILED
 MAX_NAME = 60
 MAX_TAKES = 200  # of an owner
@@ -59,7 +62,7 @@ class TakeStore:
 
     def entries(self, owner: str) -> list[TakeEntry]:
         """Takes of an owner, those changed last first."""
-        return [self._read(one / ENTRY) for one in self._takes.of(owner)]
+        return [self._read(folder / ENTRY) for folder in self._takes.of(owner)]
 
     def entry(self, owner: str, number: str) -> TakeEntry:
         """A take; errors as `folder`."""

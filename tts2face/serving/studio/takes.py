@@ -114,13 +114,7 @@ class Takes:
         await self._styles.add_take(key, copied, ".csv", folder / SOUND if entry.has_sound else None)
 
     async def make_project(self, key: ApiKey, number: str) -> str:
-        """Id of a new project with the take's sound.
-
-        Raises
-        ------
-        InputError
-            It has none.
-        """
+        """Id of a new project with the take's sound."""
         folder, entry = self._ready(key, number)
         if not entry.has_sound:
             raise InputError("the take has no sound, which a project needs; add a sound to it first")
@@ -152,7 +146,7 @@ class Takes:
         return ""
 
     async def _read(self, work: BackgroundWork, file: Path) -> Mapping[str, Any]:
-        """What the tool says of a table, or of a video from which it makes one."""
+        """Answer of the tool about a table, or about a video from which it makes one."""
         decoders = self._studio.state.decoders
         if file.name != TABLE:
             order = {"take": str(file), "table": str(file.with_name(TABLE)), "sound": str(file.with_name(SOUND))}
@@ -170,7 +164,9 @@ class Takes:
 
 def take_bundle(described: dict[str, Any], content: bytes) -> bytes:
     """A preview bundle of a take as the task ``take`` describes it; silence where it has no sound."""
-    rate, n_samples, seconds = described["rate"], described["n_samples"], described["seconds"]
+    rate = described["rate"]
+    n_samples = described["n_samples"]
+    seconds = described["seconds"]
     if not n_samples:
         rate, n_samples = QUIET_RATE, round(QUIET_RATE * seconds)
         content += np.zeros(n_samples, "<i2").tobytes()

@@ -1,7 +1,7 @@
 """Tasks of a project: its curves and sound, one of its pictures, its files, its face, and how a phone of it was made.
 
-A work has the project in ``request``: ``project`` (its JSON), ``folder`` (where its files are), and ``text``, which the
-service checks as that of any request.
+An order has the project in ``request``: ``project`` (its JSON), ``folder`` (where its files are), and ``text``, which
+the service checks as that of any request.
 """
 
 import hashlib
@@ -40,7 +40,7 @@ N_DECIMALS = 2  # of outlines, mm
 
 
 def read_project(work: Work) -> Project:
-    """Project of a work."""
+    """Project of an order."""
     return parse_project(work.request["project"], "the project", Path(work.request["folder"]))
 
 
@@ -51,7 +51,9 @@ def preview(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk
     among ``have`` of the request; then an event ``end``. Where a correction no longer fits, it is removed, and all is
     sent again from ``begin``; ``end`` says what was removed.
     """
-    project, dropped, cut_to = read_project(work), [], None
+    project = read_project(work)
+    dropped = []
+    cut_to = None
     have = frozenset(work.request.get("have", ()))
     while True:
         yield Event({"type": "begin", "fps": float(project.request.fps)})
@@ -82,7 +84,9 @@ def _pieces(session: "Session", project: Project, have: frozenset[str]) -> Itera
     said: Counter[str] = Counter()
     for number, piece in enumerate(session.stream(project.prepare())):
         clip = piece.clip
-        motion, head, samples = clip.motion.values, clip.head.values, clip.speech.waveform.samples
+        motion = clip.motion.values
+        head = clip.head.values
+        samples = clip.speech.waveform.samples
         sound = pcm_bytes(np.clip(samples, -1.0, 1.0))
         parts = [motion.astype("<f4").tobytes(), head.astype("<f4").tobytes(), sound]
         digest = digest_of(parts)
@@ -90,7 +94,7 @@ def _pieces(session: "Session", project: Project, have: frozenset[str]) -> Itera
             "type": "piece", "number": number, "text": piece.text, "occurrence": said[piece.text],
             "begin": piece.begin, "seconds": clip.speech.waveform.duration, "rate": clip.speech.waveform.rate,
             "n_frames": len(motion), "n_samples": len(samples), "digest": digest,
-            **_timing(piece), "notes": [one.sentence for one in piece.mismatches],
+            **_timing(piece), "notes": [mismatch.sentence for mismatch in piece.mismatches],
         }  # fmt: skip
         if number == 0:
             event["channels"] = list(clip.motion.channels)
@@ -182,7 +186,7 @@ def explain(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk
     for piece in session.stream(project.prepare()):
         is_here = time < piece.begin + piece.clip.speech.waveform.duration
         if phone is None and (is_here or piece.transcript is not None):
-            phone = next((one for one in piece.explain() if one.start <= time < one.end), None)
+            phone = next((spoken for spoken in piece.explain() if spoken.start <= time < spoken.end), None)
         if is_here and phone is not None:
             face = session.animated_face(has_gestures=project.request.has_gestures)
             made = _made_outlines(face, piece, phone)
@@ -195,7 +199,7 @@ def explain(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk
 def _described(talker: Talker, phone: PhoneExplanation, made: list[dict[str, Any]]) -> dict[str, Any]:
     found = asdict(phone)
     used = phone.tokens[:MAX_EXAMPLES]
-    found["tokens"] = [asdict(one) | {"outlines": _outlines_json(token_outlines(talker, one))} for one in used]
+    found["tokens"] = [asdict(token) | {"outlines": _outlines_json(token_outlines(talker, token))} for token in used]
     return found | {"made": made}
 
 
@@ -214,8 +218,8 @@ def _made_outlines(face: AnimatedFace, piece: "Piece", phone: PhoneExplanation) 
 
 def _outlines_json(outlines: tuple[LipOutline, ...]) -> list[dict[str, Any]]:
     return [
-        {name: getattr(one, name).astype(float).round(N_DECIMALS).tolist() for name in ("outer", "inner")}
-        for one in outlines
+        {name: getattr(outline, name).astype(float).round(N_DECIMALS).tolist() for name in ("outer", "inner")}
+        for outline in outlines
     ]
 
 

@@ -47,7 +47,7 @@ class BackgroundWork:
     files: tuple[Path, ...] = ()  # files and folders that it makes; removed with it, and when it does not get done
     created: float = field(default_factory=time.time)  # seconds since 1970; also the time of the order
     tries: int = 0  # how often it was begun
-    number: int = 0  # in which it was queued, by whichever server: no clock tells the order
+    number: int = 0  # in which it was queued, by whichever server: no clock decides the order
     task: "asyncio.Task[None] | None" = field(default=None, repr=False)
     on_change: Callable[["BackgroundWork"], None] = field(default=lambda _: None, repr=False)
 
@@ -68,7 +68,9 @@ class BackgroundWork:
 
     def show(self, stage: str, done: float, of: float) -> None:
         """Set the stage and its steps."""
-        self.stage, self.done, self.of = stage, done, of
+        self.stage = stage
+        self.done = done
+        self.of = of
         self.on_change(self)
 
 
@@ -117,7 +119,7 @@ class WorkList:
         rules, earlier = self._kinds[kind], self.get(order)
         if earlier is not None and earlier.is_open:
             raise InputError(rules.busy)
-        if sum(one.is_open for one in self.of(kind, owner)) >= rules.max_open:
+        if sum(item.is_open for item in self.of(kind, owner)) >= rules.max_open:
             raise InputError(f"{rules.max_open} {rules.noun} are being made already; wait, or cancel one")
         work = BackgroundWork(kind, owner, order, content, number=self._last + 1)
         self._prepare(work)
@@ -140,7 +142,7 @@ class WorkList:
 
     def of(self, kind: str, owner: str) -> list[BackgroundWork]:
         """Work of a kind and an owner since the server began, the oldest first."""
-        return [one for one in self._all.values() if (one.kind, one.owner) == (kind, owner)]
+        return [item for item in self._all.values() if (item.kind, item.owner) == (kind, owner)]
 
     def cancel(self, work: BackgroundWork) -> None:
         """Cancel work that waits or runs."""
@@ -158,18 +160,18 @@ class WorkList:
 
     async def forget(self, folder: Path) -> None:
         """Cancel and forget all work whose orders are in a folder, and wait until it has ended."""
-        found = [one for one in self._all.values() if one.order.is_relative_to(folder)]
-        for one in found:
-            self.cancel(one)
-            del self._all[one.order]
+        found = [item for item in self._all.values() if item.order.is_relative_to(folder)]
+        for item in found:
+            self.cancel(item)
+            del self._all[item.order]
         await _wait_for(found)
 
     async def close(self) -> None:
         """End all; a later server does what is not done."""
         found = list(self._all.values())
-        for one in found:
-            if one.task is not None:
-                one.task.cancel()
+        for item in found:
+            if item.task is not None:
+                item.task.cancel()
         await _wait_for(found)
 
     def _resume(self, kind: WorkKind, order: Path) -> None:
@@ -269,4 +271,4 @@ def _remove(files: Iterable[Path]) -> None:
 
 
 async def _wait_for(work: Iterable[BackgroundWork]) -> None:
-    await asyncio.gather(*(one.task for one in work if one.task is not None), return_exceptions=True)
+    await asyncio.gather(*(item.task for item in work if item.task is not None), return_exceptions=True)

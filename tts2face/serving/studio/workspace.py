@@ -95,13 +95,7 @@ class Workspace:
             self._notify("lease")
 
     async def edit(self, edit: Edit, tab: str = "") -> None:
-        """Change the project, begin its new preview, and save it within `SAVE_S`.
-
-        Raises
-        ------
-        InputError, DataError
-            The edit is wrong, or another tab edits the project.
-        """
+        """Change the project, begin its new preview, and save it within `SAVE_S`."""
         self._check_tab(tab)
         async with self._turn:
             edit = await self._checked(edit)
@@ -143,7 +137,7 @@ class Workspace:
             self.comparison.preview.cancel()
 
     async def work(self, kind: str, **more: Any) -> Work:
-        """A work of the project as it is now; see `project_work`."""
+        """An order about the project as it is now; see `project_work`."""
         self.used_at = self._now()
         return await project_work(self._state, self.key, self.project, self.folder, kind, **more)
 
@@ -196,9 +190,14 @@ class Workspace:
 
     def _fit(self, shown: Preview, dropped: list[tuple[str, int]], cut_to: float | None) -> list[str]:
         """Remove from the project what no longer fits its text or sound; a note for each."""
-        notes, project, sentences = [], self.project, shown.sentences()
-        present = [(one.text, one.occurrence) for one in project.edges]
-        dropped = [*dropped, *(one for one in present if one not in sentences and one not in dropped)]
+        notes = []
+        project = self.project
+        sentences = shown.sentences()
+        present = [(sentence.text, sentence.occurrence) for sentence in project.edges]
+        dropped = [
+            *dropped,
+            *(gone for gone in present if gone not in sentences and gone not in dropped),
+        ]
         if dropped:
             project = without_edges(project, dropped)
             notes += [

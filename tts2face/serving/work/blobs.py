@@ -1,4 +1,4 @@
-"""Files by the SHA-256 of their content, in a folder or a bucket. A file appears complete or not at all."""
+"""Files by the SHA-256 of their content, in a folder or a bucket; a file appears complete or not at all."""
 
 import contextlib
 import re
@@ -55,7 +55,9 @@ class BlobStore:
     """
 
     def __init__(self, store: ContentStore, copies: FolderStore, max_bytes: int = CACHE_BYTES) -> None:
-        self._store, self._copies, self._max_bytes = store, copies, max_bytes
+        self._store = store
+        self._copies = copies
+        self._max_bytes = max_bytes
 
     def put(self, content: Path | bytes) -> str:
         """Store a file or bytes, of which the SHA-256 in hexadecimal digits is returned; it may be stored already.
@@ -117,10 +119,10 @@ class BlobStore:
 
     def entries(self) -> Iterator[tuple[str, float]]:
         """Hashes of all files, with the times at which they were stored, in seconds since 1970."""
-        for one in self._store.entries():
-            sha256 = one.name.rpartition("/")[2]
+        for entry in self._store.entries():
+            sha256 = entry.name.rpartition("/")[2]
             if HASH.fullmatch(sha256):
-                yield sha256, one.stored_s
+                yield sha256, entry.stored_s
 
     def _local(self, sha256: str) -> Path:
         """Path of a file in the folder; errors as of `fetch`."""

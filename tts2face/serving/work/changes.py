@@ -39,8 +39,8 @@ class JobChanges:
 
     def is_open(self, job_id: str) -> bool:
         """Whether a job waits or runs."""
-        with self._database.transaction() as look:
-            return bool(look.value(f"SELECT 1 FROM tts2face_jobs WHERE id = :id AND {IS_OPEN}", id=job_id))
+        with self._database.transaction() as read:
+            return bool(read.value(f"SELECT 1 FROM tts2face_jobs WHERE id = :id AND {IS_OPEN}", id=job_id))
 
     def note_segments(self, job_id: str, addresses: Iterable[str]) -> None:
         """Note which segments a job needs."""
@@ -48,7 +48,7 @@ class JobChanges:
             change.run("DELETE FROM tts2face_job_segments WHERE job_id = :id", id=job_id)
             change.run_many(
                 "INSERT INTO tts2face_job_segments (job_id, address) VALUES (:id, :address)",
-                [{"id": job_id, "address": one} for one in sorted(set(addresses))],
+                [{"id": job_id, "address": address} for address in sorted(set(addresses))],
             )
 
     def report(self, job_id: str, content: dict[str, Any]) -> bool:

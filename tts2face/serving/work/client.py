@@ -18,9 +18,12 @@ from tts2face.serving.work.usage import UsageTable
 CONNECT_S = 2  # to PostgreSQL; then the request is refused
 SESSION_OPTIONS = "-c statement_timeout=10000 -c lock_timeout=8000"  # ms
 N_CONNECTIONS = 8
-FILES_PER_LOOK = 100  # while all changes of jobs wait
+FILES_PER_CHANGE = 100  # while all changes of jobs wait
 LEASE_S = 60.0  # within which a server delivers a webhook that it has taken
-FIRST_PAUSE_S, PAUSE_FACTOR, MAX_TRIES = 2.0, 3.0, 10  # of webhooks: the last try comes 8 hours after the first
+# of webhooks: the last try comes 8 hours after the first
+FIRST_PAUSE_S = 2.0
+PAUSE_FACTOR = 3.0
+MAX_TRIES = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,8 +124,8 @@ class JobClient:
             n_removed += 1
 
         old = [sha256 for sha256, stored_s in self.blobs.entries() if stored_s < before]
-        for at in range(0, len(old), FILES_PER_LOOK):
-            self._changes.remove_unused(set(old[at : at + FILES_PER_LOOK]), remove)
+        for at in range(0, len(old), FILES_PER_CHANGE):
+            self._changes.remove_unused(set(old[at : at + FILES_PER_CHANGE]), remove)
         return n_removed
 
     def due_webhooks(self, busy: Sequence[str] = (), limit: int = 1000) -> list[WebhookDelivery]:
@@ -140,19 +143,19 @@ class JobClient:
             f"(webhook_due <= {now} OR webhook_due > {now} + CASE webhook_tries {longest} ELSE {LEASE_S} END) "
             "ORDER BY webhook_due LIMIT :limit"
         )
-        with self._database.transaction() as look:
-            return [WebhookDelivery(*row) for row in look.rows(query, limit=limit, **names)]
+        with self._database.transaction() as read:
+            return [WebhookDelivery(*row) for row in read.rows(query, limit=limit, **names)]
 
     def take_webhooks(self, due: Sequence[WebhookDelivery]) -> list[WebhookDelivery]:
         """Those of some due webhooks that no other server has taken; none gets them for `LEASE_S`."""
         taken = []
-        for one in due:
+        for delivery in due:
             with self._database.transaction(is_change=True) as change:
                 if change.run(
                     f"UPDATE tts2face_jobs SET webhook_due = {self._database.now} + :lease "
-                    "WHERE id = :id AND webhook_due = :due", id=one.job_id, due=one.due, lease=LEASE_S,
+                    "WHERE id = :id AND webhook_due = :due", id=delivery.job_id, due=delivery.due, lease=LEASE_S,
                 ):  # fmt: skip
-                    taken.append(one)
+                    taken.append(delivery)
         return taken
 
     def note_delivery(self, delivery: WebhookDelivery, *, is_delivered: bool) -> None:
@@ -170,8 +173,8 @@ class JobClient:
 
     def is_reachable(self) -> bool:
         """Whether the database answers; raises `DatabaseAwayError` if not."""
-        with self._database.transaction() as look:
-            return bool(look.value("SELECT 1"))
+        with self._database.transaction() as read:
+            return bool(read.value("SELECT 1"))
 
     def _active(self, address: str) -> list[str]:
         """Names of the jobs of the queue of a segment that have not ended."""
@@ -182,7 +185,7 @@ class JobClient:
             load_input=False,
             load_output=False,
         )
-        return [one.workflow_id for one in found]
+        return [job.workflow_id for job in found]
 
 
 def _pause_s(n_tries: int) -> float:

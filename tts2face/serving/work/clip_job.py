@@ -14,13 +14,7 @@ BACKGROUND = "background.png"
 
 
 def run_clip(task: JobTask) -> Products:
-    """Render the clip as one segment, whichever worker takes it.
-
-    Raises
-    ------
-    DataError
-        It could not be rendered; the message says why.
-    """
+    """Render the clip as one segment, whichever worker takes it."""
     format = str(task.request["format"])
     segment = clip_segment(task)
     missing = {} if task.store.result(segment.address) is not None else {segment.address: segment}

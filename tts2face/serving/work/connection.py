@@ -75,13 +75,7 @@ class JobDatabase:
 
     @contextmanager
     def transaction(self, *, is_change: bool = False) -> Iterator["Transaction"]:
-        """A transaction; one that changes something waits for the others of all processes.
-
-        Raises
-        ------
-        DatabaseAwayError
-            The database cannot be reached.
-        """
+        """A transaction; one that changes something waits for the others of all processes."""
         try:
             with self._engine.begin() as connection:
                 transaction = Transaction(connection, self._sql)
@@ -122,7 +116,9 @@ class Transaction:
         import sqlalchemy
 
         found = sqlalchemy.inspect(self.connection)
-        return frozenset(one["name"] for one in found.get_columns(table)) if found.has_table(table) else frozenset()
+        return (
+            frozenset(column["name"] for column in found.get_columns(table)) if found.has_table(table) else frozenset()
+        )
 
     def value(self, statement: str, **values: Any) -> Any:
         """First value of a query; None without a row."""

@@ -14,7 +14,7 @@ from tts2face.serving.work.local_workers import LocalWorkers, local_workers
 from tts2face.serving.work.segment_queue import ACTIVE, JOBS_PER_QUERY, enqueue, failure_reason, open_client
 from tts2face.serving.work.workers import Workers
 
-POLL_S = 0.5  # between two looks at the jobs that are awaited
+POLL_S = 0.5  # between two polls of the jobs that are awaited
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,22 +50,22 @@ class DatabaseEngine:
         prepare_database(url)
         here = LocalWorkers(self.database, self.store_url, self.n_workers, self.on_message)
         with open_client(url) as client, Workers(url) as workers, local_workers(here) as supervise:
-            look = _Look(client, enqueue(client, workers, segments, self.priority))
+            awaited = _Awaited(client, enqueue(client, workers, segments, self.priority))
             if self.n_workers == 0 and not workers.alive():
                 self.on_message("no worker is alive in this database; start `tts2face worker` with it")
-            while look.waiting:
+            while awaited.waiting:
                 supervise()
                 self.on_wait()
-                for address, reason in look.ended():
+                for address, reason in awaited.ended():
                     result = wait_for_store(partial(store.result, address), self.on_message)
                     yield Rendered(address, result, "" if result is not None else reason)
-                if look.waiting:
+                if awaited.waiting:
                     time.sleep(POLL_S)
 
 
 @dataclass(slots=True)
-class _Look:
-    """Looks at the jobs that are awaited, by their names: no clock says which of them have ended since the last look.
+class _Awaited:
+    """Jobs that are awaited, polled by their names: no clock says which of them have ended since the last poll.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class _Look:
     def ended(self) -> list[tuple[str, str]]:
         """Addresses of the jobs that have ended, with the reason if there is no segment; each once.
 
-        Of many jobs it looks at those that were queued first, which end first, and at one further part after the other.
+        Of many jobs it polls those that were queued first, which end first, and one further part after the other.
         """
         names = list(self.waiting)
         found = self._found(names[:JOBS_PER_QUERY])
@@ -99,4 +99,4 @@ class _Look:
     def _found(self, names: list[str]) -> dict[str, Any]:
         """Jobs by their names; None of one that is gone."""
         jobs = self.client.list_workflows(workflow_ids=names, load_input=False)
-        return dict.fromkeys(names) | {one.workflow_id: one for one in jobs}
+        return dict.fromkeys(names) | {job.workflow_id: job for job in jobs}

@@ -88,7 +88,7 @@ class JobRecord:
 
 @dataclass(frozen=True, slots=True)
 class JobEvent:
-    """What has happened to a job; numbers rise from 1."""
+    """An event of a job; numbers rise from 1."""
 
     number: int
     time: float

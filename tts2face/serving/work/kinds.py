@@ -1,14 +1,11 @@
 """The list of kinds of durable work, and what the function of a kind gets and returns.
 
 The next kind:
-
 1. its function in a module of this room, ``NAME_job.py``: it may run again after any death, so that whatever it stores
    has a name by content, or is replaced;
 2. its row in `KINDS`, with a queue of `PLACES` if it computes for minutes;
 3. what clients send, and its checks, as a `JobKind` of `tts2face.serving.service.orders` in `JOB_KINDS` (`options`);
 4. a test of the function with a `JobTask` made by hand (``tests/serving/work/test_talker_job.py``).
-
-Work of the studio, which changes what an open page shows, is a `WorkKind` of `tts2face.serving.studio.work`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -34,7 +31,7 @@ MEDIA_TYPES = {
 
 @dataclass(frozen=True, slots=True)
 class JobKind:
-    """A kind of jobs.
+    """A kind of jobs. Work of the studio, which changes what an open page shows, is a `WorkKind` of its list.
 
     Parameters
     ----------
@@ -110,13 +107,7 @@ class Products:
 
 
 def find_runner(kind: str) -> Callable[[JobTask], Products]:
-    """Function that executes the jobs of a kind.
-
-    Raises
-    ------
-    DataError
-        This version has no such kind.
-    """
+    """Function that executes the jobs of a kind."""
     if kind not in KINDS:
         raise DataError(f"this worker cannot execute jobs of kind {kind!r}; install the version of the service")
     module, name = KINDS[kind].run.split(":")

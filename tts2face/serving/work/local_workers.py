@@ -92,11 +92,6 @@ class _Supervisor:
         """Start the workers that do not run; the number of those that do.
 
         After one that could not start, those that have just been started do not count.
-
-        Raises
-        ------
-        BackendError
-            They end as soon as they start.
         """
         n_alive = 0
         for number in range(self._wanted.n_workers):

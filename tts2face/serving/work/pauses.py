@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-AWAKE_S = 2.0  # after work was found or done, in which the engine looks for itself
-IDLE_S = 30.0  # between two looks of the engine while no work is found
+AWAKE_S = 2.0  # after work was found or done, in which the engine polls for itself
+IDLE_S = 30.0  # between two polls of the engine while no work is found
 
 
 class EnginePauses:
@@ -32,11 +32,11 @@ class EnginePauses:
 
     @property
     def is_awake(self) -> bool:
-        """Whether the engine looks for itself: this worker is at work, or work was found a moment ago."""
+        """Whether the engine polls for itself: this worker is at work, or work was found a moment ago."""
         return self._n_busy > 0 or time.monotonic() < self._awake_until_s
 
     def wake(self) -> None:
-        """Let the engine look at its queues now: work may wait there."""
+        """Let the engine poll its queues now: work may wait there."""
         with self._changed:
             self._awake_until_s = time.monotonic() + AWAKE_S
             self._changed.notify_all()

@@ -22,13 +22,7 @@ REQUEST_PATHS = ("audio", "timeline", "dictionary", "voice")
 
 
 def place_file(blobs: Sequence[BlobStore], sha256: str, name: str, folder: Path) -> Path:
-    """Path of a file with a name in a folder; it is a link where the system has links.
-
-    Raises
-    ------
-    MissingBlobError
-        No store has the file.
-    """
+    """Path of a file with a name in a folder; it is a link where the system has links."""
     path = folder / sha256 / Path(name).name
     if path.exists():
         return path
@@ -44,13 +38,7 @@ def place_file(blobs: Sequence[BlobStore], sha256: str, name: str, folder: Path)
 
 
 def fetch_file(blobs: Sequence[BlobStore], sha256: str) -> Path:
-    """Local path of a file in the first store that has it.
-
-    Raises
-    ------
-    MissingBlobError
-        No store has it.
-    """
+    """Local path of a file in the first store that has it."""
     for store in blobs[:-1]:
         with contextlib.suppress(MissingBlobError):
             return store.fetch(sha256)

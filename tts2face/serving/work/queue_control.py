@@ -70,23 +70,23 @@ def list_jobs(database: str, states: Sequence[str] = (), limit: int | None = Non
     with open_client(url) as client, Workers(url) as workers:
         places = workers.alive(within_s=1e9)
         found = client.list_workflows(name=WORKFLOW, status=statuses, limit=limit)
-        return tuple(_job(one, places) for one in found)
+        return tuple(_job(job, places) for job in found)
 
 
 def show_job(database: str, name: str) -> tuple[QueuedSegment, dict[str, Any]]:
     """A job by the start of its name, and its segment as JSON; errors as `list_jobs` and `InputError` without one."""
     url = _prepared(database)
     with open_client(url) as client, Workers(url) as workers:
-        one = _find(client, name)
-        content = one.input["args"][1] if one.input else {}
-        return _job(one, workers.alive(within_s=1e9)), dict(content)
+        job = _find(client, name)
+        content = job.input["args"][1] if job.input else {}
+        return _job(job, workers.alive(within_s=1e9)), dict(content)
 
 
 def cancel_jobs(database: str, names: Sequence[str] = ()) -> int:
     """Cancel waiting and running jobs by name, or all of them; their number."""
     with open_client(_prepared(database)) as client:
         chosen = [_find(client, name) for name in names] if names else _of_states(client, ACTIVE, load_input=False)
-        active = [one.workflow_id for one in chosen if one.status in ACTIVE]
+        active = [job.workflow_id for job in chosen if job.status in ACTIVE]
         for at in range(0, len(active), JOBS_PER_QUERY):
             client.cancel_workflows(active[at : at + JOBS_PER_QUERY], cancel_children=True)
         return len(active)
@@ -98,10 +98,10 @@ def retry_jobs(database: str, names: Sequence[str] = (), priority: int | None = 
     url = _prepared(database)
     with open_client(url) as client, Workers(url) as workers:
         chosen = [_find(client, name) for name in names] if names else _of_states(client, ended)
-        latest = {one.workflow_id.partition(".")[0]: one for one in chosen if one.status in ended}
-        for address, one in latest.items():
-            segment = segment_from_json(one.input["args"][1])
-            enqueue(client, workers, {address: segment}, one.priority if priority is None else priority)
+        latest = {job.workflow_id.partition(".")[0]: job for job in chosen if job.status in ended}
+        for address, job in latest.items():
+            segment = segment_from_json(job.input["args"][1])
+            enqueue(client, workers, {address: segment}, job.priority if priority is None else priority)
         return len(latest)
 
 
@@ -109,7 +109,7 @@ def unfinished_segments(database: str) -> frozenset[str]:
     """Addresses of the segments of waiting and running jobs."""
     with open_client(_prepared(database)) as client:
         found = _of_states(client, ACTIVE, load_input=False)
-    return frozenset(one.workflow_id.partition(".")[0] for one in found)
+    return frozenset(job.workflow_id.partition(".")[0] for job in found)
 
 
 def prune_jobs(database: str, older_than_s: float = 0.0, *, dry_run: bool = False) -> int:
@@ -132,7 +132,7 @@ def prune_jobs(database: str, older_than_s: float = 0.0, *, dry_run: bool = Fals
             if not ended:
                 break
             if not dry_run:
-                client.delete_workflows([one.workflow_id for one in ended])
+                client.delete_workflows([job.workflow_id for job in ended])
         if not dry_run:
             workers.forget_dead()
     return removed
@@ -155,24 +155,24 @@ def _find(client: Any, name: str) -> Any:
     if len(name) < MIN_NAME_CHARACTERS:
         raise InputError(f"the name {name!r} is too short; give at least {MIN_NAME_CHARACTERS} characters of it")
     found = client.list_workflows(workflow_id_prefix=name, name=WORKFLOW)
-    addresses = {one.workflow_id.partition(".")[0] for one in found}
+    addresses = {job.workflow_id.partition(".")[0] for job in found}
     if len(addresses) != 1:
         raise InputError(f"{len(addresses)} jobs begin with {name!r}; give more of the name that `jobs list` prints")
-    return max(found, key=lambda one: int(one.workflow_id.partition(".")[2] or 0))
+    return max(found, key=lambda job: int(job.workflow_id.partition(".")[2] or 0))
 
 
-def _job(one: Any, places: dict[str, str]) -> QueuedSegment:
-    content = one.input["args"][1] if one.input and len(one.input.get("args", ())) > 1 else {}
-    state = STATES.get(one.status, one.status)
-    took = None if not one.completed_at or not one.dequeued_at else (one.completed_at - one.dequeued_at) / 1000.0
+def _job(job: Any, places: dict[str, str]) -> QueuedSegment:
+    content = job.input["args"][1] if job.input and len(job.input.get("args", ())) > 1 else {}
+    state = STATES.get(job.status, job.status)
+    took = None if not job.completed_at or not job.dequeued_at else (job.completed_at - job.dequeued_at) / 1000.0
     return QueuedSegment(
-        one.workflow_id,
+        job.workflow_id,
         state,
-        one.priority or 0,
+        job.priority or 0,
         str(content.get("request", {}).get("text", "")),
-        places.get(str(one.executor_id), str(one.executor_id or "")),
-        one.recovery_attempts or 0,
-        failure_reason(one) if state in (FAILED, CANCELLED) else "",
-        (one.created_at or 0) / 1000.0,
+        places.get(str(job.executor_id), str(job.executor_id or "")),
+        job.recovery_attempts or 0,
+        failure_reason(job) if state in (FAILED, CANCELLED) else "",
+        (job.created_at or 0) / 1000.0,
         took,
     )

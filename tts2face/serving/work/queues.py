@@ -1,4 +1,4 @@
-"""What DBOS keeps: its application, its workflows and their table, and its queues with their places."""
+"""Names of what DBOS keeps: workflows and their table, and queues with their places."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -9,7 +9,9 @@ APPLICATION = "tts2face"
 APPLICATION_VERSION = f"segments-{SEGMENT_FORMAT}"  # pinned: workers of equal segments share their work
 WORKFLOW, JOB_WORKFLOW = "render_segment", "run_job"
 WORK = "work"  # call of the process of a worker
-QUEUE, JOB_QUEUE, TALKER_QUEUE = "tts2face-segments", "tts2face-jobs", "tts2face-talkers"
+QUEUE = "tts2face-segments"
+JOB_QUEUE = "tts2face-jobs"
+TALKER_QUEUE = "tts2face-talkers"
 # DBOS' table of workflows by the kind of database. Whether a job waits or runs is read there, and written nowhere else.
 WORKFLOWS = {"sqlite": "workflow_status", "postgresql": "dbos.workflow_status"}
 # Places of each queue in each worker (`worker_concurrency`; `concurrency` would count the jobs of the dead, too).

@@ -1,8 +1,6 @@
 """Check of an uploaded talker, face, palette, dictionary or character, in a limited process.
 
 What is stored is written here again from what was read, never the bytes of the upload.
-
-The error of a decoding process that refuses its file.
 """
 
 import json
@@ -27,16 +25,27 @@ class RefusedFileError(DataError):
     """The file is not what it should be."""
 
 
-TALKER, FACE, PALETTE, DICTIONARY = "talker", "face", "palette", "dictionary"
+TALKER = "talker"
+FACE = "face"
+PALETTE = "palette"
+DICTIONARY = "dictionary"
 CHARACTER, PHOTO = "character", "photo"  # files that become faces
 RESOURCE_KINDS = (TALKER, FACE, PALETTE, DICTIONARY)
-CONTENT, DESCRIPTION, PICTURE = "content", "description.json", "picture.png"  # files of a checked resource
+# files of a checked resource
+CONTENT = "content"
+DESCRIPTION = "description.json"
+PICTURE = "picture.png"
 MAX_TEXT = 200  # characters of a text of the description
 MAX_ENTRIES = 200  # identities or styles of the description
-PICTURE_SIDE_PX, TILE_SIDE_PX, TILE_COLUMNS, MAX_TILES = 384, 192, 4, 12
+PICTURE_SIDE_PX = 384
+TILE_SIDE_PX = 192
+TILE_COLUMNS = 4
+MAX_TILES = 12
 REST_S, STYLE_S = 0.1, 2.0  # of idle motion that is synthesised for a picture
 # CPU seconds: shipped models take 0.03, 0.4 and 0.02. A slower one would hold up the streams of everybody.
-MAX_FRAME_CPU_S, MAX_STYLE_CPU_S, MAX_SPEECH_CPU_S = 1.0, 8.0, 4.0
+MAX_FRAME_CPU_S = 1.0
+MAX_STYLE_CPU_S = 8.0
+MAX_SPEECH_CPU_S = 4.0
 # First bytes of files that are sent by mistake, or on purpose.
 FOREIGN = {
     b"PK\x03\x04": "a zip archive", b"\x80\x02": "a Python pickle", b"\x80\x03": "a Python pickle",
@@ -47,7 +56,7 @@ FOREIGN = {
 GLTF_MAGIC = b"glTF"
 PICTURE_MAGIC = (b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"BM", b"II*\x00", b"MM\x00*")
 BOXED_PICTURES = ((0, b"RIFF", b"WEBP"), *((4, b"ftyp", brand) for brand in HEIC_BRANDS))  # offset, box, kind
-N_MAGIC = 12  # bytes by which a picture is told
+N_MAGIC = 12  # bytes by which a picture is known
 # Beside a photo: name of the face, consent of the person shown, pixels, corrections; beside a character: its mapping.
 STATEMENT = "statement.json"
 TOML_SHAPES = re.compile(r"^\s*\[\s*shapes\s*\]", re.MULTILINE)  # the table of a mapping in TOML
@@ -120,8 +129,8 @@ def _check_type(kind: str, source: Path) -> None:
     """Refuse other types of files by their first bytes: model files are safetensors, which hold no code."""
     with source.open("rb") as file:
         head = file.read(9)
-    for begin, name in FOREIGN.items():
-        if head.startswith(begin):
+    for first_bytes, name in FOREIGN.items():
+        if head.startswith(first_bytes):
             raise RefusedFileError(f"it is {name}, not a .{kind} file")
     if len(head) < 9 or head[8:] != b"{" or int.from_bytes(head[:8], "little") > source.stat().st_size:
         raise RefusedFileError(f"it is not a .{kind} file, or is truncated")
@@ -207,7 +216,7 @@ def _check_photo(source: Path, out: Path) -> dict[str, Any]:
 
 
 def read_statement(photo: Path) -> dict[str, Any]:
-    """What is stated of a photo, whose size is checked.
+    """Statement beside a photo, whose size is checked.
 
     Raises
     ------
@@ -227,13 +236,7 @@ def read_statement(photo: Path) -> dict[str, Any]:
 
 
 def find_places(source: Path, folder: Path) -> None:
-    """Find lips, lids, teeth and pivot in a photo with a `STATEMENT`: write `PLACES`, and the picture as `SHOWN`.
-
-    Raises
-    ------
-    RefusedFileError
-        It is no picture, or shows no face that can be moved.
-    """
+    """Find lips, lids, teeth and pivot in a photo with a `STATEMENT`: write `PLACES`, and the picture as `SHOWN`."""
     from PIL import Image
 
     from tts2face.photo.face_from_photo import places_in_photo
@@ -262,7 +265,7 @@ def _check_palette(source: Path, out: Path) -> dict[str, Any]:
     from tts2face.session.catalogue import styles
 
     _rewrite(source, out, PALETTE, palette.FORMAT_VERSION)
-    return {"styles": [{"name": one.name, "summary": one.summary} for one in styles(str(out))]}
+    return {"styles": [{"name": style.name, "summary": style.summary} for style in styles(str(out))]}
 
 
 def _check_dictionary(source: Path, out: Path) -> dict[str, Any]:

@@ -64,7 +64,7 @@ class StoredResource:
 
 @dataclass(frozen=True, slots=True)
 class Usage:
-    """What a key stores: number of resources and bytes."""
+    """Number of resources and bytes that a key stores."""
 
     n_resources: int
     n_bytes: int
@@ -84,7 +84,7 @@ def over_quota(owner: str, usage: Usage, limits: Usage, n_bytes: int) -> str | N
 
 def resource_from_folder(owner: str, kind: str, name: str, checked: Path, blobs: BlobStore) -> StoredResource:
     """Row of a resource whose files, which `tts2face.serving.work.resource_check` has written, are put into a store."""
-    files = [checked / one for one in (CONTENT, PICTURE) if (checked / one).is_file()]
+    files = [checked / name for name in (CONTENT, PICTURE) if (checked / name).is_file()]
     stored = {file.name: blobs.put(file) for file in files}
     description = parse_json((checked / DESCRIPTION).read_text(encoding="utf-8"), name)
     n_bytes = sum(file.stat().st_size for file in files)
@@ -114,20 +114,20 @@ class ResourceTable:
 
     def find(self, owner: str, kind: str, name: str) -> StoredResource | None:
         """The resource of a name, if the owner has one."""
-        with self._transaction() as look:
-            return next(iter(_rows(look, _CHOSEN, owner=owner, kind=kind, name=name)), None)
+        with self._transaction() as read:
+            return next(iter(_rows(read, _CHOSEN, owner=owner, kind=kind, name=name)), None)
 
     def select(self, kind: str, owner: str | None) -> tuple[StoredResource, ...]:
         """Resources of a kind, sorted by name; of all owners if none is given."""
-        with self._transaction() as look:
+        with self._transaction() as read:
             if owner is None:
-                return _rows(look, "kind = :kind", kind=kind)
-            return _rows(look, "kind = :kind AND owner = :owner", kind=kind, owner=owner)
+                return _rows(read, "kind = :kind", kind=kind)
+            return _rows(read, "kind = :kind AND owner = :owner", kind=kind, owner=owner)
 
     def usage(self, owner: str) -> Usage:
-        """What an owner stores."""
-        with self._transaction() as look:
-            return _usage(look, owner)
+        """Number of resources and bytes of an owner."""
+        with self._transaction() as read:
+            return _usage(read, owner)
 
     def add(self, resource: StoredResource, *, check: Callable[[Usage], None], keep: Callable[[], None]) -> bool:
         """Add a resource unless its owner has one of this name; False if so.
@@ -156,7 +156,7 @@ class ResourceTable:
             change.run(_LOCK)
             old = _rows(change, _CHOSEN, owner=owner, kind=kind, name=name)
             change.run(_DELETE, owner=owner, kind=kind, name=name)
-            for content in _unused(change, {one for each in old for one in (each.content, each.picture) if one}):
+            for content in _unused(change, {file for each in old for file in (each.content, each.picture) if file}):
                 delete(content)
             return bool(old)
 
@@ -179,19 +179,19 @@ class ResourceTable:
             yield transaction
 
 
-def _usage(look: Transaction, owner: str) -> Usage:
+def _usage(read: Transaction, owner: str) -> Usage:
     query = "SELECT COUNT(*), COALESCE(SUM(n_bytes), 0) FROM tts2face_resources WHERE owner = :owner"
-    ((n_resources, n_bytes),) = look.rows(query, owner=owner)
+    ((n_resources, n_bytes),) = read.rows(query, owner=owner)
     return Usage(int(n_resources), int(n_bytes))
 
 
-def _rows(look: Transaction, chosen: str, **values: Any) -> tuple[StoredResource, ...]:
+def _rows(read: Transaction, chosen: str, **values: Any) -> tuple[StoredResource, ...]:
     query = f"SELECT {_COLUMNS} FROM tts2face_resources WHERE {chosen} ORDER BY name, owner"
-    rows = [dict(row._mapping) for row in look.rows(query, **values)]
+    rows = [dict(row._mapping) for row in read.rows(query, **values)]
     return tuple(StoredResource(**{**row, "description": json.loads(row["description"])}) for row in rows)
 
 
-def _unused(look: Transaction, contents: set[str]) -> tuple[str, ...]:
+def _unused(read: Transaction, contents: set[str]) -> tuple[str, ...]:
     """Those of some contents that no row has."""
     query = "SELECT COUNT(*) FROM tts2face_resources WHERE content = :content OR picture = :content"
-    return tuple(content for content in sorted(contents) if not look.value(query, content=content))
+    return tuple(content for content in sorted(contents) if not read.value(query, content=content))

@@ -28,10 +28,13 @@ from tts2face.storage.user_folders import without_folders
 BLOBS, RESOURCES = "results", "resources"  # kinds of files in a store: of jobs, and uploaded models
 MODEL_SECTIONS = ("models", "request")  # parts of a job's JSON that may name uploads
 PAUSE_S = 2.0  # before another try while the database or the store cannot be reached
-CHECK_S = 1.0  # between two looks whether a job is still wanted
+CHECK_S = 1.0  # between two questions whether a job is still wanted
 FULL = f"waits: the disk of the worker has less than {MIN_FREE_BYTES >> 20} MB free; it goes on when there is room"
 REPORT_S = 0.5  # between two notes of its progress
-SMALLEST_PRIORITY, LARGEST_PRIORITY, SEGMENTS_PER_STEP = 10, 100, 20  # small jobs overtake large ones
+# small jobs overtake large ones
+SMALLEST_PRIORITY = 10
+LARGEST_PRIORITY = 100
+SEGMENTS_PER_STEP = 20
 
 
 def job_blobs(store: str) -> Callable[[], tuple[BlobStore, ...]]:
@@ -53,7 +56,10 @@ class JobRunner:
     """
 
     def __init__(self, url: str, place: str, store: Store, blobs: Callable[[], tuple[BlobStore, ...]]) -> None:
-        self._url, self._place, self._store, self._blobs = url, place, store, blobs
+        self._url = url
+        self._place = place
+        self._store = store
+        self._blobs = blobs
 
     def run(self, job_id: str) -> str:
         """Execute a job unless it has ended; its state afterwards.
@@ -77,7 +83,10 @@ class JobRunner:
             names = changes.table.open_jobs()
             for at in range(0, len(names), JOBS_PER_QUERY):
                 part = names[at : at + JOBS_PER_QUERY]
-                found = {one.workflow_id: one for one in client.list_workflows(workflow_ids=part, load_input=False)}
+                found = {
+                    workflow.workflow_id: workflow
+                    for workflow in client.list_workflows(workflow_ids=part, load_input=False)
+                }
                 for name in part:
                     reason = "it was removed from the queue; send it again"
                     if name in found:
@@ -107,7 +116,7 @@ class JobRunner:
                 )  # fmt: skip
                 products = find_runner(job.kind)(task)
                 ending = Ending(DONE, self._put(products.files), products.error)
-                paths = {one.name: one.path for one in products.files}
+                paths = {product.name: product.path for product in products.files}
             except (DatabaseAwayError, StoreAwayError):
                 raise
             except Tts2faceError as wrong:
@@ -129,20 +138,23 @@ class JobRunner:
             default, roles = cast.get("default", {}), cast.get("role", [])
             found["cast"] = {
                 "default": place_models(default, self._blobs),
-                "role": [place_models(one, self._blobs) for one in roles],
+                "role": [place_models(role, self._blobs) for role in roles],
             }
         return found
 
     def _inputs(self, job: JobRecord, folder: Path) -> dict[str, Path]:
-        return {one.name: place_file(self._blobs(), one.sha256, one.name, folder / "inputs") for one in job.inputs}
+        return {file.name: place_file(self._blobs(), file.sha256, file.name, folder / "inputs") for file in job.inputs}
 
     def _put(self, products: Sequence[Product]) -> tuple[JobFile, ...]:
         store = self._blobs()[0]
         return tuple(
             JobFile(
-                one.name, wait_for_store(partial(store.put, one.path), _ignore), one.media_type, one.path.stat().st_size
+                product.name,
+                wait_for_store(partial(store.put, product.path), _ignore),
+                product.media_type,
+                product.path.stat().st_size,
             )
-            for one in products
+            for product in products
         )
 
     def _end(self, changes: JobChanges, job: JobRecord, ending: Ending, paths: Mapping[str, Path]) -> None:
@@ -150,12 +162,12 @@ class JobRunner:
         store = self._blobs()[0]
 
         def put_missing(files: Sequence[JobFile]) -> None:
-            for one in files:
-                if not store.has(one.sha256):
-                    store.put(paths[one.name])
+            for file in files:
+                if not store.has(file.sha256):
+                    store.put(paths[file.name])
 
         if not changes.end(job.id, ending, put_missing):
-            changes.remove_unused({one.sha256 for one in ending.outputs}, store.delete)
+            changes.remove_unused({file.sha256 for file in ending.outputs}, store.delete)
         changes.forget_inputs(job.id, store.delete)
 
 
@@ -169,12 +181,14 @@ class JobWatch:
     """
 
     def __init__(self, job: JobRecord, changes: JobChanges, folder: Path) -> None:
-        self.job_id, self.changes, self._folder = job.id, changes, folder
+        self.job_id = job.id
+        self.changes = changes
+        self._folder = folder
         self._checked_at = self._reported_at = 0.0
         self._is_paused = job.error is not None  # by a worker that has died since
 
     def check(self) -> None:
-        """Raise `JobCancelledError` if the job has ended or was deleted; looks at most once in `CHECK_S`.
+        """Raise `JobCancelledError` if the job has ended or was deleted; asks at most once in `CHECK_S`.
 
         It also notes in the job that the disk has less than `MIN_FREE_BYTES`, where the rendering waits for room.
         """

@@ -15,13 +15,7 @@ ACTIVE = frozenset({"PENDING", "ENQUEUED", "DELAYED"})
 
 @contextmanager
 def open_client(url: str) -> Iterator[Any]:
-    """Client of a prepared database.
-
-    Raises
-    ------
-    BackendError
-        The database cannot be reached.
-    """
+    """Client of a prepared database."""
     import sqlalchemy
     from dbos import DBOSClient
 
@@ -79,9 +73,9 @@ def _skip_ended(client: Any, numbers: dict[str, int]) -> set[str]:
     while unknown:
         names = [f"{address}.{numbers[address]}" for address in unknown]
         unknown = set()
-        for one in client.list_workflows(workflow_ids=names, load_input=False, load_output=False):
-            address = one.workflow_id.partition(".")[0]
-            if one.status in ACTIVE:
+        for job in client.list_workflows(workflow_ids=names, load_input=False, load_output=False):
+            address = job.workflow_id.partition(".")[0]
+            if job.status in ACTIVE:
                 active.add(address)
             else:
                 numbers[address] += 1

@@ -24,7 +24,7 @@ def is_cancelled(name: str) -> bool:
     from dbos import DBOS
 
     found = DBOS.list_workflows(workflow_ids=[name], load_input=False, load_output=False)
-    return any(one.status == "CANCELLED" for one in found)
+    return any(job.status == "CANCELLED" for job in found)
 
 
 class SegmentFailedError(RuntimeError):
@@ -53,7 +53,9 @@ class SegmentWorker:
         core: int | None = None,
         on_message: Message = lambda _: None,
     ) -> None:
-        self._store, self._blobs, self._on_message = store, blobs, on_message
+        self._store = store
+        self._blobs = blobs
+        self._on_message = on_message
         self._process = RenderProcess(core) if renderer is None else None
         self._renderer: Renders = renderer or self
         self._rendering = threading.Lock()  # one segment at a time

@@ -21,16 +21,10 @@ N_SHOWN = 3  # reasons of failed clips
 
 
 def run_subtitles(task: JobTask) -> Products:
-    """Make the clips of all files.
-
-    Raises
-    ------
-    InputError, DataError
-        As `plan_batch`; or no clip could be made.
-    """
+    """Make the clips of all files."""
     plan = plan_of(task)
     if not plan.outputs:
-        reasons = "; ".join(one.message for one in plan.warnings[:N_SHOWN])
+        reasons = "; ".join(warning.message for warning in plan.warnings[:N_SHOWN])
         raise DataError(f"no cue can be spoken: {reasons}")
     out = task.folder / "clips"
     result = run_batch(
@@ -75,6 +69,6 @@ def _report(task: JobTask, done: int, of: int) -> None:
 def _remove_folders(path: Path, task: JobTask) -> None:
     """Leave only the names of the job's files in a manifest."""
     text = path.read_text(encoding="utf-8")
-    for folder in {str(one.parent) for one in task.inputs.values()}:
+    for folder in {str(path.parent) for path in task.inputs.values()}:
         text = text.replace(f"{folder}/", "")
     path.write_text(text, encoding="utf-8")

@@ -86,8 +86,8 @@ class JobTable:
         create_tables(self.database, _TABLES)
 
     def _migrate(self) -> None:
-        with self.database.transaction() as look:
-            names = look.columns("tts2face_jobs")
+        with self.database.transaction() as read:
+            names = read.columns("tts2face_jobs")
         if "state" in names:
             with self.database.transaction(is_change=True) as change:
                 if "state" in change.columns("tts2face_jobs"):  # no other process was faster
@@ -142,9 +142,9 @@ class JobTable:
 
     def get(self, job_id: str) -> JobRecord | None:
         """A job with its files; None if there is none."""
-        with self.database.transaction() as look:
-            found = look.rows(f"{self._select} WHERE j.id = :id", id=job_id)
-            return _with_files(look, record_from_row(found[0])) if found else None
+        with self.database.transaction() as read:
+            found = read.rows(f"{self._select} WHERE j.id = :id", id=job_id)
+            return _with_files(read, record_from_row(found[0])) if found else None
 
     def page(self, key_name: str | None, state: str | None, before: str | None, limit: int) -> list[JobRecord]:
         """Jobs without their files, the newest first.
@@ -167,15 +167,15 @@ class JobTable:
             conditions.append("(j.created, j.id) < (SELECT created, id FROM tts2face_jobs WHERE id = :before)")
             values["before"] = before
         query = f"{self._select} WHERE {' AND '.join(conditions)} ORDER BY j.created DESC, j.id DESC LIMIT :limit"
-        with self.database.transaction() as look:
-            return [record_from_row(row) for row in look.rows(query, **values)]
+        with self.database.transaction() as read:
+            return [record_from_row(row) for row in read.rows(query, **values)]
 
     def events(self, job_id: str, after: int, limit: int = 500) -> tuple[list[JobEvent], bool]:
         """Events of a job with larger numbers, and whether it may have further ones."""
         query = "SELECT number, time, content FROM tts2face_job_events WHERE job_id = :id AND number > :after "
-        with self.database.transaction() as look:
-            is_open = bool(look.value(f"SELECT 1 FROM tts2face_jobs WHERE id = :id AND {IS_OPEN}", id=job_id))
-            rows = look.rows(f"{query} ORDER BY number LIMIT :limit", id=job_id, after=after, limit=limit)
+        with self.database.transaction() as read:
+            is_open = bool(read.value(f"SELECT 1 FROM tts2face_jobs WHERE id = :id AND {IS_OPEN}", id=job_id))
+            rows = read.rows(f"{query} ORDER BY number LIMIT :limit", id=job_id, after=after, limit=limit)
         return [event_from_row(row) for row in rows], is_open or len(rows) == limit
 
     def file_of(self, sha256: str, key_name: str | None) -> JobFile | None:
@@ -185,30 +185,30 @@ class JobTable:
             "ON j.id = f.job_id WHERE f.sha256 = :hash AND f.role = 'output' AND j.ending = 'done'"
         )
         query += "" if key_name is None else " AND j.key_name = :key"
-        with self.database.transaction() as look:
-            found = look.rows(f"{query} LIMIT 1", hash=sha256, **({} if key_name is None else {"key": key_name}))
+        with self.database.transaction() as read:
+            found = read.rows(f"{query} LIMIT 1", hash=sha256, **({} if key_name is None else {"key": key_name}))
         return JobFile(*found[0]) if found else None
 
     def counts(self) -> tuple[dict[str, int], float]:
         """Numbers of jobs by state, and the age of the oldest waiting one in seconds."""
-        with self.database.transaction() as look:
+        with self.database.transaction() as read:
             query = f"SELECT ending, count(*), 0.0 FROM tts2face_jobs WHERE NOT {IS_OPEN} GROUP BY ending"
-            rows = look.rows(query)
+            rows = read.rows(query)
             age = f"{self.database.now} - min(j.created)"
-            rows += look.rows(f"SELECT {_STATE}, count(*), {age} FROM {self._jobs} WHERE j.{IS_OPEN} GROUP BY 1")
+            rows += read.rows(f"SELECT {_STATE}, count(*), {age} FROM {self._jobs} WHERE j.{IS_OPEN} GROUP BY 1")
         ages = {row[0]: float(row[2]) for row in rows}
         return dict.fromkeys(STATES, 0) | {row[0]: row[1] for row in rows}, ages.get(WAITING, 0.0)
 
     def open_jobs(self) -> list[str]:
         """Names of all waiting and running jobs."""
-        with self.database.transaction() as look:
-            return [row[0] for row in look.rows(f"SELECT id FROM tts2face_jobs WHERE {IS_OPEN}")]
+        with self.database.transaction() as read:
+            return [row[0] for row in read.rows(f"SELECT id FROM tts2face_jobs WHERE {IS_OPEN}")]
 
     def ended_before(self, age_s: float) -> list[str]:
         """Names of jobs that ended some seconds ago or earlier."""
         query = f"SELECT id FROM tts2face_jobs WHERE finished < {self.database.now} - :age"
-        with self.database.transaction() as look:
-            return [row[0] for row in look.rows(query, age=age_s)]
+        with self.database.transaction() as read:
+            return [row[0] for row in read.rows(query, age=age_s)]
 
     def own_segments(self, job_id: str) -> list[str]:
         """Addresses of the segments of a job that no other waiting or running job uses."""
@@ -216,8 +216,8 @@ class JobTable:
             "SELECT address FROM tts2face_job_segments WHERE job_id = :id AND address NOT IN (SELECT s.address FROM "
             f"tts2face_job_segments s JOIN tts2face_jobs j ON j.id = s.job_id WHERE j.{IS_OPEN} AND j.id <> :id)"
         )
-        with self.database.transaction() as look:
-            return [row[0] for row in look.rows(query, id=job_id)]
+        with self.database.transaction() as read:
+            return [row[0] for row in read.rows(query, id=job_id)]
 
     def delete(self, job_id: str, remove: Callable[[str], None]) -> None:
         """Delete a job; `remove` is called with each file that no other job uses.
@@ -254,8 +254,8 @@ class JobTable:
             raise OtherBodyError("this Idempotency-Key was sent with another body before; use a new one")
         return _with_files(change, record)
 
-    def _read(self, look: Transaction, job_id: str) -> JobRecord:
-        return _with_files(look, record_from_row(look.rows(f"{self._select} WHERE j.id = :id", id=job_id)[0]))
+    def _read(self, read: Transaction, job_id: str) -> JobRecord:
+        return _with_files(read, record_from_row(read.rows(f"{self._select} WHERE j.id = :id", id=job_id)[0]))
 
 
 def insert_files(change: Transaction, job_id: str, role: str, files: Sequence[JobFile]) -> None:
@@ -264,23 +264,23 @@ def insert_files(change: Transaction, job_id: str, role: str, files: Sequence[Jo
         "INSERT INTO tts2face_job_files (job_id, role, name, sha256, media_type, n_bytes) VALUES (:id, :role, :name, "
         ":hash, :type, :bytes)",
         [
-            {"id": job_id, "role": role, "name": one.name, "hash": one.sha256, "type": one.media_type,
-             "bytes": one.n_bytes}
-            for one in files
+            {"id": job_id, "role": role, "name": file.name, "hash": file.sha256, "type": file.media_type,
+             "bytes": file.n_bytes}
+            for file in files
         ],
     )  # fmt: skip
 
 
-def remove_unused(look: Transaction, hashes: set[str], remove: Callable[[str], None]) -> None:
+def remove_unused(read: Transaction, hashes: set[str], remove: Callable[[str], None]) -> None:
     """Call `remove` with the files that no job uses."""
     for sha256 in sorted(hashes):
-        if not look.value("SELECT count(*) FROM tts2face_job_files WHERE sha256 = :hash", hash=sha256):
+        if not read.value("SELECT count(*) FROM tts2face_job_files WHERE sha256 = :hash", hash=sha256):
             remove(sha256)
 
 
-def _with_files(look: Transaction, record: JobRecord) -> JobRecord:
+def _with_files(read: Transaction, record: JobRecord) -> JobRecord:
     query = "SELECT role, name, sha256, media_type, n_bytes FROM tts2face_job_files WHERE job_id = :id ORDER BY name"
     files: dict[str, list[JobFile]] = {INPUT: [], OUTPUT: []}
-    for role, *rest in look.rows(query, id=record.id):
+    for role, *rest in read.rows(query, id=record.id):
         files[role].append(JobFile(*rest))
     return replace(record, inputs=tuple(files[INPUT]), outputs=tuple(files[OUTPUT]))

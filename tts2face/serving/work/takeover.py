@@ -23,7 +23,7 @@ def return_work(executor_ids: set[str]) -> set[str]:
 
     names = sorted(executor_ids)
     DBOS._recover_pending_workflows(names)
-    return executor_ids - {str(one.executor_id) for one in list_running(names)}
+    return executor_ids - {str(job.executor_id) for job in list_running(names)}
 
 
 def list_running(executor_ids: list[str] | None = None) -> list[Any]:

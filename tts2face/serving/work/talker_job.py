@@ -24,13 +24,7 @@ N_SHOWN_NOTES = 20  # refused parts, and warnings, that are reported
 
 
 def run_talker(task: JobTask) -> Products:
-    """Build a talker and store it as a model of the key.
-
-    Raises
-    ------
-    InputError, DataError, BackendError
-        The recording is not suitable, as `tts2face corpus build` says; or the name or the quota is used up.
-    """
+    """Build a talker and store it as a model of the key."""
     recordings = task.folder / "recordings"
     recordings.mkdir()
     for name, path in task.inputs.items():
@@ -80,7 +74,7 @@ def _build(task: JobTask) -> Mapping[str, Any]:
     child = Child(build.program)
     try:
         with limits_of("the recording"):
-            return child.call(TOOL, build.order, on_event=report, look=check, timeout_s=build.timeout_s).content
+            return child.call(TOOL, build.order, on_event=report, check=check, timeout_s=build.timeout_s).content
     finally:
         child.close()
 
@@ -88,7 +82,9 @@ def _build(task: JobTask) -> Mapping[str, Any]:
 def _store(task: JobTask) -> None:
     """Store the talker as a model of the key; while the database cannot be reached, it is tried again."""
     assert task.resources is not None
-    asked, blobs, checked = task.request, task.resources(), task.folder / "checked"
+    asked = task.request
+    blobs = task.resources()
+    checked = task.folder / "checked"
     made = resource_from_folder(asked["owner"], TALKER, asked["name"], checked, blobs)
     made = replace(made, description={**made.description, "order": asked["order"]})
     limits = Usage(**asked["limits"])

@@ -36,7 +36,12 @@ from tts2face.types import SOUND_RATE
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-SOUND, PICTURE, VIDEO, DRAW, SUBTITLES, PLACES = "sound", "picture", "video", "draw-", "subtitles-", "places"
+SOUND = "sound"
+PICTURE = "picture"
+VIDEO = "video"
+DRAW = "draw-"
+SUBTITLES = "subtitles-"
+PLACES = "places"
 LIMITS = ProcessLimits(memory_bytes=2 << 30, cpu_s=60, file_bytes=1 << 30, n_files=64)
 MEDIA_BYTES = 1 << 30  # of addresses of a reader of sounds, videos and subtitles; 265 MB measured
 RESOURCE_CPU_S = 180  # a resource with its picture takes 3 to 5 s, at the first time with the compilation of kernels
@@ -74,13 +79,7 @@ def _decoding(kind: str, source: Path, *errors: type[Exception]) -> Iterator[Non
 
 
 def decode_sound(source: Path, target: Path, max_seconds: float) -> None:
-    """Write the first sound stream of a file as mono 16-bit .wav at `SOUND_RATE`.
-
-    Raises
-    ------
-    RefusedFileError
-        It has no sound, more than `max_seconds`, or cannot be decoded.
-    """
+    """Write the first sound stream of a file as mono 16-bit .wav at `SOUND_RATE`."""
     import wave
 
     import av
@@ -135,26 +134,14 @@ def _opened_picture(source: Path, max_pixels: float) -> "Iterator[Image]":
 
 
 def decode_picture(source: Path, target: Path, max_pixels: float) -> None:
-    """Write a picture as .png.
-
-    Raises
-    ------
-    RefusedFileError
-        It has more than `max_pixels`, or cannot be decoded.
-    """
+    """Write a picture as .png."""
     with _opened_picture(source, max_pixels) as picture:
         plain = picture if picture.mode == "RGB" else picture.convert("RGB")  # which would copy it
         plain.save(target, "PNG", compress_level=1)
 
 
 def check_video(source: Path, target: Path, max_seconds: float) -> None:
-    """Write what a video is, JSON with its ending and seconds; its packets are counted and not decoded.
-
-    Raises
-    ------
-    RefusedFileError
-        It is no video, longer than `max_seconds`, or its pictures are too large or too many.
-    """
+    """Write what a video is, JSON with its ending and seconds; its packets are counted and not decoded."""
     import av
 
     options = {"format_whitelist": ",".join(VIDEO_FORMATS), "protocol_whitelist": "none"}
@@ -163,7 +150,7 @@ def check_video(source: Path, target: Path, max_seconds: float) -> None:
         source.open("rb") as file,
         av.open(file, "r", options=options) as container,
     ):
-        stream = next((one for one in container.streams.video if one.codec_context is not None), None)
+        stream = next((stream for stream in container.streams.video if stream.codec_context is not None), None)
         if stream is None:
             raise RefusedFileError("it holds no video")
         if stream.width * stream.height > MAX_VIDEO_PIXELS:
@@ -190,13 +177,7 @@ def _measure_video(container: Any, stream: Any, max_seconds: float) -> float:
 
 
 def check_subtitles(source: Path, target: Path, max_cues: float, encoding: str | None) -> None:
-    """Copy a subtitle file, and write its numbers beside it: cues and seconds, as JSON.
-
-    Raises
-    ------
-    RefusedFileError
-        It contains no cues or more than `max_cues`.
-    """
+    """Copy a subtitle file, and write its numbers beside it: cues and seconds, as JSON."""
     from tts2face.interchange.subtitles.reader import read_subtitles
 
     shutil.copyfile(source, target)
@@ -232,7 +213,9 @@ def decode(kind: str, source: Path, target: Path, limit: float) -> None:
 
 def _measure(call: Call) -> dict[str, Any]:
     """The memory that a file takes when it is decoded, by its head and format."""
-    kind, source, limit = call.content["kind"], Path(call.content["source"]), float(call.content["limit"])
+    kind = call.content["kind"]
+    source = Path(call.content["source"])
+    limit = float(call.content["limit"])
     if kind == PICTURE:
         with _opened_picture(source, limit) as picture:
             return {"memory_bytes": CHILD_BYTES + decoding_bytes(picture)}

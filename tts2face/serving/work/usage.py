@@ -1,4 +1,4 @@
-"""What keys have used, counted by all servers of a database together: buckets that refill, and requests that run now.
+"""Usage of keys, counted by all servers of a database together: buckets that refill, and requests that run now.
 
 Each server adds what it has counted since it last did, and reads what the others have.
 """
@@ -11,7 +11,9 @@ from tts2face.serving.work.connection import JobDatabase, Transaction, create_ta
 SHARED = ""  # server of the rows that all servers write
 RUNS_S = 6.0  # for which a server that says no more counts as running what it ran; rows of this time are read again
 OLD_S = 2 * 86_400.0  # after which a bucket is full
-SMALLER, LARGER = ({"sqlite": one, "postgresql": other} for one, other in (("MIN", "LEAST"), ("MAX", "GREATEST")))
+SMALLER, LARGER = (
+    {"sqlite": lite, "postgresql": postgres} for lite, postgres in (("MIN", "LEAST"), ("MAX", "GREATEST"))
+)
 _TABLE = """CREATE TABLE IF NOT EXISTS tts2face_key_usage (
     server VARCHAR(64) NOT NULL, key_name VARCHAR(64) NOT NULL, quantity VARCHAR(20) NOT NULL,
     amount DOUBLE PRECISION NOT NULL, at DOUBLE PRECISION NOT NULL, PRIMARY KEY (server, key_name, quantity))"""
@@ -23,7 +25,7 @@ Name = tuple[str, str]  # of a key, and of a quantity
 
 @dataclass(frozen=True, slots=True)
 class Spent:
-    """What a server has taken of a bucket that holds `most` and is refilled within `period_s`."""
+    """Amount that a server has taken of a bucket that holds `most` and is refilled within `period_s`."""
 
     name: Name
     amount: float
@@ -33,7 +35,7 @@ class Spent:
 
 @dataclass(frozen=True, slots=True)
 class SharedUsage:
-    """What all servers have counted.
+    """Counts of all servers.
 
     Parameters
     ----------
@@ -73,11 +75,13 @@ class UsageTable:
         rows = [{"server": server, "key": key, "quantity": quantity, "amount": n}
                 for (key, quantity), n in sorted(running.items())]  # fmt: skip
         with self._database.transaction() as change:
-            for one in sorted(spent, key=lambda one: one.name):  # in one order, so that no two servers wait in a circle
-                key, quantity = one.name
+            for bucket in sorted(
+                spent, key=lambda bucket: bucket.name
+            ):  # in one order, so that no two servers wait in a circle
+                key, quantity = bucket.name
                 change.run(
-                    self._spend, server=SHARED, key=key, quantity=quantity, amount=float(one.amount),
-                    most=float(one.most), period=one.period_s,
+                    self._spend, server=SHARED, key=key, quantity=quantity, amount=float(bucket.amount),
+                    most=float(bucket.most), period=bucket.period_s,
                 )  # fmt: skip
             change.run_many(self._run, rows)
             found, now = self._read(change)
@@ -90,11 +94,11 @@ class UsageTable:
                 result.running[key, quantity] = result.running.get((key, quantity), 0) + int(amount)
         return result
 
-    def _read(self, look: Transaction) -> tuple[list[tuple[str, str, str, float, float]], float]:
+    def _read(self, read: Transaction) -> tuple[list[tuple[str, str, str, float, float]], float]:
         """Rows that have changed since the last time, and the time by the clock of the database."""
-        now = float(look.value(f"SELECT {self._database.now}"))
+        now = float(read.value(f"SELECT {self._database.now}"))
         query = "SELECT server, key_name, quantity, amount, at FROM tts2face_key_usage WHERE at > :since"
-        return look.rows(query, since=min(self._read_until, now) - RUNS_S), now
+        return read.rows(query, since=min(self._read_until, now) - RUNS_S), now
 
     def forget_old(self) -> None:
         """Remove buckets that are full again, and what servers that ended have run."""

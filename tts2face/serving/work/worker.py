@@ -36,18 +36,18 @@ from tts2face.serving.work.segment_worker import SegmentWorker, is_cancelled
 from tts2face.serving.work.takeover import list_running, return_work
 from tts2face.serving.work.workers import BEAT_S, Workers
 
-POLL_S = 0.2  # between two looks at the queue
-MAX_LOOKS_PER_S = 200.0  # of all workers together: with more than 40, each looks less often
+POLL_S = 0.2  # between two polls of the queue
+MAX_POLLS_PER_S = 200.0  # of all workers together: with more than 40, each polls less often
 MAX_DEATHS = 8  # of workers that had the same segment; then it counts as failed
-ALL_WORK_S = 60.0  # between two looks at all running work
+ALL_WORK_S = 60.0  # between two polls of all running work
 MAX_JOB_DEATHS = 30  # of workers that executed the same job of the service, which lasts longer than a segment
 # Connections of a worker to the database: two stay open, besides that of its heartbeats.
 CONNECTIONS = {"pool_size": 2, "max_overflow": 3}
 
 
 def poll_interval(n_workers: int) -> float:
-    """Seconds between two looks of a worker at the queue, for a number of workers."""
-    return max(POLL_S, n_workers / MAX_LOOKS_PER_S)
+    """Seconds between two polls of the queue by a worker, for a number of workers."""
+    return max(POLL_S, n_workers / MAX_POLLS_PER_S)
 
 
 class Worker:
@@ -63,11 +63,6 @@ class Worker:
         What renders; None: a child process.
     core
         Core to which the child process is bound; None: all.
-
-    Raises
-    ------
-    InputError, BackendError
-        The database or store cannot be used.
     """
 
     def __init__(
@@ -89,7 +84,7 @@ class Worker:
         self._place = f"{socket.gethostname()}, process {os.getpid()}"
         self._stopped = threading.Event()
         self._pauses = EnginePauses()
-        self._look_s = poll_interval(1)
+        self._poll_s = poll_interval(1)
         self._vanished: set[str] = set()
         self._next_all_work_s = 0.0
         self._noting = threading.Lock()
@@ -157,9 +152,9 @@ class Worker:
         try:
             workers.beat(self.executor_id, self._place)
             DBOS.launch()
-            self._look_s = poll_interval(len(workers.alive()))
+            self._poll_s = poll_interval(len(workers.alive()))
             for queue, n_places in PLACES.items():
-                DBOS.register_queue(queue, worker_concurrency=n_places, polling_interval_sec=self._look_s)
+                DBOS.register_queue(queue, worker_concurrency=n_places, polling_interval_sec=self._poll_s)
         except (sqlalchemy.exc.SQLAlchemyError, dbos_error.DBOSException) as away:
             raise BackendError(f"the worker cannot start: {database_reason(away)}; check the database") from away
 
@@ -172,7 +167,7 @@ class Worker:
         import sqlalchemy
 
         next_beat_s = time.monotonic() + BEAT_S
-        while not self._stopped.wait(self._look_s if self._is_reached else BEAT_S):
+        while not self._stopped.wait(self._poll_s if self._is_reached else BEAT_S):
             began_s = time.monotonic()
             is_due, is_asleep = began_s >= next_beat_s, not self._pauses.is_awake
             if not (is_due or is_asleep):
@@ -198,7 +193,7 @@ class Worker:
             dead = set(self._vanished)
             self._segments.end_cancelled(is_cancelled)
             if began_s >= self._next_all_work_s:
-                dead |= self._look_at_all_work(workers)
+                dead |= self._poll_all_work(workers)
                 self._jobs.end_abandoned()
                 self._next_all_work_s = began_s + ALL_WORK_S * random.uniform(0.5, 1.5)
             dead.discard(self.executor_id)
@@ -229,18 +224,18 @@ class Worker:
                     else f"the database cannot be reached ({type(away).__name__}); trying again"
                 )
 
-    def _look_at_all_work(self, workers: Workers) -> set[str]:
+    def _poll_all_work(self, workers: Workers) -> set[str]:
         """Owners of running work that send no heartbeat; the interval of the queue follows the number of workers."""
         from dbos import DBOS
 
         alive = set(workers.alive())
         workers.return_later()
-        wanted = self._look_s = poll_interval(len(alive))
+        wanted = self._poll_s = poll_interval(len(alive))
         for name in PLACES:
             queue = DBOS.retrieve_queue(name)
             if queue is not None and not 0.8 < wanted / queue.polling_interval_sec < 1.25:
                 queue.set_polling_interval_sec(wanted)
-        return {str(one.executor_id) for one in list_running() if one.executor_id} - alive
+        return {str(job.executor_id) for job in list_running() if job.executor_id} - alive
 
 
 def work(call: Call) -> dict[str, Any]:

@@ -100,13 +100,7 @@ class Workers:
             return int(connection.execute(self._sql(query)).rowcount)
 
     def has_waiting(self) -> bool:
-        """Whether a job waits in a queue; for one thread, which asks often: on a connection that stays open.
-
-        Raises
-        ------
-        DatabaseAwayError
-            The database cannot be reached.
-        """
+        """Whether a job waits in a queue; for one thread, which asks often: on a connection that stays open."""
         while True:
             was_open = self._looking is not None
             try:
@@ -139,8 +133,10 @@ class Workers:
     def forget(self, executor_ids: Iterable[str]) -> None:
         """Remove workers."""
         with self._engine.begin() as connection:
-            for one in executor_ids:
-                connection.execute(self._sql("DELETE FROM tts2face_workers WHERE executor_id = :id"), {"id": one})
+            for executor_id in executor_ids:
+                connection.execute(
+                    self._sql("DELETE FROM tts2face_workers WHERE executor_id = :id"), {"id": executor_id}
+                )
 
     def forget_dead(self, older_than_s: float = 3600.0) -> None:
         """Remove workers without a heartbeat for a long time."""

@@ -26,10 +26,10 @@ from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import open_store
 from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
-from tts2face.serving.work.engine import POLL_S, DatabaseEngine, _Look
+from tts2face.serving.work.engine import POLL_S, DatabaseEngine, _Awaited
 from tts2face.serving.work.queue_control import cancel_jobs, list_jobs, prune_jobs
 from tts2face.serving.work.segment_queue import JOBS_PER_QUERY, enqueue, open_client
-from tts2face.serving.work.worker import MAX_LOOKS_PER_S, Worker, poll_interval
+from tts2face.serving.work.worker import MAX_POLLS_PER_S, Worker, poll_interval
 from tts2face.serving.work.worker import POLL_S as WORKER_POLL_S
 from tts2face.serving.work.workers import BEAT_S, DEAD_AFTER_S, Workers
 
@@ -111,7 +111,7 @@ def test_a_dead_worker_of_another_version_is_reported_once(
 
 def test_looks_at_the_queue_are_bounded() -> None:
     assert poll_interval(1) == poll_interval(4) == WORKER_POLL_S
-    assert poll_interval(200) == 200 / MAX_LOOKS_PER_S > WORKER_POLL_S
+    assert poll_interval(200) == 200 / MAX_POLLS_PER_S > WORKER_POLL_S
 
 
 def test_a_worker_without_its_database_says_so_in_one_line(tmp_path: Path, segments: Segments) -> None:
@@ -192,10 +192,10 @@ def test_all_jobs_of_a_large_batch_are_looked_at(monkeypatch: pytest.MonkeyPatch
             return [SimpleNamespace(workflow_id=one, status="SUCCESS" if one in ended else "PENDING", error=None)
                     for one in workflow_ids]  # fmt: skip
 
-    look = _Look(Client(), {f"j{number}": f"a{number}" for number in range(11)})
-    assert [[address for address, _ in look.ended()] for _ in range(3)] == [["a4"], ["a9"], []]
+    awaited = _Awaited(Client(), {f"j{number}": f"a{number}" for number in range(11)})
+    assert [[address for address, _ in awaited.ended()] for _ in range(3)] == [["a4"], ["a9"], []]
     ended |= {"j0", "j10"}
-    assert sorted(address for _ in range(3) for address, _ in look.ended()) == ["a0", "a10"]
+    assert sorted(address for _ in range(3) for address, _ in awaited.ended()) == ["a0", "a10"]
 
 
 def move_by_a_day(database: str, column: str) -> None:
