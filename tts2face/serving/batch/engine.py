@@ -24,7 +24,7 @@ MAX_TRIES = 3  # of a segment whose process ended; then it counts as failed
 MIN_FREE_BYTES = 200 << 20  # below which work pauses
 PAUSE_S = 2.0  # between two looks at a full disk
 
-Message = Callable[[str], None]
+OnMessage = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class Engine(Protocol):
         """Yield each segment as soon as it is stored or has failed."""
 
 
-class Renders(Protocol):
+class SegmentRenderer(Protocol):
     """A renderer of this process, or a child process."""
 
     def render(self, segment: Segment, out: Path) -> SegmentResult:
@@ -55,7 +55,7 @@ class LocalEngine:
     """Processes of this machine; one job renders in this process."""
 
     n_jobs: int = 1
-    on_message: Message = lambda _: None
+    on_message: OnMessage = lambda _: None
 
     def render(self, segments: Mapping[str, Segment], store: Store) -> Iterator[Rendered]:
         """Yield each segment as soon as it is stored or has failed."""
@@ -109,7 +109,7 @@ def _processes(n_jobs: int) -> Iterator[list[RenderProcess]]:
             process.close()
 
 
-def render_into(store: Store, segment: Segment, renderer: Renders, on_message: Message) -> Rendered:
+def render_into(store: Store, segment: Segment, renderer: SegmentRenderer, on_message: OnMessage) -> Rendered:
     """Render a segment unless the store has it; errors become the reason.
 
     A process that ends is tried again up to `MAX_TRIES` times. A full disk and a store that cannot be reached are
@@ -162,7 +162,7 @@ def free_bytes(folder: Path) -> int:
     return shutil.disk_usage(folder).free
 
 
-def wait_for_space(folder: Path, on_message: Message) -> None:
+def wait_for_space(folder: Path, on_message: OnMessage) -> None:
     """Wait until the disk of a folder has `MIN_FREE_BYTES`, and say so."""
     is_waiting = False
     while free_bytes(folder) < MIN_FREE_BYTES:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from tts2face.serving.batch.engine import Message, Rendered
+from tts2face.serving.batch.engine import OnMessage, Rendered
 from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import Store, wait_for_store
 from tts2face.serving.work.database import database_url, prepare_database
@@ -39,7 +39,7 @@ class DatabaseEngine:
     store_url: str
     n_workers: int = 1
     priority: int = 10
-    on_message: Message = lambda _: None
+    on_message: OnMessage = lambda _: None
     on_wait: Callable[[], None] = lambda: None
 
     def render(self, segments: Mapping[str, Segment], store: Store) -> Iterator[Rendered]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from lexicon.errors import BackendError, Tts2faceError
 from tts2face.processes.parent import Child
 from tts2face.processes.program import Program
-from tts2face.serving.batch.engine import Message
+from tts2face.serving.batch.engine import OnMessage
 from tts2face.serving.work.queues import WORK
 
 WORKER = "tts2face.serving.work.worker:HANDLERS"
@@ -36,7 +36,7 @@ class LocalWorkers:
     database: str
     store_url: str
     n_workers: int = 1
-    on_message: Message = lambda _: None
+    on_message: OnMessage = lambda _: None
     niceness: int = 0
 
 

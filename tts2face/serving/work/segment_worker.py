@@ -10,7 +10,7 @@ from typing import Any
 
 from lexicon.errors import DataError, InputError, Tts2faceError
 from tts2face.processes.parent import ChildEndedError
-from tts2face.serving.batch.engine import Message, Renders, render_into
+from tts2face.serving.batch.engine import OnMessage, SegmentRenderer, render_into
 from tts2face.serving.batch.render_process import RenderProcess
 from tts2face.serving.batch.segment import Segment, SegmentResult, segment_from_json
 from tts2face.serving.batch.store import Store, wait_for_store
@@ -49,15 +49,15 @@ class SegmentWorker:
         store: Store,
         blobs: Callable[[], tuple[BlobStore, ...]],
         *,
-        renderer: Renders | None = None,
+        renderer: SegmentRenderer | None = None,
         core: int | None = None,
-        on_message: Message = lambda _: None,
+        on_message: OnMessage = lambda _: None,
     ) -> None:
         self._store = store
         self._blobs = blobs
         self._on_message = on_message
         self._process = RenderProcess(core) if renderer is None else None
-        self._renderer: Renders = renderer or self
+        self._renderer: SegmentRenderer = renderer or self
         self._rendering = threading.Lock()  # one segment at a time
         self._files: Temporary | None = None
         self._current: str | None = None

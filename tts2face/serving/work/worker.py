@@ -18,7 +18,7 @@ from typing import Any
 
 from lexicon.errors import BackendError
 from tts2face.processes.child import Call, Handler
-from tts2face.serving.batch.engine import Message, Renders
+from tts2face.serving.batch.engine import OnMessage, SegmentRenderer
 from tts2face.serving.batch.store import Store, open_store
 from tts2face.serving.work.connection import DatabaseAwayError, database_reason
 from tts2face.serving.work.database import database_url, prepare_database, quiet_dbos
@@ -70,9 +70,9 @@ class Worker:
         database: str,
         store: str,
         *,
-        renderer: Renders | None = None,
+        renderer: SegmentRenderer | None = None,
         core: int | None = None,
-        on_message: Message = lambda _: None,
+        on_message: OnMessage = lambda _: None,
     ) -> None:
         self._url = database_url(database)
         self._store: Store = open_store(store)
