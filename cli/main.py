@@ -92,7 +92,7 @@ def phones(
     """Print the words of a text and their phones, in ARPABET and IPA, with stress and syllables."""
     from lexicon.dictionary import read_dictionary
     from lexicon.spoken_words import pronounce_marked
-    from lexicon.ssml import parse_marks
+    from lexicon.text_marks import parse_marks
     from tts2face.interchange.exports.pronunciation import FORMATS
 
     pronunciation = pronounce_marked(

@@ -13,6 +13,7 @@ from lexicon import written_forms as readings
 from lexicon.dictionary import cmudict_lookup, own_pronunciation, word_set
 from lexicon.english import CAPITALISED_WORDS, is_read_by_letters
 from lexicon.form_readers import BEFORE_ROMAN, NEVER_LETTERS, RULERS, TITLES
+from lexicon.number_words import roman_value
 from lexicon.sentence_ends import abbreviations
 
 _WORD = re.compile(r"[^\W\d_]+(?:['’][^\W\d_]+)*")
@@ -234,7 +235,7 @@ def _beside_number(text: str, word: re.Match[str]) -> str:
 
 def _is_spelled(word: str, before: str, after: str) -> bool:
     """Whether a word of a passage in capitals is an initialism or a Roman numeral."""
-    is_roman = re.fullmatch("[IVXLCDM]+", word) is not None and readings.roman_value(word) > 0
+    is_roman = re.fullmatch("[IVXLCDM]+", word) is not None and roman_value(word) > 0
     if is_roman and (word in NEVER_LETTERS or before.lower() in BEFORE_ROMAN | RULERS):
         return True
     if word in _initialisms():

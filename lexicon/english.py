@@ -28,6 +28,7 @@ CAPITALISED_WORDS = word_set(
 )
 _VOICELESS_ENDINGS = frozenset({"p", "t", "k", "f", "θ"})
 _SIBILANTS = frozenset({"s", "z", "ʃ", "ʒ", "tʃ", "dʒ"})
+Lookup = Callable[[str], tuple[IpaPhone, ...] | None]
 
 
 def fold_to_arpabet(segments: tuple[IpaPhone, ...]) -> tuple[IpaPhone, ...]:
@@ -106,9 +107,6 @@ def is_initialism(word: str) -> bool:
 def _look_up_without_accents(word: str) -> tuple[IpaPhone, ...] | None:
     plain = "".join(letter for letter in unicodedata.normalize("NFD", word) if not unicodedata.combining(letter))
     return None if plain == word else own_pronunciation(plain) or cmudict_lookup(plain)
-
-
-Lookup = Callable[[str], tuple[IpaPhone, ...] | None]
 
 
 def look_up_word(word: str, *, is_letter: bool, own: Lookup) -> tuple[IpaPhone, ...] | None:

@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 from lexicon import written_forms as readings
 from lexicon.dictionary import word_set
-from lexicon.languages import language_scripts, letter_name, letter_script
+from lexicon.letter_names import letter_name
+from lexicon.number_words import cardinal_words, digit_words, number_words, ordinal_words, roman_value, year_words
+from lexicon.scripts import language_scripts, letter_script
 from lexicon.sentence_ends import MARKS, is_abbreviated, starts_sentence
-from lexicon.written_forms import cardinal_words, digit_words, number_words, ordinal_words, roman_value, year_words
 
 NEVER_LETTERS = frozenset({"II", "III", "VII", "VIII"})  # Roman numerals that abbreviate nothing
 TITLES = frozenset({"title", "doctor", "saint"})  # contexts of abbreviations before names
@@ -26,9 +27,13 @@ RULERS = word_set(
     "frederick wilhelm nicholas catherine peter alexander napoleon ramses leo gregory clement innocent urban ivan "
     "ferdinand henri boniface constantine albert margaret"
 )
-
-
 Reader = Callable[[re.Match[str], str], str]
+_BEFORE_NAME = re.compile(r" [A-Z]")
+_BEFORE_LETTER = re.compile(r" [a-z]")
+_BEFORE_NUMBER = re.compile(r" ?[0-9]")
+_NO_NAMES = word_set("The On In At And But When Dear I If As To From Near")
+_AT_END = re.compile(r"\s*$")
+_CONTEXT_AFTER = 48  # characters after a full stop that decide whether a sentence begins there
 
 
 def read_numeric_date(m: re.Match[str], _: str) -> str:
@@ -207,14 +212,6 @@ def read_roman_numeral(m: re.Match[str], previous: str) -> str:
     if value and (before in BEFORE_ROMAN or m.group() in NEVER_LETTERS):
         return cardinal_words(value)
     return m.group()
-
-
-_BEFORE_NAME = re.compile(r" [A-Z]")
-_BEFORE_LETTER = re.compile(r" [a-z]")
-_BEFORE_NUMBER = re.compile(r" ?[0-9]")
-_NO_NAMES = word_set("The On In At And But When Dear I If As To From Near")
-_AT_END = re.compile(r"\s*$")
-_CONTEXT_AFTER = 48  # characters after a full stop that decide whether a sentence begins there
 
 
 def _keep_full_stop(words: str, m: re.Match[str]) -> str:

@@ -1,30 +1,23 @@
 """Grapheme-to-phoneme conversion by espeak-ng, through phonemizer, in every language of espeak-ng.
 
 espeak-ng is a library with global state: one lock guards all calls.
-
-Convert Japanese text with Chinese characters to spoken katakana, by pyopenjtalk-plus (extra ``[japanese]``).
-
-Texts in kana alone are read by espeak-ng, which cannot read Chinese characters.
 """
 
 import functools
 import logging
-import os
 import re
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
 from lexicon.errors import BackendError, InputError
 from lexicon.ipa import IpaPhone, parse_ipa
-from lexicon.sentence_ends import split_chunks
 
 DEFAULT_LANGUAGE = "en-us"
 MAX_DATA_PATH = 150  # characters; espeak-ng cuts longer paths off (its buffer holds 160)
 _LOCK = threading.RLock()
 _LANGUAGE_SWITCH = re.compile(r"\([a-z0-9-]+\)")  # espeak-ng marks foreign words: (en)...(fr); their phones are kept
-
 # The output of espeak-ng in tone languages is partly not IPA: tones as digits and as ɜ (a "3"), retroflexes with a dot.
 # The vowel of English words among them is long: ɜː.
 _TONE_LANGUAGES = frozenset({"cmn", "hak", "yue", "vi", "th", "my", "shn"})
@@ -155,50 +148,3 @@ def segments_by_rules(words: Sequence[str], language: str) -> tuple[tuple[IpaPho
         tuple(segment for part in written for segment in parse_espeak_word(part, language))
         for written in phonemize(words, language)
     )
-
-
-_KANJI = re.compile("[㐀-䶿一-鿿豈-﫿々〆〇𠀀-𪛟]")
-_KANA = re.compile("[ァ-ヺー]+")
-_PUNCTUATION = frozenset("。、？！…，．")
-MAX_CHARACTERS = 300  # per call; the library rejects texts of about 8,000 bytes
-
-
-def has_kanji(text: str) -> bool:
-    """Whether the text contains Chinese characters."""
-    return not text.isascii() and _KANJI.search(text) is not None
-
-
-@functools.cache
-def load_reader() -> Any:
-    """The library that reads Chinese characters."""
-    os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")  # it imports onnxruntime, which would send telemetry
-    try:
-        import pyopenjtalk
-    except ImportError as missing:
-        raise BackendError(
-            "Japanese with Chinese characters needs pyopenjtalk-plus; run: pip install 'tts2face[japanese]', or write "
-            "the text in kana"
-        ) from missing
-    return pyopenjtalk
-
-
-def to_kana(text: str) -> str:
-    """Spoken form in katakana (particles wa and e, long vowels, numbers), with spaces between accent phrases.
-
-    Raises
-    ------
-    BackendError
-        The library is not installed.
-    """
-    read = load_reader().run_frontend
-    return " ".join("".join(_kana_pieces(read(chunk))).strip() for chunk in split_chunks(text, MAX_CHARACTERS, "ja"))
-
-
-def _kana_pieces(words: list[Mapping[str, Any]]) -> Iterator[str]:
-    """Pieces of a sentence; `chain_flag` 1 joins a word to the phrase before it."""
-    for number, word in enumerate(words):
-        written, spoken = str(word["string"]), str(word["pron"]).replace("’", "").replace("ヲ", "オ")
-        if not _KANA.fullmatch(spoken):
-            yield written if written in _PUNCTUATION else f" {written} " if written.isalnum() else " "
-        else:
-            yield spoken if number == 0 or word["chain_flag"] == 1 else f" {spoken}"

@@ -9,22 +9,44 @@ from dataclasses import dataclass
 from itertools import pairwise
 from types import MappingProxyType
 
+from lexicon.canonical import canonical_text
 from lexicon.dictionary import Dictionary
 from lexicon.english import fold_to_arpabet
 from lexicon.english_text import english_segments
 from lexicon.errors import InputError, SilentTextError
-from lexicon.g2p import DEFAULT_LANGUAGE, has_kanji, parse_espeak_word, phonemize, segments_by_rules, to_kana
+from lexicon.foreign_letters import name_foreign_letters
+from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word, phonemize, segments_by_rules
+from lexicon.german_dates import read_german_dates
 from lexicon.ipa import IpaPhone
-from lexicon.languages import check_script, language_code, name_foreign_letters
-from lexicon.normalize import MARKS, canonical_text, normalize, split_tokens
+from lexicon.japanese import has_kanji, to_kana
+from lexicon.languages import language_code
+from lexicon.normalize import MARKS, normalize, split_tokens
+from lexicon.number_words import MAX_CARDINAL_DIGITS
 from lexicon.phones import PHONES, ipa_to_arpabet
-from lexicon.say_as import read_german_dates
-from lexicon.written_forms import MAX_CARDINAL_DIGITS
+from lexicon.scripts import check_script
 
 # espeak-ng omits what follows the first 160 letters of a word; the longest in use have 85. From U+0900 on, scripts
 # without spaces between words begin.
 _LONG_WORD = re.compile(r"[^\W\d_\u0900-\U0010ffff]{100}(?=[^\W\d_\u0900-\U0010ffff])")
 _LONG_NUMBER = re.compile(rf"[0-9]{{{MAX_CARDINAL_DIGITS + 1},}}")
+NOTHING = "there is nothing to say in the text; add at least one word or number"
+PAUSES_S = MappingProxyType({"": 0.0, ",": 0.2, ";": 0.3, ":": 0.3, ".": 0.5, "!": 0.5, "?": 0.5})  # s, nominal
+_MARKS_BY_STRENGTH = tuple(PAUSES_S)  # of two adjacent marks the later one of this order is kept
+_PIECE = re.compile(r"[^\s.,;:!?]+|[.,;:!?]")
+# English onsets of two and three consonants (Cruttenden, Gimson's Pronunciation of English, chapter on clusters).
+_ONSET_PAIRS = MappingProxyType({
+    "ɹ": "p b t d k ɡ f θ ʃ", "l": "p b k ɡ f s", "w": "t d k ɡ θ s h", "j": "p b k ɡ f v m n h s l t d θ",
+    "p": "s", "t": "s", "k": "s", "m": "s", "n": "s", "f": "s",
+})  # fmt: skip
+ENGLISH_ONSETS = frozenset(
+    {(first, second) for second, firsts in _ONSET_PAIRS.items() for first in firsts.split()}
+    | {("s", "p", "ɹ"), ("s", "p", "l"), ("s", "p", "j"), ("s", "t", "ɹ"), ("s", "t", "j"), ("s", "k", "ɹ")}
+    | {("s", "k", "l"), ("s", "k", "w"), ("s", "k", "j")}
+)
+_SONORITY = MappingProxyType({
+    "stop": 0, "click": 0, "affricate": 0, "fricative": 1, "nasal": 2, "lateral": 3, "tap": 3, "trill": 3,
+    "approximant": 4,
+})  # fmt: skip
 
 
 def spoken_form(text: str, language: str) -> str:
@@ -47,26 +69,6 @@ def spoken_form(text: str, language: str) -> str:
         text = read_german_dates(text)
     text = _LONG_NUMBER.sub(lambda number: " ".join(number.group()), name_foreign_letters(text, language))
     return _LONG_WORD.sub(r"\g<0> ", text)
-
-
-NOTHING = "there is nothing to say in the text; add at least one word or number"
-PAUSES_S = MappingProxyType({"": 0.0, ",": 0.2, ";": 0.3, ":": 0.3, ".": 0.5, "!": 0.5, "?": 0.5})  # s, nominal
-_MARKS_BY_STRENGTH = tuple(PAUSES_S)  # of two adjacent marks the later one of this order is kept
-_PIECE = re.compile(r"[^\s.,;:!?]+|[.,;:!?]")
-# English onsets of two and three consonants (Cruttenden, Gimson's Pronunciation of English, chapter on clusters).
-_ONSET_PAIRS = MappingProxyType({
-    "ɹ": "p b t d k ɡ f θ ʃ", "l": "p b k ɡ f s", "w": "t d k ɡ θ s h", "j": "p b k ɡ f v m n h s l t d θ",
-    "p": "s", "t": "s", "k": "s", "m": "s", "n": "s", "f": "s",
-})  # fmt: skip
-ENGLISH_ONSETS = frozenset(
-    {(first, second) for second, firsts in _ONSET_PAIRS.items() for first in firsts.split()}
-    | {("s", "p", "ɹ"), ("s", "p", "l"), ("s", "p", "j"), ("s", "t", "ɹ"), ("s", "t", "j"), ("s", "k", "ɹ")}
-    | {("s", "k", "l"), ("s", "k", "w"), ("s", "k", "j")}
-)
-_SONORITY = MappingProxyType({
-    "stop": 0, "click": 0, "affricate": 0, "fricative": 1, "nasal": 2, "lateral": 3, "tap": 3, "trill": 3,
-    "approximant": 4,
-})  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

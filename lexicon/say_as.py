@@ -2,8 +2,6 @@
 
 All kinds are supported in English. In other languages, where espeak-ng reads numbers itself, only kinds that need no
 words of the language are: letters, digits, telephone and cardinal numbers.
-
-Dates of German texts: 3. Mai is dritter Mai, am 3. Mai am dritten Mai.
 """
 
 import re
@@ -11,10 +9,9 @@ from collections.abc import Callable
 from types import MappingProxyType
 
 from lexicon import written_forms as readings
-from lexicon.dictionary import word_set
 from lexicon.errors import InputError
 from lexicon.normalize import normalize
-from lexicon.written_forms import cardinal_words, digit_words, number_words, ordinal_words, roman_value
+from lexicon.number_words import cardinal_words, digit_words, number_words, ordinal_words, roman_value
 
 MAX_CHARACTERS = 300  # characters of one element
 _SIGNS = MappingProxyType({
@@ -34,6 +31,7 @@ _CURRENCY_FIRST = re.compile(r"([A-Z]{3})\s*([0-9][0-9,]*(?:\.[0-9]+)?)")
 _COMPACT = re.compile("[0-9?]{8}")
 _PARTS = re.compile(r"[0-9]+|[^\W\d_]+|\?+")
 DATE_FORMATS = ("mdy", "dmy", "ymd", "ydm", "md", "dm", "ym", "my", "y", "m", "d")
+Reader = Callable[[str, str], str]
 
 
 def say_as(kind: str, text: str, written_format: str, language: str) -> str:
@@ -194,7 +192,6 @@ def _bleep(_text: str, _: str) -> str:
     return "bleep"
 
 
-Reader = Callable[[str, str], str]
 KINDS: MappingProxyType[str, Reader] = MappingProxyType({
     "cardinal": _cardinal, "number": _cardinal, "ordinal": _ordinal, "characters": _characters,
     "spell-out": _characters, "verbatim": _characters, "digits": _digits, "date": _date, "time": _time,
@@ -224,28 +221,3 @@ _OTHER_LANGUAGES: MappingProxyType[str, Callable[[str], str]] = MappingProxyType
     "cardinal": _plain_number, "number": _plain_number, "characters": _spell, "spell-out": _spell, "verbatim": _spell,
     "digits": _spell, "telephone": _spell_groups,
 })  # fmt: skip
-
-
-_MONTH = "Januar|Jänner|Februar|März|April|Mai|Juni|Juli|August|September|Oktober|November|Dezember"
-_DATE = re.compile(rf"(?:\b(?P<before>[^\W\d_]+) )?\b(?P<day>[0-9]{{1,2}})\. ?(?=(?:{_MONTH})\b)")
-_ORDINALS = (
-    "erst", "zweit", "dritt", "viert", "fünft", "sechst", "siebt", "acht", "neunt", "zehnt", "elft", "zwölft",
-    "dreizehnt", "vierzehnt", "fünfzehnt", "sechzehnt", "siebzehnt", "achtzehnt", "neunzehnt", "zwanzigst",
-    *(f"{digit}undzwanzigst" for digit in ("ein", "zwei", "drei", "vier", "fünf", "sechs", "sieben", "acht", "neun")),
-    "dreißigst", "einunddreißigst",
-)  # fmt: skip
-_DATIVE = word_set("am vom zum dem den im beim ab bis seit des nach vor")
-
-
-def read_german_dates(text: str) -> str:
-    """The text with the days of its dates as words, in the case that the word before requires."""
-    return _DATE.sub(_read_day, text)
-
-
-def _read_day(match: "re.Match[str]") -> str:
-    day, before = int(match["day"]), match["before"]
-    if not 1 <= day <= len(_ORDINALS):
-        return match.group()
-    small = (before or "").lower()
-    ending = "en" if small in _DATIVE else "e" if small in {"der", "die", "das"} else "er"
-    return f"{before} " * bool(before) + f"{_ORDINALS[day - 1]}{ending} "

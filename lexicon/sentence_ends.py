@@ -1,7 +1,8 @@
 """Decide by tables whether a full stop ends a sentence or belongs to an abbreviation.
 
 The rules of ``sentence_ends.tsv`` state, for an abbreviation of a language (``*``: of every language without a table of
-its own), what may follow it within a sentence:
+its own), what may follow it within a sentence; an English one without a row follows its context in
+``abbreviations.tsv``:
 
 ========== ===============================================================================================
 ``never``  anything: the full stop ends no sentence (Dr. Smith)
@@ -9,21 +10,15 @@ its own), what may follow it within a sentence:
 ``start``  anything but a word that sentences begin with (Ph.D. students, but: Ph.D. She left.)
 ``unless`` one of the words of the row (5 p.m. Monday)
 ========== ===============================================================================================
-
-An English abbreviation without a row there follows its context in ``abbreviations.tsv``.
-
-Split a long text into sentences, in bounded memory.
 """
 
 import functools
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import resources
 from types import MappingProxyType
 
 from lexicon import written_forms as readings
-from lexicon.errors import InputError
 
 MARKS = frozenset(".,;:!?")  # of clauses and sentences
 _WORD = re.compile(r"""[^\s("'“‘«„\[]*\Z""")
@@ -139,105 +134,3 @@ def _unlisted_ends_sentence(word: str, after: str, *, is_english: bool, is_first
     if not is_initial and not is_dotted:
         return True
     return is_english and not is_first and starts_sentence(after)
-
-
-# A sentence ends at ., !, ? or … (with closing quotes) before a space that no lower-case letter follows, at an end mark
-# of East Asian or Indic writing, or at a blank line. A run of marks is tried once, from its first mark, and as a whole.
-_END = re.compile(r"""(?<![.!?…])[.!?…]++["'”’)\]]*+(?=\s++[^a-z])|[。！？｡।॥؟۔]+["'”’」』）]*|\n\s*\n""")
-_CLAUSE = re.compile(r"[,;:—–、，；：،؛](?=\s)|[、，；：]")
-# Words before which an English phrase may end where a sentence has no clause mark, the better places first.
-_PHRASE_BEGINS = (
-    "and but or so because which who whose where when while until unless if though although since that",
-    "about after against around at before behind between by during for from in into near on over through to under with",
-)
-_PHRASE_PLACES = tuple(re.compile(rf"(?<!\d)\s(?=(?:{words.replace(' ', '|')})\s(?!\d))") for words in _PHRASE_BEGINS)
-_BETWEEN_WORDS = re.compile(r"(?<=[^\W\d_A-Z])\s(?=[^\W\d_A-Z])")
-_MIN_PHRASE_CHARACTERS = 20  # of either part; shorter ones sound like words of their own
-_MAX_UNDIVIDED_CHARACTERS = 600  # a longer word, as of digits, is divided; addresses are shorter
-_CONTEXT_BEFORE, _CONTEXT_AFTER = 24, 40  # characters around a full stop by which an abbreviation is recognised
-
-
-def split_chunks(text: str, limit: int, language: str = "en-us") -> Iterator[str]:
-    """Sentences of a text, none longer than `limit` characters unless a single word is, of up to 600 characters.
-
-    A longer sentence is split after the last clause mark within the limit, else at the last space, and in text without
-    either (Chinese, Japanese, a longer word) after `limit` characters. Only white space is dropped. Abbreviations are
-    those of the language (`lexicon.sentence_ends`).
-
-    Raises
-    ------
-    InputError
-        `limit` is below 1.
-    """
-    if limit < 1:
-        raise InputError(f"the limit of a chunk must be at least 1 character, not {limit}; increase it")
-    begin = 0
-    for match in _END.finditer(text):
-        if _is_abbreviated(text, begin, match, language):
-            continue
-        yield from _split_sentence(text[begin : match.end()], limit)
-        begin = match.end()
-    yield from _split_sentence(text[begin:], limit)
-
-
-def split_phrase(sentence: str, limit: int) -> tuple[str, str]:
-    """First phrase of a sentence that is longer than `limit` characters, and the rest; the rest may be empty.
-
-    The phrase ends at the last clause mark within the limit, else before an English conjunction, else before a
-    preposition, else between two words; never beside a number, whose reading depends on its neighbours.
-    """
-    if len(sentence) <= limit:
-        return sentence, ""
-    last = min(limit, len(sentence) - _MIN_PHRASE_CHARACTERS)
-    clauses = (
-        at.end() for at in _CLAUSE.finditer(sentence, 0, last + 1) if not sentence[at.end() :].lstrip()[:1].isdigit()
-    )
-    others = ((at.start() for at in kind.finditer(sentence, 0, last + 1)) for kind in (*_PHRASE_PLACES, _BETWEEN_WORDS))
-    for places in (clauses, *others):
-        at = max((place for place in places if _MIN_PHRASE_CHARACTERS <= place <= last), default=0)
-        if at:
-            return sentence[:at].rstrip(), sentence[at:].lstrip()
-    return sentence, ""
-
-
-def middle_place(text: str) -> int:
-    """Index of the space that is nearest to the middle of a text; of the middle in a text without spaces."""
-    middle = len(text) // 2
-    places = [place for place in (text.rfind(" ", 0, middle), text.find(" ", middle)) if place >= 0]
-    return min(places, key=lambda place: abs(place - middle), default=middle)
-
-
-def _is_abbreviated(text: str, begin: int, end: "re.Match[str]", language: str) -> bool:
-    """Whether the full stop of a possible sentence end belongs to an abbreviation."""
-    if end.group().rstrip("\"'”’)]") != ".":
-        return False
-    before = text[max(begin, end.start() - _CONTEXT_BEFORE) : end.start()]
-    return not ends_sentence(before, text[end.end() : end.end() + _CONTEXT_AFTER].lstrip(), language)
-
-
-def _split_sentence(sentence: str, limit: int) -> Iterator[str]:
-    text, begin = " ".join(sentence.split()), 0
-    while len(text) - begin > limit:
-        end = _cut_position(text, begin, limit)
-        yield text[begin:end].rstrip()
-        begin = end + text.startswith(" ", end)
-    if begin < len(text):
-        yield text[begin:]
-
-
-def _cut_position(text: str, begin: int, limit: int) -> int:
-    """Index at which a text whose rest from `begin` is longer than the limit is split."""
-    end = begin + limit
-    clauses = [match.end() for match in _CLAUSE.finditer(text, begin + limit // 3, end)]
-    if clauses:
-        return clauses[-1]
-    space = text.rfind(" ", begin + 1, end + 1)
-    if space > 0:
-        return space
-    if not (text[end - 1].isascii() and text[end].isascii()):
-        return end
-    longest = begin + max(limit, _MAX_UNDIVIDED_CHARACTERS)
-    word_end = text.find(" ", end, longest + 1)
-    if word_end > 0:
-        return word_end
-    return len(text) if len(text) <= longest else end

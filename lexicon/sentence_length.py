@@ -4,12 +4,12 @@ import unicodedata
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 
+from lexicon.chunks import middle_place, split_chunks, split_phrase
 from lexicon.dictionary import word_key
 from lexicon.errors import InputError
 from lexicon.ipa import IpaPhone
 from lexicon.marked_text import MarkedText, PauseMark, PhoneMark, StyleRun
 from lexicon.pronounce import spoken_form
-from lexicon.sentence_ends import middle_place, split_chunks, split_phrase
 
 MAX_SENTENCE_CHARACTERS = 300  # longer sentences are split at a clause mark or a space
 # Letters of the spoken form; a sentence with more (of numbers, symbols, given phones) is divided. 65 s of English.

@@ -1,25 +1,17 @@
-"""Phones in time: labels on shared edges, which exclude gaps and overlaps.
-
-Nominal phone durations by class, for phones without sound.
-
-Rounded values of read English that give tables and TextGrids a time axis; they are not predictions. With sound, the
-durations of the voice or of an alignment are used instead.
-"""
+"""Phones in time: labels on shared edges, which exclude gaps and overlaps."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lexicon.errors import InputError
-from lexicon.phones import PHONES
-from lexicon.pronounce import Pronunciation
 from lexicon.values.fields import check_fields
 
 SILENCE = "sil"  # label of segments without speech
 DOUBTFUL = 0.5  # words below this confidence
+MIN_PHONE_S = 0.005  # shorter phones and silences cannot be resolved
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,9 +130,6 @@ def concatenate_phones(
     return PhoneSequence(phones, edges), tuple(spans)
 
 
-MIN_PHONE_S = 0.005  # shorter phones and silences cannot be resolved
-
-
 def enforce_increasing(edges: NDArray[np.float64]) -> NDArray[np.float64]:
     """Move (N + 1,) edges so that successive ones differ by at least `MIN_PHONE_S`; the first and last are fixed.
 
@@ -156,28 +145,3 @@ def enforce_increasing(edges: NDArray[np.float64]) -> NDArray[np.float64]:
     moved: NDArray[np.float64] = slack + room
     moved[0], moved[-1] = first, last
     return moved
-
-
-NOMINAL_S = MappingProxyType({
-    "vowel": 0.09, "diphthong": 0.14, "stop": 0.07, "affricate": 0.11, "fricative": 0.09, "nasal": 0.07,
-    "approximant": 0.06, "lateral": 0.06, "tap": 0.03, "trill": 0.07, "click": 0.08,
-})  # fmt: skip
-STRESS_FACTOR = 1.3  # stressed vowels are longer by this factor
-LEADING_SILENCE_S = 0.1  # s of silence before the first word and, at least, after the last
-
-
-def nominal_phones(pronunciation: Pronunciation) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
-    """Phones, with a silence at each punctuation mark, and words as ranges of phones."""
-    phones, edges = [SILENCE], [0.0, LEADING_SILENCE_S]
-    spans = []
-    for word in pronunciation.words:
-        first = len(phones)
-        for phone, stress in zip(word.phones, word.stress, strict=True):
-            phones.append(phone)
-            edges.append(round(edges[-1] + NOMINAL_S[PHONES[phone].kind] * (STRESS_FACTOR if stress else 1.0), 6))
-        spans.append(WordSpan(word.text, first, len(phones)))
-        pause = max(word.pause_s, LEADING_SILENCE_S if word is pronunciation.words[-1] else 0.0)
-        if pause:
-            phones.append(SILENCE)
-            edges.append(round(edges[-1] + pause, 6))
-    return PhoneSequence(phones, edges), tuple(spans)

@@ -7,19 +7,25 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
+from lexicon.chunks import split_chunks
 from lexicon.dictionary import Dictionary
 from lexicon.errors import InputError, SilentTextError
 from lexicon.foreign_words import make_readable
 from lexicon.g2p import DEFAULT_LANGUAGE
+from lexicon.given_phones import pronounce_words
 from lexicon.languages import language_code
 from lexicon.marked_text import MarkedText
 from lexicon.normalize import split_tokens
 from lexicon.pronounce import NOTHING, Pronunciation, Word, pronounce
-from lexicon.sentence_ends import split_chunks
 from lexicon.sentence_length import MAX_SENTENCE_CHARACTERS, n_letters
-from lexicon.sentences import Phrase, pronounce_words, split_sentences
-from lexicon.ssml import parse_marks
+from lexicon.sentences import Phrase, split_sentences
+from lexicon.text_marks import parse_marks
 from lexicon.values.files import LARGEST_TEXT_BYTES
+
+_MAY_END = re.compile(r"[.!?…。！？｡।॥؟۔\n]|.{300}", re.DOTALL)
+_OPEN_MARK = re.compile(r"\[[^\]\[]{0,200}\Z|<[^<>]{0,1000}\Z")  # a mark or tag that is not yet complete
+_MAX_OPEN_CHARACTERS = 1001
+_SPACES = re.compile(r"\s{2,}")
 
 
 def pronounce_marked(
@@ -68,12 +74,6 @@ def _with_sources(words: Sequence[Word], written: str, language: str) -> tuple[W
     if len(sources) != len(words):
         return tuple(words)
     return tuple(replace(word, source=source) for word, source in zip(words, sources, strict=True))
-
-
-_MAY_END = re.compile(r"[.!?…。！？｡।॥؟۔\n]|.{300}", re.DOTALL)
-_OPEN_MARK = re.compile(r"\[[^\]\[]{0,200}\Z|<[^<>]{0,1000}\Z")  # a mark or tag that is not yet complete
-_MAX_OPEN_CHARACTERS = 1001
-_SPACES = re.compile(r"\s{2,}")
 
 
 class GrowingText:

@@ -12,15 +12,6 @@
 ``voice lang``          another voice (``name``, ``gender``, ``language``), another language (``xml:lang``)
 ``express-as``          ``style`` of the gestures, as ``[style:...]``; also ``mstts:express-as``
 ======================= ==============================================================================================
-
-The parser is expat; a document type declaration is refused, and without one there are no entities to expand or fetch.
-Attributes have at most `lexicon.ssml_values.MAX_ATTRIBUTE_CHARACTERS` characters, so that parsing is linear in the
-length of the document.
-
-Parse the marks in a text: ``[pause 0.4]``, ``[nod]``, ``[style:delighted] ... [/style]``,
-``[phoneme:təˈmɑtoʊ]tomato[/phoneme]``, or SSML.
-
-Any other bracket is text.
 """
 
 import re
@@ -71,6 +62,8 @@ def parse_ssml(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:
     language
         Language of the text, where no element sets another.
     """
+    # The parser is expat; a document type declaration is refused, and without one there are no entities to expand or
+    # fetch. Attributes are short (`MAX_ATTRIBUTE_CHARACTERS`), so that parsing is linear in the length of the document.
     reader = _SsmlReader(language)
     try:
         return reader.read(text)
@@ -271,72 +264,3 @@ def _add_phonemes(builder: MarkedTextBuilder, text: str, phones: str, alphabet: 
         begin = builder.at + (number > 0)
         builder.add_mark(PhoneMark(begin, begin + len(word), segments))
         builder.add_text(f" {word}" if number else word)
-
-
-# A bracket, one of the words, and the rest up to the closing bracket, which a mark must have; words with phones up to
-# their end. Each part ends where the next begins, so that the scan is linear.
-MARK_PATTERN = re.compile(
-    r"\[phoneme:(?P<phones>[^\[\]]*)\](?P<words>[^\[\]]*)\[/phoneme\]"
-    r"|\[(?P<name>/?(?:style|nod|pause)\b|phoneme(?=:)|/phoneme(?=\]))(?P<rest>[^\[\]]*)(?P<end>\]?)"
-)
-MAX_QUOTED_CHARACTERS = 40
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
-
-
-def parse_marks(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:
-    """Separate a text from its marks; a text that begins with ``<speak`` is parsed as SSML (`lexicon.ssml`).
-
-    Parameters
-    ----------
-    language
-        Language of the text, by which SSML reads numbers and selects voices.
-
-    Raises
-    ------
-    InputError
-        A mark is malformed, not closed, unmatched, nested too deep, or has a number out of range; the message names it
-        and its syntax.
-    """
-    if is_ssml(text):
-        return parse_ssml(text, language)
-    builder = MarkedTextBuilder()
-    at = 0
-    for match in MARK_PATTERN.finditer(text):
-        builder.add_text(text[at : match.start()])
-        at = match.end()
-        _read_mark(builder, match)
-    builder.add_text(text[at:])
-    return builder.build()
-
-
-def _read_mark(builder: MarkedTextBuilder, match: "re.Match[str]") -> None:
-    shown = " ".join(match.group()[:MAX_QUOTED_CHARACTERS].split())
-    if match["name"] is None:
-        return _add_phonemes(builder, match["words"], match["phones"], "ipa")
-    name, rest = match["name"], match["rest"].strip()
-    if not match["end"]:
-        raise InputError(f"the mark {shown!r} has no closing bracket; write {_mark_syntax(name)}")
-    if name == "pause":
-        builder.add_mark(PauseMark(builder.at, _parse_number(rest.removesuffix("s").rstrip(), shown, name)))
-    elif name == "nod":
-        builder.add_mark(NodMark(builder.at, _parse_number(rest, shown, name) if rest else 1.0))
-    elif name == "style" and rest[:1] == ":" and rest[1:].strip():
-        builder.open("style", shown, style=rest[1:].strip())
-    elif name == "/style" and not rest:
-        builder.close("style", shown)
-    else:
-        raise InputError(f"cannot read the mark {shown}; write {_mark_syntax(name)}")
-    return None
-
-
-def _parse_number(written: str, shown: str, name: str) -> float:
-    if not _NUMBER.fullmatch(written):
-        raise InputError(f"cannot read the mark {shown}; write {_mark_syntax(name)}")
-    return float(written)
-
-
-def _mark_syntax(name: str) -> str:
-    forms = {"pause": "[pause 0.4], in seconds", "nod": "[nod], or [nod 0.5] for a small one"}
-    forms |= dict.fromkeys(("phoneme", "/phoneme"), "[phoneme:IPA]word[/phoneme]")
-    syntax = forms.get(name, "[style:NAME] ... [/style]")
-    return f"{syntax}, or use round brackets around words to be spoken"

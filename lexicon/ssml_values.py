@@ -24,6 +24,17 @@ NAMED_RATES = MappingProxyType({"x-slow": 0.5, "slow": 0.75, "medium": 1.0, "def
 NAMED_VOLUMES = MappingProxyType(
     {"silent": 0.0, "x-soft": 0.35, "soft": 0.6, "medium": 1.0, "default": 1.0, "loud": 1.4, "x-loud": 2.0}
 )
+ALPHABETS: Mapping[str, Callable[[str], tuple[IpaPhone, ...]]] = MappingProxyType({
+    "ipa": parse_ipa, "x-arpabet": arpabet_segments, "arpabet": arpabet_segments, "x-cmu": arpabet_segments,
+})  # fmt: skip
+# Voices that a document may name, as in tts2face.sound; Piper voices are files, which a document cannot open.
+VOICES = ("heart", "joe", "espeak", "espeak-female")
+_ENGLISH_VOICES = frozenset({"heart", "joe"})
+GENDERS = ("female", "male", "neutral")
+MAX_PHONES_CHARACTERS = 500  # characters of ``ph``
+MAX_WORD_CHARACTERS = 60  # characters of a word with given phones
+_NO_WORD = re.compile(r"[^\w'’-]+")
+PhonemeWord = tuple[str, tuple[IpaPhone, ...]]
 
 
 def primary_subtag(tag: str) -> str:
@@ -76,20 +87,6 @@ def parse_volume(written: str) -> float:
             f"cannot read the volume {written[:40]!r}; use decibels such as +6dB, or one of {', '.join(NAMED_VOLUMES)}"
         )
     return NAMED_VOLUMES[written.strip()]
-
-
-ALPHABETS: Mapping[str, Callable[[str], tuple[IpaPhone, ...]]] = MappingProxyType({
-    "ipa": parse_ipa, "x-arpabet": arpabet_segments, "arpabet": arpabet_segments, "x-cmu": arpabet_segments,
-})  # fmt: skip
-# Voices that a document may name, as in tts2face.sound; Piper voices are files, which a document cannot open.
-VOICES = ("heart", "joe", "espeak", "espeak-female")
-_ENGLISH_VOICES = frozenset({"heart", "joe"})
-GENDERS = ("female", "male", "neutral")
-MAX_PHONES_CHARACTERS = 500  # characters of ``ph``
-MAX_WORD_CHARACTERS = 60  # characters of a word with given phones
-_NO_WORD = re.compile(r"[^\w'’-]+")
-
-PhonemeWord = tuple[str, tuple[IpaPhone, ...]]
 
 
 def phoneme_words(text: str, written: str, alphabet: str) -> list[PhonemeWord]:

@@ -6,7 +6,7 @@ from functools import cache
 from types import MappingProxyType
 
 from lexicon.g2p import DEFAULT_LANGUAGE
-from lexicon.languages import letter_script
+from lexicon.scripts import letter_script
 from lexicon.written_forms import read_table
 
 READ_CHARACTERS = 2000  # of a text, which name its language well enough

@@ -21,10 +21,10 @@ from pathlib import Path
 import numpy as np
 
 from corpus_tools.prompts.coverage import Coverage, RunningText, Units, count_units, select_sentences, sentence_units
+from lexicon.chunks import split_chunks
 from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE, check_language
-from lexicon.sentence_ends import split_chunks
 from lexicon.values.files import read_text
 from tts2face.storage.files import write_atomically
 

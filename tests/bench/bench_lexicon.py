@@ -6,7 +6,7 @@ from collections.abc import Callable
 from lexicon.normalize import normalize
 from lexicon.pronounce import pronounce
 from lexicon.sentences import split_sentences
-from lexicon.ssml import parse_marks
+from lexicon.text_marks import parse_marks
 
 SENTENCE = (
     "We met Dr. Smith on March 3, 2024 at 10:30 pm in St. Paul; it cost $5.20 (about 5%), see www.example.com. "

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from lexicon.dictionary import read_dictionary
-from lexicon.ssml import parse_marks
+from lexicon.text_marks import parse_marks
 from tests.docs.blocks import DOCS, code_blocks
 from tts2face.gestures.timeline import parse_style
 from tts2face.gestures.timeline_file import parse_timeline

@@ -8,7 +8,7 @@ from lexicon.capitals import is_in_capitals, sentence_case
 from lexicon.pronounce import pronounce
 from lexicon.sentences import split_sentences
 from lexicon.spoken_words import GrowingText, pronounce_marked
-from lexicon.ssml import parse_marks
+from lexicon.text_marks import parse_marks
 
 
 def phones(text: str) -> list[tuple[str, ...]]:

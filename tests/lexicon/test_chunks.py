@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lexicon.chunks import split_chunks
 from lexicon.errors import InputError
-from lexicon.sentence_ends import split_chunks
 
 
 @pytest.mark.parametrize(

@@ -2,10 +2,10 @@
 
 import pytest
 
-from lexicon.sentence_ends import split_phrase
+from lexicon.chunks import split_phrase
 from lexicon.sentence_length import FIRST_PIECE_CHARACTERS
 from lexicon.sentences import split_sentences
-from lexicon.ssml import parse_marks
+from lexicon.text_marks import parse_marks
 
 HOUSE = "the garden behind the old house near the river had been green for years"
 

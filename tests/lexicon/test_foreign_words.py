@@ -9,10 +9,10 @@ from lexicon import foreign_words
 from lexicon.errors import BackendError
 from lexicon.foreign_words import letter_names, make_readable
 from lexicon.g2p import languages
-from lexicon.languages import check_readable
 from lexicon.marked_text import NodMark, PauseMark
-from lexicon.ssml import parse_marks
+from lexicon.scripts import check_readable
 from lexicon.text_language import LANGUAGE_OF_SCRIPT
+from lexicon.text_marks import parse_marks
 
 
 def runs_of(text: str, language: str = "en-us") -> list[tuple[str, str | None]]:

@@ -12,7 +12,7 @@ from lexicon.foreign_words import make_readable
 from lexicon.pronounce import pronounce
 from lexicon.sentences import split_sentences
 from lexicon.spoken_words import pronounce_marked
-from lexicon.ssml import parse_marks
+from lexicon.text_marks import parse_marks
 from tts2face.session.speech import phrase_content
 from tts2face.sound.heart import PHONE_OF_LETTER, voice_phones, word_letters
 from tts2face.sound.voice import pronounce_content

@@ -6,7 +6,7 @@ import pytest
 
 from lexicon.errors import InputError
 from lexicon.g2p import check_language, languages, parse_espeak_word, phonemize
-from lexicon.languages import check_script
+from lexicon.scripts import check_script
 
 SENTENCES = {
     "en-us": ["The quick brown fox jumps over the lazy dog.", "Thirty bird girls ordered boring little buttons."],

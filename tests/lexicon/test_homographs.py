@@ -12,8 +12,8 @@ import pytest
 
 from lexicon import part_of_speech
 from lexicon.dictionary import parse_dictionary
-from lexicon.english_text import homograph_segments, is_homograph
 from lexicon.errors import BackendError, DataError
+from lexicon.homographs import homograph_segments, is_homograph
 from lexicon.part_of_speech import tag_words
 from lexicon.pronounce import pronounce
 

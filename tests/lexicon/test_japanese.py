@@ -5,10 +5,10 @@ import sys
 
 import pytest
 
-from lexicon import g2p
+from lexicon import japanese
 from lexicon.errors import BackendError
-from lexicon.languages import check_script
 from lexicon.pronounce import pronounce
+from lexicon.scripts import check_script
 from tests.lexicon.japanese_readings import READINGS
 from tts2face.sound.voice_pool import load_voice
 
@@ -16,7 +16,7 @@ JAPANESE = pytest.mark.needs("pyopenjtalk")
 
 
 def reading(text: str) -> str:
-    return re.sub(r"[\s、。？！]", "", g2p.to_kana(text))
+    return re.sub(r"[\s、。？！]", "", japanese.to_kana(text))
 
 
 @JAPANESE
@@ -29,7 +29,7 @@ def test_most_sentences_are_read_as_a_person_reads_them() -> None:
 
 @JAPANESE
 def test_phrases_are_separated_and_punctuation_is_kept() -> None:
-    assert g2p.to_kana("今日は、東京へ行きます。") == "キョーワ、 トーキョーエ イキマス。"
+    assert japanese.to_kana("今日は、東京へ行きます。") == "キョーワ、 トーキョーエ イキマス。"
 
 
 @JAPANESE
@@ -38,7 +38,7 @@ def test_long_texts_are_read_piece_by_piece() -> None:
 
 
 def test_texts_in_kana_are_passed_to_espeak_unchanged() -> None:
-    assert not g2p.has_kanji("こんにちは、カタカナ。 abc 3")
+    assert not japanese.has_kanji("こんにちは、カタカナ。 abc 3")
     assert pronounce("きょうは", "ja").words[0].text == "きょうは"
 
 
@@ -52,8 +52,8 @@ def test_the_voice_pronounces_the_reading() -> None:
 
 def test_without_the_library_the_message_names_the_installation_command(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyopenjtalk", None)
-    g2p.load_reader.cache_clear()
+    japanese.load_reader.cache_clear()
     check_script("こんにちは", "ja")
     with pytest.raises(BackendError, match=r"pip install 'tts2face\[japanese\]', or write the text in kana"):
         check_script("今日は", "ja")
-    g2p.load_reader.cache_clear()
+    japanese.load_reader.cache_clear()

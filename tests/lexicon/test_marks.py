@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from lexicon.errors import InputError
 from lexicon.marked_text import MAX_NESTING, MarkedText, NameMark, NodMark, PauseMark, StyleRun
-from lexicon.ssml import parse_marks
+from lexicon.text_marks import parse_marks
 
 PLAIN = st.text(st.characters(blacklist_characters="[]<"))
 

@@ -5,7 +5,8 @@ import itertools
 import pytest
 
 from lexicon.errors import DataError, InputError
-from lexicon.phones import (  # fmt: skip
+from lexicon.phone_table import read_phones
+from lexicon.phones import (
     ARPABET,
     PHONES,
     arpabet_to_ipa,
@@ -13,7 +14,6 @@ from lexicon.phones import (  # fmt: skip
     look_up_phone,
     nearest_phones,
     phone_distance,
-    read_phones,
     vowel_symbols,
 )
 from lexicon.sequence import SILENCE

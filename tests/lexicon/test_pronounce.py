@@ -5,9 +5,10 @@ import pytest
 from lexicon.dictionary import parse_dictionary
 from lexicon.errors import InputError
 from lexicon.ipa import parse_ipa
+from lexicon.nominal_durations import nominal_phones
 from lexicon.phones import ARPABET, PHONES
 from lexicon.pronounce import pronounce, split_syllables
-from lexicon.sequence import SILENCE, nominal_phones
+from lexicon.sequence import SILENCE
 
 
 def _arpabet(text: str) -> list[str]:

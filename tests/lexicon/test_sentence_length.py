@@ -6,15 +6,16 @@ from itertools import islice
 
 import pytest
 
+from lexicon.chunks import split_chunks
 from lexicon.dictionary import parse_dictionary
 from lexicon.errors import InputError
 from lexicon.g2p import segments_by_rules
 from lexicon.marked_text import PauseMark
 from lexicon.pronounce import spoken_form
-from lexicon.sentence_ends import split_chunks
 from lexicon.sentence_length import FIRST_SPOKEN_LETTERS, LETTERS_PER_S, MAX_SPOKEN_LETTERS, check_silence
 from lexicon.sentences import Sentence, split_sentences
-from lexicon.ssml import parse_marks, parse_ssml
+from lexicon.ssml import parse_ssml
+from lexicon.text_marks import parse_marks
 
 chance = random.Random(1)
 DIGITS = "".join(chance.choices("123456789", k=5000))

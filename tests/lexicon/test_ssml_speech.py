@@ -9,14 +9,16 @@ from hypothesis import strategies as st
 
 from lexicon.dictionary import arpabet_segments, parse_dictionary
 from lexicon.errors import InputError
+from lexicon.given_phones import words_with_given_phones
 from lexicon.ipa import parse_ipa
-from lexicon.languages import check_readable, language_code
+from lexicon.languages import language_code
 from lexicon.marked_text import MarkedText, PhoneMark, StyleRun
 from lexicon.say_as import KINDS, say_as
-from lexicon.sentences import split_sentences, words_with_given_phones
+from lexicon.scripts import check_readable
+from lexicon.sentences import split_sentences
 from lexicon.spoken_words import pronounce_marked
-from lexicon.ssml import parse_marks
 from lexicon.ssml_values import MAX_ATTRIBUTE_CHARACTERS, VOICES
+from lexicon.text_marks import parse_marks
 from tts2face.sound.voice_pool import SHIPPED_VOICES
 
 

@@ -12,7 +12,7 @@ from lexicon.errors import InputError
 from lexicon.marked_text import MAX_PAUSE_S, NodMark
 from lexicon.sentences import Sentence, index_by_letters, split_sentences
 from lexicon.sequence import SILENCE
-from lexicon.ssml import parse_marks
+from lexicon.text_marks import parse_marks
 from tests.world import LEAD_S, LEVEL, PHONE_S, RATE_HZ, TRAIL_S, LetterVoice
 from tts2face.gestures.elements import Nod, StyleSpan
 from tts2face.request import Request

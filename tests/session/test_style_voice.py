@@ -3,7 +3,7 @@
 import pytest
 
 from lexicon.sentences import Sentence, split_sentences
-from lexicon.ssml import parse_marks
+from lexicon.text_marks import parse_marks
 from tests.world import World
 from tts2face.models.palette import PLAIN, Delivery, load_palette
 from tts2face.models.palette_editing import StyleMix, add_derivation, mix_styles

@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.normalize import canonical_text
+from lexicon.canonical import canonical_text
 from lexicon.pronounce import spoken_form
 from lexicon.sentence_length import n_letters
 from lexicon.sentences import text_prefix

@@ -10,10 +10,10 @@ from lexicon.dictionary import read_dictionary
 from lexicon.errors import InputError
 from lexicon.foreign_words import make_readable
 from lexicon.ipa import IpaPhone
-from lexicon.languages import check_readable
 from lexicon.marked_text import MarkedText
+from lexicon.scripts import check_readable
 from lexicon.sentences import Sentence, split_sentences
-from lexicon.ssml import parse_marks
+from lexicon.text_marks import parse_marks
 from lexicon.values.files import is_file
 from tts2face.gestures.timeline import Timeline
 from tts2face.lips.options import METHOD_OPTIONS, ExcludedToken, SynthesisOptions

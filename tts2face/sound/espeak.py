@@ -20,11 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, SilentTextError
-from lexicon.g2p import DEFAULT_LANGUAGE, has_kanji, parse_espeak_word, to_kana
+from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word
 from lexicon.ipa import IpaPhone
-from lexicon.languages import check_script, language_code
+from lexicon.japanese import has_kanji, to_kana
+from lexicon.languages import language_code
 from lexicon.phones import PHONES, nearest_phones, phone_distance
 from lexicon.pronounce import Word
+from lexicon.scripts import check_script
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan, enforce_increasing
 from tts2face.sound.voice import (
     PronunciationMap,

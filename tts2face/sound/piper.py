@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 from lexicon.errors import BackendError, DataError, InputError, SilentTextError
 from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word, phonemize
 from lexicon.ipa import IpaPhone
-from lexicon.languages import check_script, language_code
+from lexicon.languages import language_code
+from lexicon.nominal_durations import NOMINAL_S
 from lexicon.phones import PHONES, nearest_phones
 from lexicon.pronounce import Word
-from lexicon.sequence import NOMINAL_S, PhoneSequence, WordSpan
+from lexicon.scripts import check_script
+from lexicon.sequence import PhoneSequence, WordSpan
 from lexicon.values.json_text import read_json
 from tts2face.numeric.kernels import disable_telemetry
 from tts2face.sound.alignment import Align, Aligner

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.dictionary import Dictionary, cmudict_lookup
-from lexicon.english_text import weak_forms
 from lexicon.errors import DataError, InputError
 from lexicon.foreign_words import make_readable
+from lexicon.function_words import weak_forms
 from lexicon.marked_text import MarkedText
 from lexicon.pronounce import Word, pronounce
 from lexicon.sequence import PhoneSequence, WordSpan

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.dictionary import Dictionary
+from lexicon.given_phones import TextWord, pronounce_words
 from lexicon.ipa import IpaPhone
 from lexicon.phones import PHONES
 from lexicon.pronounce import Word, pronounce
-from lexicon.sentences import TextWord, pronounce_words
 from tts2face.types import Speech, Waveform
 
 if TYPE_CHECKING:

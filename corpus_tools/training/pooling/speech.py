@@ -17,9 +17,10 @@ from corpus_tools.training.pooling.lip_alignment import LipSpeech, align_phones,
 from corpus_tools.training.pooling.lip_tracks import LipTrack, parameter_features
 from lexicon.dictionary import cmudict_words, word_set
 from lexicon.errors import InputError
+from lexicon.nominal_durations import nominal_phones
 from lexicon.phones import ARPABET
 from lexicon.pronounce import pronounce
-from lexicon.sequence import SILENCE, PhoneSequence, nominal_phones
+from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.lips.explanation import speech_frames
 from tts2face.lips.tokens import build_targets, target_phones
 from tts2face.models.networks import PhoneNetwork

@@ -10,8 +10,9 @@ import pytest
 from parselmouth.praat import call
 
 from lexicon.errors import InputError
+from lexicon.nominal_durations import nominal_phones
 from lexicon.pronounce import pronounce
-from lexicon.sequence import PhoneSequence, WordSpan, nominal_phones
+from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.interchange.exports.pronunciation import FORMATS, NOMINAL_NOTE
 from tts2face.interchange.exports.textgrid import textgrid
 

@@ -6,16 +6,16 @@ from contextlib import suppress
 
 import pytest
 
+from lexicon.chunks import split_chunks, split_phrase
 from lexicon.dictionary import parse_dictionary, word_set
 from lexicon.errors import DataError, InputError
 from lexicon.ipa import parse_ipa
-from lexicon.languages import check_script
 from lexicon.normalize import normalize
 from lexicon.pronounce import pronounce
-from lexicon.sentence_ends import split_chunks, split_phrase
+from lexicon.scripts import check_script
 from lexicon.sentences import split_sentences
 from lexicon.spoken_words import GrowingText
-from lexicon.ssml import parse_marks
+from lexicon.text_marks import parse_marks
 from tts2face.interchange.subtitles.cues import spoken_text
 
 UNITS = (

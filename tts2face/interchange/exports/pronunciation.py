@@ -48,7 +48,7 @@ def pronunciation_json(pronunciation: "Pronunciation") -> str:
 
 def pronunciation_textgrid(pronunciation: "Pronunciation") -> str:
     """TextGrid with nominal durations, for a text without synthesised speech, and a tier that states this."""
-    from lexicon.sequence import nominal_phones
+    from lexicon.nominal_durations import nominal_phones
 
     phones, words = nominal_phones(pronunciation)
     return textgrid(phones, words, note=NOMINAL_NOTE)

@@ -78,7 +78,7 @@ def _timed_event(timed: "Piece") -> Event:
 def pronounce(_: "Session", work: Work, __: Inputs) -> Iterator[Event]:
     """One event with the words of a text in IPA."""
     from lexicon.spoken_words import pronounce_marked
-    from lexicon.ssml import parse_marks
+    from lexicon.text_marks import parse_marks
 
     text, language = str(work.request["text"]), str(work.request["language"])
     yield Event(

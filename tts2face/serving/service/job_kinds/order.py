@@ -19,7 +19,7 @@ from starlette.datastructures import UploadFile
 
 from lexicon.errors import InputError
 from lexicon.sentence_length import marked_silence_s
-from lexicon.ssml import parse_marks
+from lexicon.text_marks import parse_marks
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.state import ServiceState

@@ -1,0 +1,114 @@
+"""Words with phones given in the text (``<phoneme>``), within the normalised text."""
+
+import re
+import string
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+from lexicon.dictionary import Dictionary
+from lexicon.errors import InputError
+from lexicon.ipa import IpaPhone
+from lexicon.marked_text import PhoneMark
+from lexicon.pronounce import Word, pronounce, spoken_form
+from lexicon.sentence_ends import MARKS
+
+_STEM = "qzx"  # of the placeholders of given words during normalisation; not a word of any language
+
+
+@dataclass(frozen=True, slots=True)
+class TextWord:
+    """A normalised word, the phones given for it (or none), and the punctuation after it."""
+
+    text: str
+    segments: tuple[IpaPhone, ...] = ()
+    after: str = ""
+
+
+def words_with_given_phones(written: str, phones: Sequence[PhoneMark], language: str) -> tuple[TextWord, ...]:
+    """The normalised words of a text, some with given phones.
+
+    Parameters
+    ----------
+    phones
+        Their places are characters of `written`; in order, none within another.
+    """
+    names = _placeholders(written, len(phones))
+    placeholder = re.compile(rf"{_placeholder_stem(written)}[a-z]+")
+    spoken = spoken_form(_insert_placeholders(written, phones, names), language).split()
+    marks = dict(zip(names, phones, strict=True))
+    words: list[TextWord] = []
+    for word in spoken:
+        match = placeholder.search(word.lower())
+        mark = marks.pop(match.group(), None) if match else None
+        if match is None or mark is None:
+            words.append(TextWord(word))
+        else:
+            after = "".join(character for character in word[match.end() :] if character in MARKS)
+            words.append(TextWord(written[mark.at : mark.end], mark.segments, after))
+    if marks:
+        mark = next(iter(marks.values()))
+        raise InputError(
+            f"the phones of {written[mark.at : mark.end]!r} are given, but it is part of a number or an address; "
+            "put spaces around it"
+        )
+    return tuple(words)
+
+
+def pronounce_words(words: Sequence[TextWord], language: str, dictionary: Dictionary | None = None) -> tuple[Word, ...]:
+    """Pronounced words of a text, of which some have given phones.
+
+    Raises
+    ------
+    InputError, BackendError
+        As `lexicon.pronounce.pronounce`.
+    """
+    written = " ".join(word.text for word in words)
+    given = [word for word in words if word.segments]
+    names = iter(_placeholders(written, len(given)))
+    by_name = {next(names): word for word in given}
+    named = iter(by_name)
+    pieces = [_as_capitalised(next(named), word.text) if word.segments else word.text for word in words]
+    text = " ".join(piece + word.after for piece, word in zip(pieces, words, strict=True))
+    known = dict(dictionary.entries) if dictionary else {}
+    known |= {name: word.segments for name, word in by_name.items()}
+    spoken = pronounce(text, language, Dictionary(MappingProxyType(known))).words
+    return tuple(_restore_spelling(word, {name: given.text for name, given in by_name.items()}) for word in spoken)
+
+
+def _restore_spelling(word: Word, written: dict[str, str]) -> Word:
+    name = written.get(word.text.lower())
+    return word if name is None else replace(word, text=name, source=name)
+
+
+def _as_capitalised(name: str, spelling: str) -> str:
+    return name.capitalize() if spelling[:1].isupper() else name
+
+
+def _placeholder_stem(written: str) -> str:
+    stem, lower = _STEM, written.lower()
+    while stem in lower:
+        stem += "qx"
+    return stem
+
+
+def _placeholders(written: str, n: int) -> list[str]:
+    """Words that do not occur in a text; of letters only, so that normalisation does not change them."""
+    stem, letters = _placeholder_stem(written), string.ascii_lowercase
+    return [
+        stem + letters[k // 676 % 26] + letters[k // 26 % 26] + letters[k % 26] + "q" * (k // 17576) for k in range(n)
+    ]
+
+
+def _insert_placeholders(written: str, phones: Sequence[PhoneMark], names: Sequence[str]) -> str:
+    return "".join(_pieces_of_phones(written, phones, names))
+
+
+def _pieces_of_phones(written: str, phones: Sequence[PhoneMark], names: Sequence[str]) -> Iterator[str]:
+    at = 0
+    for mark, name in zip(phones, names, strict=True):
+        before = written[at : mark.at]
+        placeholder = _as_capitalised(name, written[mark.at : mark.at + 1])
+        yield before + " " * before[-1:].isalnum() + placeholder + " " * written[mark.end : mark.end + 1].isalnum()
+        at = mark.end
+    yield written[at:]
