@@ -266,7 +266,7 @@ def audio_maps(  # noqa: PLR0913 - one parameter a flag
     refuse_overwriting({"--out": out}, {"the recordings": recordings, "--talker": talker, "--model": model})
     from corpus_tools.build_talker import add_audio_maps
     from corpus_tools.run_options import RunOptions, ignore_stage
-    from tts2face.models.talker import load_talker
+    from tts2face.models.talker_file import load_talker
 
     with stage_bar() as stages:
         run_options = RunOptions(cache, jobs, model)
@@ -281,7 +281,7 @@ def audio_maps(  # noqa: PLR0913 - one parameter a flag
 def show(talker: TalkerName, /) -> None:
     """Print the contents of a talker: utterances, phones, modes, provenance."""
     from corpus_tools.describe_talker import describe
-    from tts2face.models.talker import load_talker
+    from tts2face.models.talker_file import load_talker
 
     print(describe(load_talker(talker)).text())  # noqa: T201 - the result
 

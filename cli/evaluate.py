@@ -308,7 +308,7 @@ def run_learning_curve(
     from corpus_tools.studies.pages import report_writer
     from corpus_tools.training.adapt_talker import Base
     from corpus_tools.training.choose_adaptation import NO_BASE
-    from tts2face.models.talker import load_talker
+    from tts2face.models.talker_file import load_talker
     from tts2face.storage.files import write_atomically
 
     amounts_s = DEFAULT_AMOUNTS_S if amounts == AUTOMATIC else _parse_seconds(amounts)
@@ -358,7 +358,7 @@ def run_people_evaluation(talker: str, people: list[Path], comparison: Compariso
     from corpus_tools.studies.evaluation.person_tracks import read_person
     from corpus_tools.studies.evaluation.tracks import read_tracks
     from corpus_tools.training.train_talker import correct_pose
-    from tts2face.models.talker import load_talker
+    from tts2face.models.talker_file import load_talker
 
     tests = [correct_pose(read_person(folder)) for folder in people]
     external = read_tracks(comparison.tracks) if comparison.tracks is not None else None

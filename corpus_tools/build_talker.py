@@ -32,7 +32,8 @@ from corpus_tools.training.pooling.speech import base_speech
 from corpus_tools.training.score_map import add_score_map
 from corpus_tools.training.train_talker import correct_pose, learn_talker
 from lexicon.errors import DataError, InputError
-from tts2face.models.talker import NOT_STATED, Talker, load_talker, write_talker
+from tts2face.models.talker import NOT_STATED, Talker
+from tts2face.models.talker_file import load_talker, write_talker
 from tts2face.storage.files import write_atomically
 from tts2face.types import Progress
 from tts2face.video.blendshapes import BlendshapeReader

@@ -8,7 +8,7 @@ from corpus_tools.training.phone_network import MIN_FRAMES, add_phone_network
 from corpus_tools.training.pooling.lip_tracks import read_lip_tracks
 from corpus_tools.training.pooling.speech import align_lip_tracks
 from lexicon.errors import InputError
-from tts2face.models.talker import load_talker, write_talker
+from tts2face.models.talker_file import load_talker, write_talker
 
 STAGES = ("aligning lip tracks", "learning phone networks")
 

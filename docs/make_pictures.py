@@ -23,7 +23,7 @@ from lexicon.sequence import SILENCE
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.palette import load_palette
-from tts2face.models.talker import load_talker
+from tts2face.models.talker_file import load_talker
 from tts2face.photo.face_from_photo import face_from_photo
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import MeshRenderer, draw, mesh_renderer

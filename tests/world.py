@@ -45,7 +45,8 @@ from tts2face.models.palette import (
     read_palette,
     write_palette,
 )
-from tts2face.models.talker import ShapeModel, Talker, Utterance, read_talker, write_talker
+from tts2face.models.talker import ShapeModel, Talker, Utterance
+from tts2face.models.talker_file import read_talker, write_talker
 from tts2face.plugins import declared
 from tts2face.session.session import Session
 from tts2face.sound.voice import (

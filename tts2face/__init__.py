@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from tts2face.models.palette import Palette as Palette
     from tts2face.models.palette import load_palette as load_palette
     from tts2face.models.talker import Talker as Talker
-    from tts2face.models.talker import load_talker as load_talker
+    from tts2face.models.talker_file import load_talker as load_talker
     from tts2face.photo.face_from_photo import face_from_photo as face_from_photo
     from tts2face.picture.options import Picture as Picture
     from tts2face.request import Request as Request
@@ -172,7 +172,8 @@ _MODULES = {
     "tts2face.models.face": ("Face",),
     "tts2face.models.face_loading": ("load_face",),
     "tts2face.models.palette": ("Palette", "load_palette"),
-    "tts2face.models.talker": ("Talker", "load_talker"),
+    "tts2face.models.talker": ("Talker",),
+    "tts2face.models.talker_file": ("load_talker",),
     "tts2face.photo.face_from_photo": ("face_from_photo",),
     "tts2face.session.project": ("Project",),
     "tts2face.session.project_file": ("load_project", "save_project"),

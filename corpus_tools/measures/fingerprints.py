@@ -17,7 +17,8 @@ from corpus_tools.recordings.observation import TRACK_SUFFIX, Observation
 from corpus_tools.recordings.sound import SOUND_RATE
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.models.talker import Talker, load_talker
+from tts2face.models.talker import Talker
+from tts2face.models.talker_file import load_talker
 from tts2face.numeric.arrays import interpolate_columns
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound

@@ -27,7 +27,8 @@ from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.lips.exemplar import ExemplarModel, build_exemplar_model, speech_trajectory
 from tts2face.models.landmarks import lip_opening
-from tts2face.models.talker import ShapeModel, load_talker
+from tts2face.models.talker import ShapeModel
+from tts2face.models.talker_file import load_talker
 from tts2face.sound.features import intensity
 from tts2face.video.pose import PoseFreeLandmarks, head_angles, remove_pose
 from tts2face.video.resampling import resample_to_grid, trim_and_fill

@@ -97,7 +97,7 @@ def make_talker(making: Making) -> None:
 def add_voices_map(making: Making) -> None:
     """The audio map for live sound of any voice, in the talker that is there; a quarter of an hour."""
     from corpus_tools.shipped.training.voices_audio_map import NAME, learn_voices_map
-    from tts2face.models.talker import load_talker, write_talker
+    from tts2face.models.talker_file import load_talker, write_talker
 
     path = making.out / f"{GRID}.talker"
     talker = load_talker(str(path))

@@ -8,7 +8,8 @@ from typing import Any
 
 from corpus_tools.recordings.observation import Observation, Quality
 from lexicon.errors import InputError
-from tts2face.models.talker import Talker, load_talker
+from tts2face.models.talker import Talker
+from tts2face.models.talker_file import load_talker
 from tts2face.processes.child import Call
 from tts2face.storage.files import write_atomically
 from tts2face.types import Progress

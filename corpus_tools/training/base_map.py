@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lexicon.phones import nearest_phones, phone_features
 from lexicon.sequence import PhoneSequence
 from tts2face.models.audio_map import AudioMap
-from tts2face.models.networks import N_PLACE, PHONE_WINDOW_S, STEP_S, PhoneNetwork, window_features
+from tts2face.models.phone_network import N_PLACE, PHONE_WINDOW_S, STEP_S, PhoneNetwork, window_features
 
 N_OFFSETS = 2 * round(PHONE_WINDOW_S / STEP_S) + 1  # leading columns of `window_features`
 KERNEL_CENTRES_S = (-0.08, 0.0, 0.08)  # of the Gaussian windows through which phones are seen

@@ -18,12 +18,14 @@ from tts2face.face.deformation import landmark_motion, landmark_positions, scatt
 from tts2face.face.mouth import SPEECH_SHAPE_PREFIXES
 from tts2face.lips.retargeting import build_retargeter
 from tts2face.models import face_file
+from tts2face.models.codec import stored_arrays
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_schema import SCORE_INPUTS
 from tts2face.models.landmarks import N_LANDMARKS
-from tts2face.models.networks import SCORE_MAP_PREFIX, SCORE_SHAPES, ScoreMap, mouth_scores, score_map_arrays
-from tts2face.models.talker import Talker, load_talker
+from tts2face.models.score_map import SCORE_SHAPES, SCORES, ScoreMap, mouth_scores
+from tts2face.models.talker import Talker
+from tts2face.models.talker_file import load_talker
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
 from tts2face.storage.shipped import find_file
@@ -230,7 +232,7 @@ def calibrate_face_file(
 
 def _replace_score_map(path: Path, out: Path, scores: ScoreMap) -> None:
     arrays, header = read_tensors(path, face_file.KIND, face_file.FORMAT_VERSION)
-    kept = {name: array for name, array in arrays.items() if not name.startswith(SCORE_MAP_PREFIX)}
+    kept = {name: array for name, array in arrays.items() if not name.startswith(f"{SCORES}.")}
     header = header | {SCORE_INPUTS: list(scores.inputs)}
-    written = kept | score_map_arrays(scores)
+    written = kept | stored_arrays(scores, SCORES)
     write_tensors(out, face_file.KIND, face_file.FORMAT_VERSION, written, header, is_packed=True)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.models.networks import N_SCORES, ScoreMap, logistic, mouth_scores
+from tts2face.models.score_map import N_SCORES, ScoreMap, logistic, mouth_scores
 from tts2face.models.talker import Talker, speech_channels
 from tts2face.types import Trajectory
 from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader

@@ -17,7 +17,7 @@ from corpus_tools.recordings.video import CachedTracker
 from corpus_tools.run_options import RunOptions
 from corpus_tools.training.train_talker import learn_talker
 from tests.bench.appearance_measures import measure_appearance
-from tts2face.models.talker import write_talker
+from tts2face.models.talker_file import write_talker
 from tts2face.picture.options import Picture
 from tts2face.picture.own_face import draw_video_frame, own_face_renderer
 from tts2face.video.networks import find_bundle

@@ -19,7 +19,7 @@ import numpy as np
 from sentences import sentences
 
 from tts2face.models.face_loading import load_face
-from tts2face.models.talker import load_talker
+from tts2face.models.talker_file import load_talker
 from tts2face.picture.film import ClipWriter
 from tts2face.picture.options import Picture
 from tts2face.request import Request

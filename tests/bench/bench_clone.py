@@ -25,7 +25,8 @@ from tts2face.lips.cloning import ParameterTransfer, append_missing_components, 
 from tts2face.lips.retargeting import build_retargeter
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import MOUTH_REGION, lip_opening
-from tts2face.models.talker import ShapeModel, Talker, load_talker
+from tts2face.models.talker import ShapeModel, Talker
+from tts2face.models.talker_file import load_talker
 
 Floats = NDArray[np.float64]
 

@@ -19,7 +19,8 @@ from corpus_tools.studies.evaluation.people_tables import people_table
 from tts2face.lips import explanation
 from tts2face.lips.exemplar import build_exemplar_model, speech_trajectory
 from tts2face.models.landmarks import lip_opening, lip_width
-from tts2face.models.talker import Talker, load_talker
+from tts2face.models.talker import Talker
+from tts2face.models.talker_file import load_talker
 from tts2face.session.recording import map_audio_to_motion
 from tts2face.sound.transcript import recognise_phones
 from tts2face.sound.voice_pool import load_voice

@@ -21,7 +21,8 @@ from tts2face.lips.exemplar import (
     speech_trajectory,
 )
 from tts2face.lips.options import THEOBALD_2007
-from tts2face.models.talker import Talker, Utterance, read_talker
+from tts2face.models.talker import Talker, Utterance
+from tts2face.models.talker_file import read_talker
 from tts2face.types import frame_count
 
 FPS = 30.0

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from corpus_tools.training.phone_network import add_phone_network
 from corpus_tools.training.pooling.speech import base_speech
-from tts2face.models.talker import load_talker
+from tts2face.models.talker_file import load_talker
 
 
 def main(name: str) -> None:

@@ -26,7 +26,7 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.face.deformation import moved_landmarks
 from tts2face.lips.performer import match_shapes
 from tts2face.models.face_loading import load_face
-from tts2face.models.talker import load_talker
+from tts2face.models.talker_file import load_talker
 from tts2face.types import Trajectory
 
 RATE_HZ = 50.0

@@ -24,7 +24,8 @@ from tts2face.models.landmarks import (
     MOUTH_CORNER_RIGHT,
     UPPER_LIP_INNER_MID,
 )
-from tts2face.models.talker import Talker, Utterance, read_talker
+from tts2face.models.talker import Talker, Utterance
+from tts2face.models.talker_file import read_talker
 from tts2face.types import Trajectory
 
 Floats = NDArray[np.float64]

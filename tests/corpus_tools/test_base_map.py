@@ -10,7 +10,7 @@ from corpus_tools.training.base_map import N_OFFSETS, BaseMap, FrameTerms, fit_b
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.models.audio_map import AudioMap
 from tts2face.models.landmarks import N_LANDMARKS
-from tts2face.models.networks import N_PHONES_SEEN, N_PLACE, PhoneNetwork
+from tts2face.models.phone_network import N_PHONES_SEEN, N_PLACE, PhoneNetwork
 from tts2face.models.talker import ShapeModel
 
 INVENTORY = ("a", "b", "i", SILENCE, "ʃ")

@@ -19,7 +19,7 @@ from corpus_tools.training.network_audio_map import (
 )
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError
-from tts2face.models.talker import read_talker, write_talker
+from tts2face.models.talker_file import read_talker, write_talker
 from tts2face.sound.features import FEATURE_RATE
 from tts2face.types import Waveform
 

@@ -16,7 +16,8 @@ from corpus_tools.studies.evaluation.people import evaluate_people
 from corpus_tools.training.choose_adaptation import learn_short_talker
 from lexicon.errors import InputError
 from lexicon.sequence import PhoneSequence
-from tts2face.models.talker import Talker, Utterance, load_talker
+from tts2face.models.talker import Talker, Utterance
+from tts2face.models.talker_file import load_talker
 
 RATE = 16_000
 

@@ -8,7 +8,7 @@ from corpus_tools.training.train_talker import learn_talker, mean_rotation, rest
 from lexicon.errors import DataError, InputError
 from tts2face.face.deformation import head_rotation
 from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS, lip_opening
-from tts2face.models.talker import read_talker, write_talker
+from tts2face.models.talker_file import read_talker, write_talker
 
 from .conftest import known_directions  # noqa: TID252 - a test's own data
 

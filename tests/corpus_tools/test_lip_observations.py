@@ -13,7 +13,8 @@ from corpus_tools.training.pooling.speech import PooledSpeech, spoken_sequence, 
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE
 from tests.corpus_tools.build.test_people import person, write_tracks
-from tts2face.models.talker import Talker, load_talker
+from tts2face.models.talker import Talker
+from tts2face.models.talker_file import load_talker
 
 
 @pytest.fixture(scope="module")

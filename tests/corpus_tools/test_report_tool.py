@@ -12,7 +12,7 @@ from corpus_tools.studies.evaluation.evaluate import evaluate
 from corpus_tools.tools.report import report, talker_observations
 from tests.processes.answered import answered
 from tts2face.models.landmarks import lip_opening
-from tts2face.models.talker import load_talker, write_talker
+from tts2face.models.talker_file import load_talker, write_talker
 
 
 def messages(kind: str, model: str, out: Path) -> list[Mapping[str, Any]]:

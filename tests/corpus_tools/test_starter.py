@@ -8,7 +8,7 @@ import tts2face
 from corpus_tools.describe_talker import describe
 from corpus_tools.training.train_talker import CLOSED_GAP
 from tts2face.models.landmarks import lip_opening
-from tts2face.models.talker import load_talker
+from tts2face.models.talker_file import load_talker
 
 PATH = Path(tts2face.__file__).parent / "data" / "grid_s1.talker"
 

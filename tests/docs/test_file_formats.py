@@ -12,7 +12,7 @@ from tests.docs.blocks import DOCS, code_blocks
 from tts2face.gestures.timeline import parse_style
 from tts2face.gestures.timeline_file import parse_timeline
 from tts2face.models.palette import Palette, load_palette
-from tts2face.models.talker import load_talker
+from tts2face.models.talker_file import load_talker
 from tts2face.request import Request
 from tts2face.session.prepared import prepare
 from tts2face.session.project_file import load_project, project_json

@@ -17,7 +17,8 @@ from tests.rendered_takes import ONLY_RENDERED
 from tests.world import World
 from tts2face.lips.exemplar import build_exemplar_model, speech_trajectory
 from tts2face.models.landmarks import lip_opening
-from tts2face.models.talker import Talker, load_talker, write_talker
+from tts2face.models.talker import Talker
+from tts2face.models.talker_file import load_talker, write_talker
 from tts2face.request import Request
 from tts2face.session.recording import MAX_CLIP_FRAMES, map_audio_to_motion, resample_motion, select_audio_map
 from tts2face.session.session import Session

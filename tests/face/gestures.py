@@ -5,7 +5,7 @@ import numpy as np
 from tts2face.face.deformation import landmark_motion, landmark_positions
 from tts2face.models.face import Face
 from tts2face.models.palette import FaceRegion, Palette, Style
-from tts2face.models.talker import load_talker
+from tts2face.models.talker_file import load_talker
 
 BROWS = (70, 63, 105, 66, 107, 55, 65, 52, 53, 46, 336, 296, 334, 293, 300, 276, 283, 282, 295, 285)
 CHEEKS = (205, 425, 50, 280, 117, 346, 129, 358, 98, 327, 36, 266, 101, 330)

@@ -23,7 +23,7 @@ from tts2face.models.landmarks import (
     MOUTH_CORNER_RIGHT,
 )
 from tts2face.models.palette import EXPRESSIONS
-from tts2face.models.talker import load_talker
+from tts2face.models.talker_file import load_talker
 from tts2face.request import Request
 from tts2face.session.session import Session
 from tts2face.types import HEAD_CHANNELS, Trajectory

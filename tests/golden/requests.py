@@ -16,7 +16,8 @@ import numpy as np
 from tests.golden.doors import DOORS, SESSIONS
 from tests.golden.fingerprints import Fingerprint, of_clips, of_pictures, read_machines, renewed, write_machines
 from tests.picture.tiny_talker import own_talker
-from tts2face.models.talker import Talker, load_talker
+from tts2face.models.talker import Talker
+from tts2face.models.talker_file import load_talker
 from tts2face.picture.options import Picture
 from tts2face.request import Request
 from tts2face.session.named_models import Models

@@ -21,7 +21,8 @@ from tts2face.models.landmarks import (
     N_LANDMARKS,
     UPPER_LIP_INNER_MID,
 )
-from tts2face.models.talker import ShapeModel, load_talker
+from tts2face.models.talker import ShapeModel
+from tts2face.models.talker_file import load_talker
 from tts2face.types import Trajectory
 
 INNER_UPPER_LIP, INNER_LOWER_LIP = list(INNER_LIP_UPPER[1:-1]), list(INNER_LIP_LOWER[1:-1])

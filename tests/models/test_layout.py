@@ -17,7 +17,7 @@ from tests.picture.tiny_talker import own_talker
 from tts2face.models.audio_map import FEATURE_SIZES
 from tts2face.models.face_file import read_face
 from tts2face.models.palette import read_palette
-from tts2face.models.talker import read_talker
+from tts2face.models.talker_file import read_talker
 from tts2face.numeric.least_squares import bounded_least_squares
 from tts2face.picture.options import Picture
 from tts2face.picture.own_face import own_face_renderer

@@ -34,7 +34,8 @@ from tts2face.lips.retargeting import build_retargeter
 from tts2face.models.face_file import read_face
 from tts2face.models.face_loading import load_face
 from tts2face.models.palette import read_palette
-from tts2face.models.talker import load_talker, read_talker, speech_channels
+from tts2face.models.talker import speech_channels
+from tts2face.models.talker_file import load_talker, read_talker
 from tts2face.picture.options import Picture
 from tts2face.picture.own_face import draw_video_frame, own_face_renderer
 from tts2face.picture.renderer import mesh_renderer

@@ -1,5 +1,6 @@
 """The linear drive against direct regression, the network against finite differences and a known answer."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,10 @@ from corpus_tools.training.linear_audio_map import TrainingUtterance, learn_line
 from corpus_tools.training.network_audio_map import NetworkMapOptions, learn_network_map, loss_and_gradient
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.models.audio_map import AudioMap, audio_map_arrays, audio_maps_from_arrays
-from tts2face.models.talker import ShapeModel, Talker, Utterance, read_talker, write_talker
+from tts2face.models.audio_map import AudioMap
+from tts2face.models.audio_map_file import StoredAudioMap
+from tts2face.models.talker import ShapeModel, Talker, Utterance
+from tts2face.models.talker_file import read_talker, write_talker
 
 THREE = "level+level+level"  # three numbers a frame, as the lessons have
 
@@ -134,10 +137,10 @@ def test_a_talker_file_keeps_its_drives_and_old_files_have_none(tmp_path: Path) 
 
 
 def test_a_drive_that_lost_a_part_is_refused() -> None:
-    arrays = audio_map_arrays({"linear": learn_linear_map(lessons(), feature="mfcc")})
-    arrays["drive.linear.inner"] = arrays["drive.linear.inner"][:, :2]
+    stored = StoredAudioMap.of(learn_linear_map(lessons(), feature="mfcc"))
+    inner, outer = stored.weights
     with pytest.raises(DataError, match="do not fit each other"):
-        audio_maps_from_arrays(arrays, 25.0)
+        replace(stored, weights=(inner[:, :2], outer)).audio_map(25.0)
 
 
 def test_features_of_another_number_are_refused() -> None:

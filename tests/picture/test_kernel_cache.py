@@ -25,7 +25,7 @@ from tests.processes.answered import answered
 from tts2face.face import deformation, eyeballs
 from tts2face.gestures import field_kernels
 from tts2face.lips import blending, contacts, token_search, tokens
-from tts2face.models import networks
+from tts2face.models import phone_network
 from tts2face.models.light import Lamps
 from tts2face.numeric import compiler, least_squares, object_code
 from tts2face.numeric import kernels as compilation
@@ -273,7 +273,7 @@ def test_some_kernels_may_reorder_sums():
 
 CLIP = (
     surface, shading, eyes, response, cut_out, fragments, deformation, eyeballs, blending, contacts, token_search,
-    tokens, networks, least_squares, field_kernels, segments, level,
+    tokens, phone_network, least_squares, field_kernels, segments, level,
 )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from lexicon.errors import DataError
 from tts2face import Session, load_face, load_palette, load_talker
-from tts2face.models import talker as talker_files
+from tts2face.models import talker_file
 from tts2face.processes.shared import N_KEPT, Shared, free_unused, shared
 from tts2face.session.named_models import Models
 from tts2face.session.session_cache import SessionCache
@@ -105,8 +105,8 @@ def test_a_released_session_frees_its_models(own_talker: Path):
 
 
 def test_two_threads_load_a_file_once(own_talker: Path, monkeypatch: pytest.MonkeyPatch):
-    n_reads, read = [], talker_files.read_talker
-    monkeypatch.setattr(talker_files, "read_talker", lambda path: n_reads.append(path) or read(path))
+    n_reads, read = [], talker_file.read_talker
+    monkeypatch.setattr(talker_file, "read_talker", lambda path: n_reads.append(path) or read(path))
     found = []
     threads = [threading.Thread(target=lambda: found.append(load_talker(str(own_talker)))) for _ in range(4)]
     for thread in threads:

@@ -28,7 +28,7 @@ from tts2face.lips.token_search import (
 )
 from tts2face.lips.tokens import Targets, Tokens, build_targets, collect_tokens, phone_contexts, target_phones
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
-from tts2face.models.networks import PhoneNetwork
+from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import Talker, require_appearance, speech_channels
 from tts2face.numeric.arrays import interpolate_columns, smoothstep
 from tts2face.processes.shared import shared

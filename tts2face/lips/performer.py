@@ -11,7 +11,7 @@ from tts2face.lips.retargeting import MAX_CONTACT_MM, Retargeter, build_retarget
 from tts2face.lips.score_matching import scaled_scores
 from tts2face.models.face import Face
 from tts2face.models.landmarks import EYELID_LANDMARKS, MOUTH_REGION, N_LANDMARKS, eye_aperture, inner_lip_gaps
-from tts2face.models.networks import SCORE_SHAPES, mouth_scores
+from tts2face.models.score_map import SCORE_SHAPES, mouth_scores
 from tts2face.models.talker import ShapeModel, Talker, speech_channels
 from tts2face.numeric.arrays import principal_axes
 from tts2face.types import Trajectory

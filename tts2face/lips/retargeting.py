@@ -36,7 +36,7 @@ from tts2face.models.landmarks import (
     MOUTH_REGION,
     inner_lip_gaps,
 )
-from tts2face.models.networks import ScoreMap
+from tts2face.models.score_map import ScoreMap
 from tts2face.models.talker import ShapeModel, Talker
 from tts2face.numeric.arrays import ordered_product
 from tts2face.numeric.least_squares import bounded_least_squares

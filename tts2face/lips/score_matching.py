@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.face.mouth import MIDDLE_PAIR
-from tts2face.models.networks import N_SCORES, SCORE_SHAPES, ScoreMap, logistic
+from tts2face.models.score_map import N_SCORES, SCORE_SHAPES, ScoreMap, logistic
 from tts2face.numeric.arrays import ordered_product, smoothstep
 from tts2face.numeric.least_squares import bounded_least_squares
 

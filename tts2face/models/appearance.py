@@ -5,20 +5,31 @@ shape, is ``mean + sum_i b_i basis_i`` (eq. 2). The inside of the mouth has a se
 stay sharp (design of Cosker et al. 2004; measured in docs/decisions/032-own-face.md).
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
+from tts2face.models.codec import Part, Stored, StoredModel, half
+from tts2face.models.landmarks import FACE_OVAL, N_MESH_LANDMARKS
+from tts2face.storage.schema import Contents, Tensor, millimetres
 
 STEPS_PER_PARAMETER = 1000.0  # appearance parameters are stored as 16-bit integers in steps of spread / 1000
+APPEARANCE = "appearance"  # name of an appearance before those of its arrays
+MAX_PX = 1e5
+MAX_SIDE_PX = 4096
+MAX_PARAMETER = 1e6
+N_POINTS = N_MESH_LANDMARKS + len(FACE_OVAL)
+
+
+def _whole_numbers(array: NDArray[np.int32]) -> tuple[int, ...]:
+    return tuple(int(number) for number in array)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TextureModel:
+class TextureModel(StoredModel):
     """Linear texture model on a reference shape: ``texture = mean + sum_i b_i basis_i``, sRGB values from 0 to 255.
 
     Parameters
@@ -39,13 +50,13 @@ class TextureModel:
         Standard deviation of each parameter over the training frames.
     """
 
-    reference: NDArray[np.float32]
-    triangles: NDArray[np.int32]
-    size: tuple[int, int]
-    pixels: NDArray[np.int32]
-    mean: NDArray[np.float32]
-    basis: NDArray[np.float32]
-    spread: NDArray[np.float32]
+    reference: Annotated[NDArray[np.float32], Tensor("float32", ("points of {own}", 2), -MAX_PX, MAX_PX)]
+    triangles: Annotated[NDArray[np.int32], Tensor("int32", ("triangles of {own}", 3))]
+    size: Annotated[tuple[int, int], Stored(Tensor("int32", (2,), 1, MAX_SIDE_PX), decode=_whole_numbers)]
+    pixels: Annotated[NDArray[np.int32], Tensor("int32", ("pixels of {own}",))]
+    mean: Annotated[NDArray[np.float32], half("pixels of {own}", 3, low=-1e4, high=1e4)]
+    basis: Annotated[NDArray[np.float32], half("{own} parameters", "pixels of {own}", 3, low=-1.01, high=1.01)]
+    spread: Annotated[NDArray[np.float32], Tensor("float32", ("{own} parameters",), 0.0, MAX_PARAMETER)]
 
     def __post_init__(self) -> None:
         """Check that the shapes of all arrays agree."""
@@ -53,6 +64,15 @@ class TextureModel:
         fits = self.mean.shape == (n_pixels, 3) and self.pixels.shape == (n_pixels,) and self.spread.shape == (n_modes,)
         if not fits or self.basis.shape[2:] != (3,) or self.reference.shape[1:] != (2,):
             raise DataError("the texture model's mean, basis, spread and pixels do not fit each other; build it again")
+
+    @classmethod
+    def check_stored(cls, contents: Contents, prefix: str) -> None:
+        """Refuse numbers of points and pixels that there are not."""
+        own = prefix.rpartition(".")[2]
+        width, height = (int(side) for side in contents.arrays[f"{prefix}.size"])
+        contents.indices(f"{prefix}.triangles", contents.sizes[f"points of {own}"], "points")
+        contents.indices(f"{prefix}.pixels", width * height, "pixels")
+        contents.distinct(f"{prefix}.pixels")
 
     @property
     def n_modes(self) -> int:
@@ -72,7 +92,7 @@ class TextureModel:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plate:
+class Plate(StoredModel):
     """Segment of the talker's video on which synthesised frames are drawn.
 
     Parameters
@@ -89,15 +109,18 @@ class Plate:
         Parameters of the face's texture model.
     """
 
-    video: NDArray[np.uint8]
-    points: NDArray[np.float32]
-    axes: NDArray[np.float32]
-    shape: NDArray[np.float32]
-    texture_parameters: NDArray[np.float32]
+    video: Annotated[NDArray[np.uint8], Tensor("uint8", ("bytes",))]
+    points: Annotated[NDArray[np.float32], Tensor("float32", ("{own}", N_POINTS, 2), -MAX_PX, MAX_PX)]
+    axes: Annotated[NDArray[np.float32], Tensor("float32", ("{own}", 2, 3), -MAX_PX, MAX_PX)]
+    shape: Annotated[NDArray[np.float32], millimetres("{own}", "modes", most=1e6)]
+    texture_parameters: Annotated[
+        NDArray[np.float32],
+        Stored(Tensor("float32", ("{own}", "face parameters"), -MAX_PARAMETER, MAX_PARAMETER), "looks"),
+    ]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Appearance:
+class Appearance(StoredModel):
     """Texture models of a talker's face and inner mouth, and the plate that they are drawn on.
 
     Parameters
@@ -114,11 +137,21 @@ class Appearance:
         Background video.
     """
 
-    face: TextureModel
-    mouth: TextureModel
-    mouth_points: NDArray[np.int32]
-    moved_by_speech: NDArray[np.float32]
-    plate: Plate
+    face: Annotated[TextureModel, Part(TextureModel)]
+    mouth: Annotated[TextureModel, Part(TextureModel)]
+    mouth_points: Annotated[NDArray[np.int32], Tensor("int32", ("points of mouth",))]
+    moved_by_speech: Annotated[NDArray[np.float32], half("pixels of face", low=0.0, high=1.0)]
+    plate: Annotated[Plate, Part(Plate)]
+
+    @classmethod
+    def prepare_check(cls, contents: Contents, prefix: str) -> None:
+        """Points of the face are landmarks of its mesh."""
+        contents.sizes["points of face"] = N_MESH_LANDMARKS
+
+    @classmethod
+    def check_stored(cls, contents: Contents, prefix: str) -> None:
+        """Refuse points of the mouth that the face has not."""
+        contents.indices(f"{prefix}.mouth_points", N_MESH_LANDMARKS, "points of the face")
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -144,67 +177,3 @@ def nearest_pixels(model: TextureModel) -> NDArray[np.int64]:
     place[model.pixels] = np.arange(len(model.pixels))
     nearest: NDArray[np.int64] = place[(y * width + x).ravel()]
     return nearest
-
-
-def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
-    """Arrays of an appearance for a talker file; inverse of `appearance_from_arrays`."""
-    arrays: dict[str, NDArray[Any]] = {
-        "appearance.mouth_points": appearance.mouth_points,
-        "appearance.moved_by_speech": appearance.moved_by_speech.astype(np.float16),
-    }
-    for name, model in (("face", appearance.face), ("mouth", appearance.mouth)):
-        arrays |= {
-            f"appearance.{name}.reference": model.reference,
-            f"appearance.{name}.triangles": model.triangles,
-            f"appearance.{name}.size": np.array(model.size, np.int32),
-            f"appearance.{name}.pixels": model.pixels,
-            f"appearance.{name}.mean": model.mean.astype(np.float16),
-            f"appearance.{name}.basis": model.basis.astype(np.float16),
-            f"appearance.{name}.spread": model.spread,
-        }
-    for part in ("video", "points", "axes", "shape"):
-        arrays[f"appearance.plate.{part}"] = getattr(appearance.plate, part)
-    arrays["appearance.plate.looks"] = appearance.plate.texture_parameters
-    return arrays
-
-
-def appearance_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Appearance | None:
-    """Appearance in the arrays of a talker file, or None.
-
-    Raises
-    ------
-    KeyError
-        A part is missing.
-    """
-    if "appearance.mouth_points" not in arrays:
-        return None
-
-    def model(name: str) -> TextureModel:
-        def part(key: str) -> NDArray[Any]:
-            return arrays[f"appearance.{name}.{key}"]
-
-        width, height = (int(side) for side in part("size"))
-        return TextureModel(
-            reference=part("reference"),
-            triangles=part("triangles"),
-            size=(width, height),
-            pixels=part("pixels"),
-            mean=part("mean").astype(np.float32),
-            basis=part("basis").astype(np.float32),
-            spread=part("spread"),
-        )
-
-    plate = Plate(
-        video=arrays["appearance.plate.video"],
-        points=arrays["appearance.plate.points"],
-        axes=arrays["appearance.plate.axes"],
-        shape=arrays["appearance.plate.shape"],
-        texture_parameters=arrays["appearance.plate.looks"],
-    )
-    return Appearance(
-        face=model("face"),
-        mouth=model("mouth"),
-        mouth_points=arrays["appearance.mouth_points"],
-        moved_by_speech=arrays["appearance.moved_by_speech"].astype(np.float32),
-        plate=plate,
-    )

@@ -8,14 +8,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 
-AUDIO_MAP_PREFIX = "drive."
 # Number of values per frame of each kind of feature of `tts2face.sound.features`.
 FEATURE_SIZES: Mapping[str, int] = MappingProxyType(
     {"formants": 4, "mfcc": 13, "lpc": 16, "lsf": 16, "level": 1, "mel": 72}
@@ -23,7 +21,6 @@ FEATURE_SIZES: Mapping[str, int] = MappingProxyType(
 MAX_CONTEXT = 1000  # frames of context on either side
 MAX_GAIN_DB = 40.0  # fainter recordings contain more noise than speech
 ACTIVATIONS = ("linear", "tanh", "rectified")  # by their numbers in a file
-FIRST, MIDDLE, LAST = ("inner", "bias"), ("middle", "middle_bias"), ("outer", "offset")  # names of layers in a file
 N_AT_ONCE = 1000  # frames, whose windows take 5 MB
 Values = NDArray[np.floating]
 Floats = NDArray[np.float32]
@@ -122,55 +119,3 @@ def context_windows(features: Values, before: int, after: int) -> Values:
     width = before + 1 + after
     n_frames = max(len(features) - width + 1, 0)
     return np.concatenate([features[at : at + n_frames] for at in range(width)], axis=1)
-
-
-def layer_names(n_layers: int) -> list[tuple[str, str]]:
-    """Names of the weights and the bias of each layer in a file."""
-    return [FIRST, *[MIDDLE] * (n_layers - 2), LAST]
-
-
-def audio_map_arrays(audio_maps: Mapping[str, AudioMap]) -> dict[str, NDArray[Any]]:
-    """Arrays of audio maps for a talker file; inverse of `audio_maps_from_arrays`."""
-    arrays: dict[str, NDArray[Any]] = {}
-    for name, audio_map in audio_maps.items():
-        prefix = f"{AUDIO_MAP_PREFIX}{name}"
-        arrays |= {f"{prefix}.mean": audio_map.mean, f"{prefix}.spread": audio_map.spread}
-        layers = zip(layer_names(len(audio_map.weights)), audio_map.weights, audio_map.biases, strict=True)
-        for names, weights, bias in layers:
-            arrays |= {f"{prefix}.{names[0]}": weights, f"{prefix}.{names[1]}": bias}
-        context = [audio_map.before, audio_map.after, ACTIVATIONS.index(audio_map.activation)]
-        arrays[f"{prefix}.context"] = np.array(context, np.int32)
-        arrays[f"{prefix}.loudness"] = np.array([audio_map.loudness], np.float32)
-        arrays[f"{prefix}.fps"] = np.array([audio_map.fps])
-        arrays[f"{prefix}.feature"] = np.frombuffer(audio_map.feature.encode(), np.uint8)
-    return arrays
-
-
-def audio_maps_from_arrays(arrays: Mapping[str, NDArray[Any]], fps: float) -> dict[str, AudioMap]:
-    """Audio maps by name in the arrays of a talker file; older files state no rate, which is that of the talker.
-
-    Raises
-    ------
-    KeyError
-        A part is missing.
-    """
-    names = sorted({key.split(".")[1] for key in arrays if key.startswith(AUDIO_MAP_PREFIX)})
-    return {name: _audio_map(arrays, f"{AUDIO_MAP_PREFIX}{name}", fps) for name in names}
-
-
-def _audio_map(arrays: Mapping[str, NDArray[Any]], prefix: str, fps: float) -> AudioMap:
-    before, after, activation = (int(number) for number in arrays[f"{prefix}.context"])
-    layers = layer_names(3 if f"{prefix}.{MIDDLE[0]}" in arrays else 2)
-    weights, biases = (tuple(arrays[f"{prefix}.{names[part]}"] for names in layers) for part in range(2))
-    return AudioMap(
-        arrays[f"{prefix}.feature"].tobytes().decode(),
-        before,
-        after,
-        arrays[f"{prefix}.mean"],
-        arrays[f"{prefix}.spread"],
-        weights,
-        biases,
-        ACTIVATIONS[activation],
-        float(arrays[f"{prefix}.loudness"][0]),
-        float(arrays.get(f"{prefix}.fps", [fps])[0]),
-    )

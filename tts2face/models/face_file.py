@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.baked_light import BakedLight
+from tts2face.models.codec import stored_arrays
 from tts2face.models.face import VERTEX_COLOURS, Eye, Face, FacePart, Hairdo, Late, Texture
 from tts2face.models.face_schema import (
     FOLLOW,
@@ -32,8 +33,8 @@ from tts2face.models.face_schema import (
 )
 from tts2face.models.light import Baked, Lamps, Light, Photographed
 from tts2face.models.light_coding import decode_light, encode_light, pack_shapes, quantise, unpack_shapes
-from tts2face.models.networks import score_map_arrays, score_map_from_arrays
 from tts2face.models.photo_view import PhotoView
+from tts2face.models.score_map import SCORES, score_map_of
 from tts2face.storage.model_pictures import (
     decode_colours,
     decode_coverage,
@@ -41,6 +42,7 @@ from tts2face.storage.model_pictures import (
     encode_coverage,
     texture_tensors,
 )
+from tts2face.storage.schema import Contents
 from tts2face.storage.shipped import present_name
 from tts2face.storage.tensors import read_tensors, write_tensors
 
@@ -111,7 +113,7 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
         "metadata": dict(face.metadata),
     }
     if face.scores is not None:
-        arrays |= score_map_arrays(face.scores)
+        arrays |= stored_arrays(face.scores, SCORES)
         header[SCORE_INPUTS] = list(face.scores.inputs)
     if not isinstance(face.light, Lamps):
         arrays[LIGHT], header[LIGHT] = encode_light(face.light.baked)
@@ -275,7 +277,7 @@ def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, A
         landmark_weights=arrays["landmark_weights"],
         pivot=arrays["pivot"],
         metadata=header["metadata"],
-        scores=score_map_from_arrays(arrays, tuple(header.get(SCORE_INPUTS, ()))),
+        scores=score_map_of(Contents(path, KIND, arrays, header), tuple(header.get(SCORE_INPUTS, ()))),
         light=_read_light(arrays, header, path),
     )
 

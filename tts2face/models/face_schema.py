@@ -18,7 +18,7 @@ from tts2face.models.baked_light import LIP_RING
 from tts2face.models.face import PART_KINDS
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.light_coding import MAX_STEP_MM, SHAPE_TENSORS, check_shapes
-from tts2face.models.networks import check_score_map
+from tts2face.models.score_map import check_score_map
 from tts2face.storage.deflated import deflate, inflate
 from tts2face.storage.model_pictures import texture_tensors
 from tts2face.storage.schema import MAX_MM, Contents, ModelPlace, Tensor, millimetres

@@ -10,15 +10,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from lexicon.values.checks import free, list_of, text
+from tts2face.models.codec import InHeader, Stored, StoredModel, in_64_bits, read_model, stored_arrays, stored_header
 from tts2face.storage.schema import Contents, Tensor
 from tts2face.storage.shipped import find_file
-from tts2face.storage.tensors import read_tensors, write_tensors
+from tts2face.storage.tensors import write_tensors
 
 KIND, VERSION = "gaze", 1
 SHIPPED = "conversation"
@@ -32,6 +34,7 @@ PARAMETERS = (*(f"{name}{part}" for name in PAIRS for part in ("", "_spread")), 
 OF_BOTH_STATES = ("left", "spot")  # places that a person prefers whether speaking or listening (r .56 and .63)
 MOST_SPREADS = 2.0  # beyond which no person is drawn: fifteen people tell nothing of rarer ones
 MAX_VALUE = 20.0  # of a logarithm
+OF_STATES = (len(STATES), len(PARAMETERS))  # shape
 
 FloatArray = NDArray[np.float64]
 
@@ -93,7 +96,7 @@ class GazeHabit:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class GazeModel:
+class GazeModel(StoredModel):
     """Independent normal distributions over people of their parameters.
 
     Parameters
@@ -104,9 +107,16 @@ class GazeModel:
         Source, licence and how it was made.
     """
 
-    mean: FloatArray
-    spread: FloatArray
-    metadata: Mapping[str, object]
+    mean: Annotated[FloatArray, Stored(Tensor("float32", OF_STATES, -MAX_VALUE, MAX_VALUE), decode=in_64_bits)]
+    spread: Annotated[FloatArray, Stored(Tensor("float32", OF_STATES, 0.0, MAX_VALUE), decode=in_64_bits)]
+    metadata: Annotated[Mapping[str, object], InHeader(free, encode=dict)]
+
+    @classmethod
+    def prepare_check(cls, contents: Contents, prefix: str) -> None:
+        """Refuse the file of a version with other states or parameters."""
+        header = contents.header
+        if (tuple(header["states"]), tuple(header["parameters"])) != (STATES, PARAMETERS):
+            raise DataError(f"{contents.path} has other states or parameters than this version; learn it again")
 
     def draw(self, generator: np.random.Generator) -> Mapping[str, GazeHabit]:
         """Habits of one person by state."""
@@ -119,9 +129,8 @@ class GazeModel:
 
 def write_gaze(path: Path, model: GazeModel) -> None:
     """Write a ``.gaze`` file (docs/file-formats.md)."""
-    arrays = {name: getattr(model, name).astype(np.float32) for name in ("mean", "spread")}
-    header = {"states": list(STATES), "parameters": list(PARAMETERS), "metadata": dict(model.metadata)}
-    write_tensors(path, KIND, VERSION, arrays, header)
+    header = {"states": list(STATES), "parameters": list(PARAMETERS), **stored_header(model)}
+    write_tensors(path, KIND, VERSION, stored_arrays(model), header)
 
 
 @cache
@@ -135,18 +144,5 @@ def load_gaze(name: str = SHIPPED) -> GazeModel:
     DataError
         The file is damaged, or has other states or parameters.
     """
-    path = find_file(name, KIND)
-    arrays, header = read_tensors(path, KIND, VERSION)
-    contents = Contents(path, KIND, arrays, header)
-    contents.metadata({"states": list_of(text), "parameters": list_of(text), "metadata": free})
-    if (tuple(header["states"]), tuple(header["parameters"])) != (STATES, PARAMETERS):
-        raise DataError(f"{path} has other states or parameters than this version; learn it again")
-    shape = (len(STATES), len(PARAMETERS))
-    contents.tensors(
-        {
-            "mean": Tensor("float32", shape, -MAX_VALUE, MAX_VALUE),
-            "spread": Tensor("float32", shape, 0.0, MAX_VALUE),
-        }
-    )
-    contents.only_known()
-    return GazeModel(arrays["mean"].astype(np.float64), arrays["spread"].astype(np.float64), header["metadata"])
+    names = {"states": list_of(text), "parameters": list_of(text)}
+    return read_model(find_file(name, KIND), KIND, VERSION, GazeModel, names)

@@ -7,25 +7,40 @@ One hidden layer of rectified linear units over features of a window around each
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from lexicon.values.checks import list_of, text
+from tts2face.models.codec import (
+    InHeader,
+    Numbered,
+    Stored,
+    StoredModel,
+    half,
+    read_model,
+    stored_arrays,
+    stored_header,
+)
 from tts2face.numeric.arrays import ordered_product
 from tts2face.storage.schema import Contents, Tensor
 from tts2face.storage.shipped import find_file
-from tts2face.storage.tensors import read_tensors, write_tensors
+from tts2face.storage.tensors import write_tensors
 
 KIND, VERSION = "phones", 1
 MAX_VALUE, MAX_DELAY_S = 1e4, 1.0
 Floats = NDArray[np.float32]
+WEIGHTS = (
+    half("features", "units", low=-MAX_VALUE, high=MAX_VALUE),
+    half("units", "phones", low=-MAX_VALUE, high=MAX_VALUE),
+)
+BIASES = tuple(Stored(Tensor("float32", (size,), -MAX_VALUE, MAX_VALUE)) for size in ("units", "phones"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PhoneClassifier:
+class PhoneClassifier(StoredModel):
     """Map from K features of a frame to P phones.
 
     Parameters
@@ -44,13 +59,24 @@ class PhoneClassifier:
         Seconds from the middles of phones to the instants at which the recogniser says them.
     """
 
-    inventory: tuple[str, ...]
-    mean: Floats
-    scale: Floats
-    weights: tuple[Floats, Floats]
-    biases: tuple[Floats, Floats]
-    durations: Floats
-    delays: Floats
+    inventory: Annotated[tuple[str, ...], InHeader(list_of(text), encode=list, decode=tuple)]
+    mean: Annotated[Floats, Tensor("float32", ("features",), -MAX_VALUE, MAX_VALUE)]
+    scale: Annotated[Floats, Tensor("float32", ("features",), 0.0, MAX_VALUE)]
+    weights: Annotated[tuple[Floats, Floats], Numbered(WEIGHTS, 2)]
+    biases: Annotated[tuple[Floats, Floats], Numbered(BIASES, 2)]
+    durations: Annotated[Floats, Tensor("float32", ("phones", 2), -MAX_VALUE, MAX_VALUE)]
+    delays: Annotated[Floats, Tensor("float32", ("phones",), -MAX_DELAY_S, MAX_DELAY_S)]
+
+    @classmethod
+    def prepare_check(cls, contents: Contents, prefix: str) -> None:
+        """The number of phones is that of the inventory."""
+        contents.sizes["phones"] = len(contents.header["inventory"])
+
+    @classmethod
+    def check_stored(cls, contents: Contents, prefix: str) -> None:
+        """Refuse an inventory with a phone that is listed twice."""
+        if len(set(contents.header["inventory"])) < contents.sizes["phones"]:
+            raise DataError(f"{contents.path}: a phone is listed twice; train the file again")
 
     def log_probabilities(self, features: Floats) -> NDArray[np.float64]:
         """Log probabilities (T, P) of the phones in frames with features (T, K)."""
@@ -63,15 +89,7 @@ class PhoneClassifier:
 
 def write_phone_classifier(path: Path, classifier: PhoneClassifier) -> None:
     """Write a classifier to a file, weights in 16 bits."""
-    arrays: dict[str, NDArray[Any]] = {
-        "mean": classifier.mean,
-        "scale": classifier.scale,
-        **{f"weights{at}": layer.astype(np.float16) for at, layer in enumerate(classifier.weights)},
-        **{f"biases{at}": layer for at, layer in enumerate(classifier.biases)},
-        "durations": classifier.durations,
-        "delays": classifier.delays,
-    }
-    write_tensors(path, KIND, VERSION, arrays, {"inventory": list(classifier.inventory)})
+    write_tensors(path, KIND, VERSION, stored_arrays(classifier), stored_header(classifier))
 
 
 def load_phone_classifier(name: str) -> PhoneClassifier:
@@ -84,27 +102,4 @@ def load_phone_classifier(name: str) -> PhoneClassifier:
     DataError
         The file is damaged.
     """
-    path = find_file(name, KIND)
-    arrays, header = read_tensors(path, KIND, VERSION)
-    contents = Contents(path, KIND, arrays, header)
-    contents.metadata({"inventory": list_of(text)})
-    n_phones = len(header["inventory"])
-    contents.tensors(
-        {
-            "mean": Tensor("float32", ("features",), -MAX_VALUE, MAX_VALUE),
-            "scale": Tensor("float32", ("features",), 0.0, MAX_VALUE),
-            "weights0": Tensor("float16", ("features", "units"), -MAX_VALUE, MAX_VALUE),
-            "biases0": Tensor("float32", ("units",), -MAX_VALUE, MAX_VALUE),
-            "weights1": Tensor("float16", ("units", n_phones), -MAX_VALUE, MAX_VALUE),
-            "biases1": Tensor("float32", (n_phones,), -MAX_VALUE, MAX_VALUE),
-            "durations": Tensor("float32", (n_phones, 2), -MAX_VALUE, MAX_VALUE),
-            "delays": Tensor("float32", (n_phones,), -MAX_DELAY_S, MAX_DELAY_S),
-        }
-    )
-    contents.only_known()
-    if len(set(header["inventory"])) < n_phones:
-        raise DataError(f"{path}: a phone is listed twice; train the file again")
-    layers = [(arrays[f"weights{at}"].astype(np.float32), arrays[f"biases{at}"]) for at in range(2)]
-    weights, biases = zip(*layers, strict=True)
-    kept = {name: arrays[name] for name in ("mean", "scale", "durations", "delays")}
-    return PhoneClassifier(inventory=tuple(header["inventory"]), weights=weights, biases=biases, **kept)
+    return read_model(find_file(name, KIND), KIND, VERSION, PhoneClassifier)

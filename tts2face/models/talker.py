@@ -1,39 +1,29 @@
-"""Talker model, built from the recordings of one person, and the ``.talker`` file format."""
+"""Talker model, built from the recordings of one person."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence, WordSpan
-from tts2face.models.appearance import STEPS_PER_PARAMETER, Appearance, appearance_arrays, appearance_from_arrays
-from tts2face.models.audio_map import AudioMap, audio_map_arrays, audio_maps_from_arrays
-from tts2face.models.networks import (
-    PhoneNetwork,
-    ScoreMap,
-    network_arrays,
-    network_from_arrays,
-    score_map_arrays,
-    score_map_from_arrays,
-)
-from tts2face.models.talker_schema import check_talker
-from tts2face.processes.shared import Shared, file_state
-from tts2face.storage.shipped import find_file
-from tts2face.storage.tensors import read_tensors, write_tensors
-from tts2face.types import HEAD_CHANNELS, Trajectory
+from lexicon.values.checks import whole
+from tts2face.models.appearance import Appearance
+from tts2face.models.audio_map import AudioMap
+from tts2face.models.codec import InHeader, StoredModel
+from tts2face.models.landmarks import N_LANDMARKS
+from tts2face.models.phone_network import PhoneNetwork
+from tts2face.models.score_map import ScoreMap
+from tts2face.storage.schema import MAX_MM, Contents, Tensor, millimetres
+from tts2face.types import Trajectory
 
-KIND = "talker"
-FORMAT_VERSION = 1
-STEPS_PER_SPREAD = 2000.0
 NOT_STATED = "not stated"  # by who made the model: its name, language, sources, licence
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ShapeModel:
+class ShapeModel(StoredModel):
     """Linear model of landmark shapes with head pose removed: ``shape = mean + sum_i p_i basis_i``.
 
     Parameters
@@ -51,11 +41,11 @@ class ShapeModel:
         Parameters of the talker at rest: silent, lips closed.
     """
 
-    mean: NDArray[np.float32]
-    basis: NDArray[np.float32]
-    spread: NDArray[np.float32]
-    n_speech: int
-    rest: NDArray[np.float32]
+    mean: Annotated[NDArray[np.float32], millimetres(N_LANDMARKS, 3)]
+    basis: Annotated[NDArray[np.float32], Tensor("float32", ("modes", N_LANDMARKS, 3), -1.01, 1.01)]
+    spread: Annotated[NDArray[np.float32], Tensor("float32", ("modes",), 0.0, MAX_MM)]
+    n_speech: Annotated[int, InHeader(whole(1, 10_000))]
+    rest: Annotated[NDArray[np.float32], millimetres("modes")]
 
     def __post_init__(self) -> None:
         """Check that the shapes of all arrays agree, then make them read-only."""
@@ -65,6 +55,13 @@ class ShapeModel:
             raise DataError("the shape model's mean, basis, spread and rest do not fit each other; build it again")
         for array in (self.mean, self.basis, self.spread, self.rest):
             array.setflags(write=False)
+
+    @classmethod
+    def check_stored(cls, contents: Contents, prefix: str) -> None:
+        """Refuse a basis that is not orthonormal, and more modes of speech than there are."""
+        contents.orthonormal("basis")
+        n_speech, n_modes = contents.header["n_speech"], contents.sizes["modes"]
+        contents.require(n_speech <= n_modes, f"n_speech is {n_speech}, but there are {n_modes} modes")
 
     def shapes(self, parameters: NDArray[np.floating]) -> NDArray[np.float32]:
         """Landmarks (T, L, 3), mm, for parameters (T, m) of the first m modes."""
@@ -146,104 +143,3 @@ def require_appearance(talker: Talker) -> Appearance:
             f"the talker {talker.metadata.get('name', '')} has motion only and no own face; build one with --appearance"
         )
     return talker.appearance
-
-
-def write_talker(path: Path, talker: Talker) -> None:
-    """Write a ``.talker`` file (docs/file-formats.md).
-
-    Shape parameters are stored as 16-bit integers in steps of 1/2000 of their spread, finer than the tracker's noise.
-    """
-    utterances = talker.utterances
-    inventory = sorted({phone for utterance in utterances for phone in utterance.phones.phones})
-    numbers = {phone: number for number, phone in enumerate(inventory)}
-    step = talker.model.spread / STEPS_PER_SPREAD
-    shape = np.concatenate([utterance.shape for utterance in utterances]) / step
-    arrays = {
-        "mean": talker.model.mean,
-        "basis": talker.model.basis,
-        "spread": talker.model.spread,
-        "rest": talker.model.rest,
-        "shape": np.clip(np.rint(shape), -32768, 32767).astype(np.int16),
-        "head": np.concatenate([utterance.head for utterance in utterances]).astype(np.float16),
-        "intensity": np.concatenate([utterance.intensity for utterance in utterances]).astype(np.float16),
-        "n_frames": np.array([len(utterance.shape) for utterance in utterances], np.int32),
-        "phones": np.array([numbers[phone] for utterance in utterances for phone in utterance.phones.phones], np.int16),
-        "n_phones": np.array([len(utterance.phones) for utterance in utterances], np.int32),
-        "edges": np.concatenate([utterance.phones.edges for utterance in utterances]),
-    }
-    if talker.appearance is not None:
-        parameters = [utterance.appearance_parameters for utterance in utterances]
-        recorded = np.concatenate([values for values in parameters if values is not None])
-        steps = recorded / (talker.appearance.spread / STEPS_PER_PARAMETER)
-        arrays["looks"] = np.clip(np.rint(steps), -32768, 32767).astype(np.int16)
-        arrays |= appearance_arrays(talker.appearance)
-    if talker.network is not None:
-        arrays |= network_arrays(talker.network)
-    arrays |= audio_map_arrays(talker.audio_maps) | score_map_arrays(talker.scores)
-    header = {
-        **talker.metadata,
-        "fps": talker.fps,
-        "n_speech": talker.model.n_speech,
-        "inventory": inventory,
-        **({"network_inventory": talker.network.inventory} if talker.network is not None else {}),
-        "head_channels": HEAD_CHANNELS,
-        "utterances": [
-            [utterance.name, [[word.text, word.first, word.last] for word in utterance.words]]
-            for utterance in utterances
-        ],
-    }
-    write_tensors(path, KIND, FORMAT_VERSION, arrays, header)
-
-
-def read_talker(path: Path) -> Talker:
-    """Read a ``.talker`` file.
-
-    Raises
-    ------
-    InputError
-        The file does not exist.
-    DataError
-        The file is damaged, of another kind or version, or invalid (`tts2face.models.talker_schema`).
-    """
-    arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
-    check_talker(path, arrays, header)
-    return _talker_from_arrays(arrays, header)
-
-
-def load_talker(name: str) -> Talker:
-    """A shipped talker by name, or one from a ``.talker`` file; errors as `find_file` and `read_talker`.
-
-    All who load the same file share one talker; a file that has changed is read again.
-    """
-    path = find_file(name, KIND)
-    return _TALKERS.get(file_state(path), lambda: read_talker(path))
-
-
-_TALKERS: Shared[Talker] = Shared()
-
-
-def _talker_from_arrays(arrays: dict[str, NDArray[Any]], header: dict[str, Any]) -> Talker:
-    n_speech = int(header.pop("n_speech"))
-    model = ShapeModel(arrays["mean"], arrays["basis"], arrays["spread"], n_speech, arrays["rest"])
-    inventory, fps = header.pop("inventory"), float(header.pop("fps"))
-    header.pop("head_channels")
-    frames = np.concatenate([[0], np.cumsum(arrays["n_frames"])])
-    phones = np.concatenate([[0], np.cumsum(arrays["n_phones"])])
-    shape = arrays["shape"].astype(np.float32) * (model.spread / STEPS_PER_SPREAD)
-    head, intensity = arrays["head"].astype(np.float32), arrays["intensity"].astype(np.float32)
-    appearance = appearance_from_arrays(arrays)
-    network = network_from_arrays(arrays, header.pop("network_inventory", ()))
-    recorded = arrays["looks"] * (appearance.spread / STEPS_PER_PARAMETER) if appearance is not None else None
-    utterances = []
-    for i, (name, words) in enumerate(header.pop("utterances")):
-        labels = [inventory[number] for number in arrays["phones"][phones[i] : phones[i + 1]]]
-        sequence = PhoneSequence(labels, arrays["edges"][phones[i] + i : phones[i + 1] + i + 1])
-        spans = tuple(WordSpan(text, first, last) for text, first, last in words)
-        span = slice(frames[i], frames[i + 1])
-        appearance_parameters = None if recorded is None else recorded[span]
-        utterances.append(
-            Utterance(name, sequence, spans, shape[span], head[span], intensity[span], appearance_parameters)
-        )
-    maps = audio_maps_from_arrays(arrays, fps)
-    scores = score_map_from_arrays(arrays, speech_channels(model))
-    return Talker(fps, model, tuple(utterances), header, appearance, network, maps, scores)

@@ -261,7 +261,7 @@ def talkers() -> tuple[TalkerEntry, ...]:
 
 def describe_talker(path: Path) -> TalkerEntry:
     """Entry of a ``.talker`` file; raises as `read_talker`."""
-    from tts2face.models.talker import read_talker
+    from tts2face.models.talker_file import read_talker
 
     talker = read_talker(path)
     seconds = sum(len(utterance.shape) for utterance in talker.utterances) / talker.fps

@@ -17,7 +17,8 @@ from tts2face.models.face_loading import load_face
 from tts2face.models.face_names import default_face
 from tts2face.models.palette import Derivation, Palette, load_palette
 from tts2face.models.palette_editing import add_derivation
-from tts2face.models.talker import Talker, load_talker
+from tts2face.models.talker import Talker
+from tts2face.models.talker_file import load_talker
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import FrameRenderer
 from tts2face.processes.memory import NO_MEMORY, SentenceMemory

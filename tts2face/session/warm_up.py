@@ -21,7 +21,7 @@ from tts2face.lips import contacts
 from tts2face.models.face import Face, keep_parts
 from tts2face.models.face_loading import load_face
 from tts2face.models.light import Lamps
-from tts2face.models.talker import load_talker
+from tts2face.models.talker_file import load_talker
 from tts2face.picture.options import Picture
 from tts2face.processes.child import Call, Handler
 from tts2face.processes.parent import Child

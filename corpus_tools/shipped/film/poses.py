@@ -15,7 +15,7 @@ from scipy.ndimage import binary_closing
 
 from tts2face.face.deformation import build_rig
 from tts2face.models.face import Face
-from tts2face.models.talker import load_talker
+from tts2face.models.talker_file import load_talker
 from tts2face.picture.baked.surface import N_COLUMNS, TRIANGLE_MASK, X, Y, nearest_triangles, project
 from tts2face.picture.camera import camera_matrices
 from tts2face.picture.options import CameraView

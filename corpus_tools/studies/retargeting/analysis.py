@@ -20,7 +20,7 @@ from tts2face.lips.performer import build_performer_retargeter
 from tts2face.lips.retargeting import BILABIALS
 from tts2face.models.face import Face
 from tts2face.models.landmarks import inner_lip_gaps, lip_opening, lip_width
-from tts2face.models.networks import SCORE_SHAPES, mouth_scores
+from tts2face.models.score_map import SCORE_SHAPES, mouth_scores
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
 from tts2face.types import Progress, Trajectory

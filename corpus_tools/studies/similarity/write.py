@@ -27,7 +27,7 @@ from corpus_tools.studies.similarity.tables import (
     phone_label,
 )
 from lexicon.phones import look_up_phone
-from tts2face.models.talker import load_talker
+from tts2face.models.talker_file import load_talker
 from tts2face.storage.files import write_atomically
 from tts2face.types import Progress
 

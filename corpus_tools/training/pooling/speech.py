@@ -23,7 +23,7 @@ from lexicon.pronounce import pronounce
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.lips.explanation import speech_frames
 from tts2face.lips.tokens import build_targets, target_phones
-from tts2face.models.networks import PhoneNetwork
+from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import Talker
 from tts2face.types import Progress, frame_count
 

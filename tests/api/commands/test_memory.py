@@ -3,7 +3,7 @@
 import gc
 
 from tts2face.models.face_loading import load_face
-from tts2face.models.talker import load_talker
+from tts2face.models.talker_file import load_talker
 from tts2face.request import Request
 from tts2face.session.session import Session
 from tts2face.types import Clip, Speech, Trajectory, Waveform

@@ -34,7 +34,8 @@ from lexicon.sequence import SILENCE
 from tests.corpus_tools.speaking import FPS, OPENINGS, observation
 from tts2face.models.audio_map import FEATURE_SIZES, AudioMap
 from tts2face.models.landmarks import lip_opening
-from tts2face.models.talker import Talker, read_talker, write_talker
+from tts2face.models.talker import Talker
+from tts2face.models.talker_file import read_talker, write_talker
 
 PASSES = TrainingOptions(hidden=(24, 16), n_epochs=60, weight_decay=1e-4)
 FEW_PASSES = replace(PASSES, n_epochs=4)  # where it does not matter what the networks have learnt

@@ -11,7 +11,8 @@ from corpus_tools.clone_talker import clone_talker, transfer_talker
 from lexicon.errors import InputError
 from tests.lips.test_clone import gaps_of, model_of, opening_model
 from tts2face.lips.cloning import build_parameter_transfer, face_size
-from tts2face.models.talker import Talker, load_talker, read_talker
+from tts2face.models.talker import Talker
+from tts2face.models.talker_file import load_talker, read_talker
 
 SOURCE_STATED = {
     "name": "A",

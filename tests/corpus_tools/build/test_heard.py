@@ -21,7 +21,7 @@ from corpus_tools.studies.evaluation.person_tracks import TRACKED
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.speaking import track_arrays
 from tts2face.lips.exemplar import build_exemplar_model, speech_trajectory
-from tts2face.models.talker import load_talker
+from tts2face.models.talker_file import load_talker
 from tts2face.sound.voice_pool import load_voice
 
 TEXTS = (

@@ -31,7 +31,7 @@ from lexicon.errors import InputError
 from tests.corpus_tools.build.test_people import write_tracks
 from tests.corpus_tools.speaking import FPS, observation
 from tests.kept import kept
-from tts2face.models.talker import write_talker
+from tts2face.models.talker_file import write_talker
 
 TRAIN = [observation(number) for number in range(16)]
 TEST = [observation(100 + number) for number in range(4)]

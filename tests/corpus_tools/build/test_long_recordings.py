@@ -14,7 +14,7 @@ from corpus_tools.studies.recordings_page import recordings_page
 from lexicon.sequence import SILENCE
 from tests.corpus_tools.films import join_clips
 from tests.rendered_takes import manifest_rows
-from tts2face.models.talker import read_talker
+from tts2face.models.talker_file import read_talker
 
 N_CLIPS = 17
 LATE_S = 0.2

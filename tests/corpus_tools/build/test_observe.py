@@ -18,7 +18,7 @@ from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, InputError
 from tests.conftest import SHARED
 from tests.rendered_takes import ONLY_RENDERED
-from tts2face.models.talker import read_talker
+from tts2face.models.talker_file import read_talker
 from tts2face.video.media import read_frames
 from tts2face.video.streaming import StreamingTracker
 

@@ -26,7 +26,8 @@ from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE
 from tests.corpus_tools.speaking import FPS, OPENINGS, observation, track_arrays, with_words
 from tts2face.lips.explanation import speech_frames
-from tts2face.models.talker import Talker, write_talker
+from tts2face.models.talker import Talker
+from tts2face.models.talker_file import write_talker
 
 
 @pytest.fixture(scope="module")

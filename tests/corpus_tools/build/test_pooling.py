@@ -27,7 +27,8 @@ from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE
 from tests.corpus_tools.speaking import FPS, observation
 from tts2face.models.landmarks import CHIN
-from tts2face.models.talker import Talker, read_talker, write_talker
+from tts2face.models.talker import Talker
+from tts2face.models.talker_file import read_talker, write_talker
 
 ERROR_BEFORE_S = 0.3  # of the times given with a track
 

@@ -17,8 +17,8 @@ from corpus_tools.training.calibrate_face import (
 from corpus_tools.training.score_map import MAX_LOGIT, add_score_map, clipped_logits, fit_score_map, read_mouth_scores
 from lexicon.errors import DataError
 from tts2face.models.face_file import read_face
-from tts2face.models.networks import N_SCORES, SCORE_SHAPES, logistic
-from tts2face.models.talker import load_talker
+from tts2face.models.score_map import N_SCORES, SCORE_SHAPES, logistic
+from tts2face.models.talker_file import load_talker
 from tts2face.storage.shipped import find_file
 from tts2face.storage.tensors import read_tensors
 from tts2face.video.blendshapes import BlendshapeReader

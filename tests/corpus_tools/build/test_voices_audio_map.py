@@ -9,7 +9,8 @@ from corpus_tools.shipped.training.damage import damage
 from corpus_tools.shipped.training.spoken_material import KnownSpeech, resampled
 from corpus_tools.training import voices_audio_map
 from lexicon.sequence import PhoneSequence
-from tts2face.models.talker import Talker, load_talker
+from tts2face.models.talker import Talker
+from tts2face.models.talker_file import load_talker
 from tts2face.sound.voice_pool import load_voice
 
 TEXTS = (

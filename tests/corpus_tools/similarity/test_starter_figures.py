@@ -7,7 +7,7 @@ import pytest
 
 from corpus_tools.studies.similarity.analysis import Analysis, NamedTalker, SimilarityOptions, analyse
 from tests.packages import needs
-from tts2face.models.talker import load_talker
+from tts2face.models.talker_file import load_talker
 
 DOC = Path(__file__).resolve().parents[3] / "docs" / "accuracy.md"
 

@@ -8,7 +8,7 @@ import pytest
 
 from cli.main import run
 from corpus_tools.clone_talker import clone_talker
-from tts2face.models.talker import load_talker, read_talker, write_talker
+from tts2face.models.talker_file import load_talker, read_talker, write_talker
 
 
 @pytest.fixture

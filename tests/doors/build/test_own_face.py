@@ -11,7 +11,7 @@ from cli.main import run
 from corpus_tools.appearance.transfer import build_appearance_transfer
 from tests.rendered_takes import ONLY_RENDERED, manifest_rows
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
-from tts2face.models.talker import read_talker
+from tts2face.models.talker_file import read_talker
 from tts2face.video.tracking import FaceTracker
 
 N_RECORDINGS = 10

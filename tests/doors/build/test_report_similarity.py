@@ -13,7 +13,7 @@ from PIL import Image
 
 from cli.main import run
 from tests.corpus_tools.similarity.steady_talker import made_talker
-from tts2face.models.talker import write_talker
+from tts2face.models.talker_file import write_talker
 
 pytestmark = pytest.mark.needs("matplotlib", "sklearn")
 

@@ -20,8 +20,9 @@ from tts2face.lips.exemplar import (
 from tts2face.lips.options import SynthesisOptions
 from tts2face.lips.token_search import context_weights
 from tts2face.lips.tokens import Targets, target_phones
-from tts2face.models.networks import PhoneNetwork, window_features
-from tts2face.models.talker import Talker, read_talker, write_talker
+from tts2face.models.phone_network import PhoneNetwork, window_features
+from tts2face.models.talker import Talker
+from tts2face.models.talker_file import read_talker, write_talker
 
 PHONES = PhoneSequence([SILENCE, "b", "i", "p", SILENCE], [0.0, 0.3, 0.4, 0.6, 0.7, 1.0])
 KNOWN = ("b", "i", "p", SILENCE)

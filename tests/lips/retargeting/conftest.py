@@ -3,7 +3,8 @@
 import pytest
 
 from tts2face.lips.exemplar import ExemplarModel, build_exemplar_model
-from tts2face.models.talker import Talker, load_talker
+from tts2face.models.talker import Talker
+from tts2face.models.talker_file import load_talker
 
 
 @pytest.fixture(scope="session")

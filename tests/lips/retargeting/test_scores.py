@@ -13,8 +13,9 @@ from tts2face.lips.score_matching import REST_TOLERANCE, build_score_matching, s
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, UPPER_LIP_INNER_MID
-from tts2face.models.networks import N_SCORES, SCORE_SHAPES, ScoreMap, logistic, mouth_scores
-from tts2face.models.talker import Talker, read_talker, speech_channels, write_talker
+from tts2face.models.score_map import N_SCORES, SCORE_SHAPES, ScoreMap, logistic, mouth_scores
+from tts2face.models.talker import Talker, speech_channels
+from tts2face.models.talker_file import read_talker, write_talker
 from tts2face.numeric.least_squares import bounded_least_squares
 from tts2face.storage.shipped import find_file
 from tts2face.types import Trajectory

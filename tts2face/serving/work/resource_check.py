@@ -137,11 +137,11 @@ def _check_type(kind: str, source: Path) -> None:
 
 
 def _check_talker(source: Path, out: Path) -> dict[str, Any]:
-    from tts2face.models import talker
+    from tts2face.models.talker_file import FORMAT_VERSION, read_talker
     from tts2face.session.catalogue import describe_talker
 
-    _rewrite(source, out, TALKER, talker.FORMAT_VERSION)
-    found = talker.read_talker(out)
+    _rewrite(source, out, TALKER, FORMAT_VERSION)
+    found = read_talker(out)
     if found.appearance is not None and not states_consent(found.metadata):
         raise DataError("it shows a person's face, but states no consent; build it with --consent")
     _try_speech(out)

@@ -28,7 +28,7 @@ from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
 from tts2face.models.landmarks import LIP_LANDMARKS
 from tts2face.models.palette import load_palette
-from tts2face.models.talker import load_talker
+from tts2face.models.talker_file import load_talker
 from tts2face.types import Trajectory
 
 PLACE_MM = 0.02  # of a landmark after its table with 7 digits; quantised files have steps of 0.015 mm

@@ -22,7 +22,7 @@ from tests.rendered_takes import transcript
 from tests.running import HostService, eventually
 from tests.serving.service.job_requests import finished
 from tests.serving.service.server.test_resource_check import WORDS
-from tts2face.models.talker import load_talker
+from tts2face.models.talker_file import load_talker
 from tts2face.serving.service.keys import add_key
 from tts2face.video.media import read_sound
 

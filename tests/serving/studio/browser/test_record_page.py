@@ -9,7 +9,7 @@ import pytest
 from corpus_tools.prompts.coverage import count_units, sentence_units
 from corpus_tools.tools.recordings import prompts_answer
 from tests.serving.studio.chromium import Browser
-from tts2face.models.talker import load_talker
+from tts2face.models.talker_file import load_talker
 from tts2face.serving.service.keys import LOCAL_KEY
 from tts2face.serving.studio.recordings import RecordingStore
 
