@@ -109,7 +109,7 @@ def test_so_many_run_at_once_of_each_owner_in_their_order(tmp_path):
         raise AssertionError
 
     async def check():
-        work = make_list(tmp_path, run, at_once=2)
+        work = make_list(tmp_path, run, places=2)
         made = {name: add(work, tmp_path, name) for name in "abcd"}
         other = add(work, tmp_path, "e", owner="eve")
         await until(lambda: len(running) == 3)
@@ -173,7 +173,7 @@ def test_cancelled_work_is_listed_and_removed_work_is_not(tmp_path):
         raise AssertionError
 
     async def check():
-        work = make_list(tmp_path, run, at_once=2)
+        work = make_list(tmp_path, run, places=2)
         one, other, waiting = (add(work, tmp_path, name) for name in "abc")
         await until(lambda: other.state == RUNNING)
         work.cancel(one)
@@ -188,7 +188,7 @@ def test_cancelled_work_is_listed_and_removed_work_is_not(tmp_path):
 
 def test_work_in_a_folder_is_forgotten_with_it(tmp_path):
     async def check():
-        work = make_list(tmp_path, forever, at_once=2)
+        work = make_list(tmp_path, forever, places=2)
         gone, kept = (add(work, tmp_path / name, name) for name in ("one", "other"))
         await until(lambda: gone.state == RUNNING)
         await work.forget(tmp_path / "one")

@@ -40,7 +40,7 @@ BUILD = "build"
 SAY = "say"
 CHECK = "check"
 WORK, ORDER = "recording", "work.json"  # kind of work, and its order in the folder of a recording
-AT_ONCE = 5  # recordings of an owner
+PLACES = 5  # recordings of an owner
 BUILDS = Shares(1, 1, 1000)  # talkers that are built: each takes a core and 1 GB for up to an hour
 
 
@@ -55,7 +55,7 @@ class Recordings:
         busy = "the last order still runs; wait for it, or cancel it"
         late = "the work took too long; try it with fewer takes"
         orders = f"recordings/*/{ORDER}"
-        work.register(WorkKind(WORK, orders, self._run, stage="starting", at_once=AT_ONCE, busy=busy, late=late))
+        work.register(WorkKind(WORK, orders, self._run, stage="starting", places=PLACES, busy=busy, late=late))
         work.register(WorkKind(CHECK, f"recordings/*/{UNCHECKED_FOLDER}/*.json", self._check, end=self._end_check))
 
     async def prompts(self, minutes: float, language: str, text: str | None) -> Mapping[str, Any]:

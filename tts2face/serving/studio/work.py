@@ -1,4 +1,4 @@
-"""Background work of the studio: what waits, runs and has ended, and what the next server goes on with.
+"""The list of background work of the studio: waiting, running and ended, and how the next server goes on.
 
 What waits or runs has an order, a file of JSON beside what it makes: its owner, the tries so far, and what is to be
 done. The order goes when the work ends; a server that begins queues those that it finds.
@@ -76,7 +76,15 @@ class BackgroundWork:
 
 @dataclass(frozen=True, slots=True)
 class WorkKind:
-    """How work of a kind is done, and how much of it an owner may have."""
+    """How work of a kind is done, and how much of it an owner may have.
+
+    The next kind, as `tts2face.serving.studio.reports` shows:
+    1. a class that registers it with the pattern of its orders, so that the next server finds them;
+    2. `prepare`, which sets title and files by the content of an order, and `run`, which makes the files and calls
+       `BackgroundWork.show`; it may run again, at most `MAX_TRIES` times, from nothing;
+    3. its place in `Studio`, and its routes and page;
+    4. a test that it goes on with the next server (``tests/serving/studio/test_work.py``).
+    """
 
     name: str
     orders: str  # pattern of the paths of orders, from the folder of the studio
@@ -84,7 +92,7 @@ class WorkKind:
     prepare: Callable[[BackgroundWork], None] = lambda _: None  # sets title and files by the content, or refuses it
     end: Callable[[BackgroundWork], None] = lambda _: None  # after any end but that of the server
     stage: str = ""  # of work that waits
-    at_once: int = 1  # of an owner, running
+    places: int = 1  # of an owner, running
     max_open: int = 10_000  # of an owner, waiting or running
     noun: str = "files"  # what is made, for the refusal of more than `max_open`
     busy: str = "this is at work already; wait until it is done"  # the refusal of work that is open
@@ -207,7 +215,7 @@ class WorkList:
     async def _run(self, work: BackgroundWork) -> None:
         kind = self._kinds[work.kind]
         try:
-            async with self._turns.setdefault((work.kind, work.owner), asyncio.Semaphore(kind.at_once)):
+            async with self._turns.setdefault((work.kind, work.owner), asyncio.Semaphore(kind.places)):
                 work.state, work.tries = RUNNING, work.tries + 1
                 _write_order(work)
                 _remove(work.files)  # of a try that an ended server left

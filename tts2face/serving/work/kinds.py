@@ -4,7 +4,7 @@ The next kind:
 1. its function in a module of this room, ``NAME_job.py``: it may run again after any death, so that whatever it stores
    has a name by content, or is replaced;
 2. its row in `KINDS`, with a queue of `PLACES` if it computes for minutes;
-3. what clients send, and its checks, as a `JobKind` of `tts2face.serving.service.orders` in `JOB_KINDS` (`options`);
+3. what clients send, and its checks, in a module of ``service/job_kinds`` and a row of `JOB_KINDS`;
 4. a test of the function with a `JobTask` made by hand (``tests/serving/work/test_talker_job.py``).
 """
 
@@ -30,8 +30,8 @@ MEDIA_TYPES = {
 
 
 @dataclass(frozen=True, slots=True)
-class JobKind:
-    """A kind of jobs. Work of the studio, which changes what an open page shows, is a `WorkKind` of its list.
+class Execution:
+    """How jobs of a kind are executed. Work that changes what an open page shows is a `WorkKind` of the studio.
 
     Parameters
     ----------
@@ -45,10 +45,10 @@ class JobKind:
     queue: str = JOB_QUEUE
 
 
-KINDS: Mapping[str, JobKind] = MappingProxyType({
-    "clip": JobKind("tts2face.serving.work.clip_job:run_clip"),
-    "subtitles": JobKind("tts2face.serving.work.subtitles_job:run_subtitles"),
-    "talker": JobKind("tts2face.serving.work.talker_job:run_talker", TALKER_QUEUE),
+KINDS: Mapping[str, Execution] = MappingProxyType({
+    "clip": Execution("tts2face.serving.work.clip_job:run_clip"),
+    "subtitles": Execution("tts2face.serving.work.subtitles_job:run_subtitles"),
+    "talker": Execution("tts2face.serving.work.talker_job:run_talker", TALKER_QUEUE),
 })  # fmt: skip
 
 

@@ -1,0 +1,14 @@
+"""Kinds of jobs: each that clients may ask for is executed, and has places in a worker."""
+
+import pytest
+
+from tts2face.serving.service.job_kinds.table import JOB_KINDS
+from tts2face.serving.work.kinds import KINDS, find_runner
+from tts2face.serving.work.queues import PLACES
+
+
+@pytest.mark.parametrize("kind", sorted({*KINDS, *JOB_KINDS}))
+def test_a_kind_is_asked_for_executed_and_has_places(kind: str) -> None:
+    assert kind in JOB_KINDS, "add it to tts2face.serving.service.job_kinds.table"
+    assert callable(find_runner(kind))
+    assert PLACES[KINDS[kind].queue] > 0
