@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.serving.studio.editing import MAX_STEPS, History
+from tts2face.serving.studio.history import MAX_STEPS, History
 from tts2face.session.project import Project
 
 BEGIN = History(Project(name="0"))

@@ -11,7 +11,7 @@ import pytest
 
 from lexicon.errors import BackendError, DataError, InputError
 from tts2face.request import Request
-from tts2face.serving.studio.editing import History
+from tts2face.serving.studio.history import History
 from tts2face.serving.studio.project_archive import archive
 from tts2face.serving.studio.project_store import ASSETS, HISTORY, PROJECT, ProjectStore
 from tts2face.session.project import Project

@@ -14,7 +14,7 @@ from tts2face.serving.service.keys import LOCAL_KEY
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.studio import workspace as opened
-from tts2face.serving.studio.editing import History
+from tts2face.serving.studio.history import History
 from tts2face.serving.studio.preview_bundle import PieceMemory
 from tts2face.serving.studio.project_store import ProjectStore
 from tts2face.serving.studio.workspace import Listener, Workspace

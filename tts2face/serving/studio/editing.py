@@ -1,13 +1,16 @@
 """Edits of a project, as a page sends them. Pure: no files, no clock, no pages.
 
-An edit is a JSON object with a ``kind`` and the fields of `EDITS`.
+An edit is a JSON object with a ``kind`` and the fields of `EDITS`, from which ``components/protocol.js`` is made.
+A new kind of edit:
 
-The history of a project: what was before, what was undone. Pure.
+1. a function of the project, the fields and the sentences, which returns the changed project;
+2. a row of `EDITS` with the types of its fields; if it adds or removes elements of a timeline, with their kind;
+3. ``python -m tts2face.serving.studio.protocol``, and a component that emits ``EDITS.name({...})``.
 """
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -25,9 +28,15 @@ from tts2face.session.project import Project
 
 MIN_PHONE_S = 0.01  # shortest phone that dragging an edge leaves: a frame of the alignment
 NEAR_S = 0.05  # within which a nod is the one at a time
-
 Edit = Mapping[str, Any]
 Sentences = Mapping[tuple[str, int], PhoneSequence]  # phones of each sentence by its text and occurrence
+Change = Callable[[Project, Edit, Sentences], Project]
+_SPAN = {"start": float, "end": float}
+_TIME = {"time": float}
+_LANE = {"feature": str, "on": bool}
+_SENTENCE = {"text": str, "occurrence": int}
+_OPTIONS = {"options": dict}
+_GAZE, _LISTENS = KINDS["gaze"], KINDS["listens"]
 
 
 def apply(project: Project, edit: Edit, sentences: Sentences | None = None) -> Project:
@@ -46,9 +55,8 @@ def apply(project: Project, edit: Edit, sentences: Sentences | None = None) -> P
     kind = edit.get("kind")
     if not isinstance(kind, str) or kind not in EDITS:
         raise InputError(f"there is no edit {str(kind)[:40]!r}; choose one of {', '.join(EDITS)}")
-    types, change = EDITS[kind]
-    given = {name: _checked(kind, name, wanted, edit) for name, wanted in types.items()}
-    return change(project, given, sentences or {})
+    given = {name: _checked(kind, name, wanted, edit) for name, wanted in EDITS[kind].fields.items()}
+    return EDITS[kind].change(project, given, sentences or {})
 
 
 def _checked(kind: str, name: str, wanted: type, edit: Edit) -> Any:
@@ -201,115 +209,48 @@ def _timed(project: Project, **changes: Any) -> Project:
     return replace(project, timeline=timeline)
 
 
-Change = Callable[[Project, Edit, Sentences], Project]
-_SPAN = {"start": float, "end": float}
-EDITS: Mapping[str, tuple[Mapping[str, type], Change]] = {
-    "paint": ({"feature": str, "style": str, **_SPAN}, _paint),
-    "erase": ({"feature": str, **_SPAN}, _erase),
-    **{
-        edit: ({KINDS[name].owner: str, "keys": list}, partial(_curve, KINDS[name]))
-        for edit, name in (("curve", "curves"), ("strength", "strengths"), ("channel", "edits"))
-    },
-    "nod": ({"time": float, "size": float}, _nod),
-    "remove_nod": ({"time": float}, _remove_nod),
-    "gaze": ({**_SPAN, "down_deg": float, "left_deg": float}, partial(_place, KINDS["gaze"])),
-    "remove_gaze": ({"time": float}, partial(_remove_span, KINDS["gaze"], "gaze target")),
-    "listen": (_SPAN, partial(_place, KINDS["listens"])),
-    "remove_listen": ({"time": float}, partial(_remove_span, KINDS["listens"], "listening span")),
-    "mute": ({"feature": str, "on": bool}, _mute),
-    "solo": ({"feature": str, "on": bool}, _solo),
-    "seed": ({"feature": str, "seed": int}, _seed),
-    "edge": ({"text": str, "occurrence": int, "index": int, "time": float}, _edge),
-    "reset_edges": ({"text": str, "occurrence": int}, _reset_edges),
-    "pronounce": ({"word": str, "phones": str}, _pronounce),
-    "exclude": ({"utterance": str, "start": float, "on": bool}, _exclude),
-    "request": ({"options": dict}, _request),
-    "models": ({"options": dict}, _models),
-    "picture": ({"options": dict}, _picture),
-    "name": ({"name": str}, _name),
-}  # fields with their types, and what the edit changes
-
-
-MAX_STEPS = 100  # that can be undone
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Step:
-    """A state of a project beside its present one; `topic` is that of the edit between it and the next later state."""
-
-    project: Project
-    topic: str = ""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class History:
-    """A project with its earlier and its undone states.
+@dataclass(frozen=True, slots=True)
+class EditKind:
+    """A kind of edits.
 
     Parameters
     ----------
-    past
-        Earlier states, the oldest first, at most `MAX_STEPS`.
-    future
-        Undone states, the one that `redo` returns to last.
+    fields
+        Names and types of its fields.
+    change
+        What it changes.
+    adds, removes
+        Kind of the elements of the timeline (`KINDS`) that it adds or removes; a curve is set as a whole.
     """
 
-    present: Project
-    past: tuple[Step, ...] = ()
-    future: tuple[Step, ...] = ()
-
-    def add(self, project: Project, topic: str = "", *, continues: bool = False) -> "History":
-        """The history with a new state.
-
-        Parameters
-        ----------
-        topic
-            What the edit changed: its kind, and in which part.
-        continues
-            Whether the edit continues the last one if both have the same topic, so that one undo takes both back.
-        """
-        if _is_equal(project, self.present):
-            return self
-        if continues and self.past and not self.future and topic and self.past[-1].topic == topic:
-            return replace(self, present=project)
-        return History(project, (*self.past, Step(self.present, topic))[-MAX_STEPS:])
-
-    def amend(self, project: Project) -> "History":
-        """The history with another present state, which undo does not know: for what follows from an edit."""
-        return replace(self, present=project)
-
-    def revise(self, change: Callable[[Project], Project]) -> "History":
-        """The history with every state changed alike: for what holds of the past, too, as the name of a style."""
-        past, future = (
-            tuple(Step(change(one.project), one.topic) for one in part) for part in (self.past, self.future)
-        )
-        return History(change(self.present), past, future)
-
-    def undo(self) -> "History":
-        """The state before the last edit.
-
-        Raises
-        ------
-        InputError
-            There is none.
-        """
-        if not self.past:
-            raise InputError("there is nothing to undo")
-        last = self.past[-1]
-        return History(last.project, self.past[:-1], (*self.future, Step(self.present, last.topic)))
-
-    def redo(self) -> "History":
-        """The state that was undone last.
-
-        Raises
-        ------
-        InputError
-            There is none.
-        """
-        if not self.future:
-            raise InputError("there is nothing to redo")
-        last = self.future[-1]
-        return History(last.project, (*self.past, Step(self.present, last.topic)), self.future[:-1])
+    fields: Mapping[str, type]
+    change: Change
+    adds: str = ""
+    removes: str = ""
 
 
-def _is_equal(a: Project, b: Project) -> bool:
-    return all(getattr(a, one.name) == getattr(b, one.name) for one in fields(Project))
+EDITS: Mapping[str, EditKind] = {
+    "paint": EditKind({"feature": str, "style": str, **_SPAN}, _paint, adds="spans"),
+    "erase": EditKind({"feature": str, **_SPAN}, _erase, removes="spans"),
+    **{
+        edit: EditKind({KINDS[name].owner: str, "keys": list}, partial(_curve, KINDS[name]), adds=name)
+        for edit, name in (("curve", "curves"), ("strength", "strengths"), ("channel", "edits"))
+    },
+    "nod": EditKind({"time": float, "size": float}, _nod, adds="nods"),
+    "remove_nod": EditKind(_TIME, _remove_nod, removes="nods"),
+    "gaze": EditKind({**_SPAN, "down_deg": float, "left_deg": float}, partial(_place, _GAZE), adds="gaze"),
+    "remove_gaze": EditKind(_TIME, partial(_remove_span, _GAZE, "gaze target"), removes="gaze"),
+    "listen": EditKind(_SPAN, partial(_place, _LISTENS), adds="listens"),
+    "remove_listen": EditKind(_TIME, partial(_remove_span, _LISTENS, "listening span"), removes="listens"),
+    "mute": EditKind(_LANE, _mute),
+    "solo": EditKind(_LANE, _solo),
+    "seed": EditKind({"feature": str, "seed": int}, _seed),
+    "edge": EditKind({**_SENTENCE, "index": int, "time": float}, _edge),
+    "reset_edges": EditKind(_SENTENCE, _reset_edges),
+    "pronounce": EditKind({"word": str, "phones": str}, _pronounce),
+    "exclude": EditKind({"utterance": str, "start": float, "on": bool}, _exclude),
+    "request": EditKind(_OPTIONS, _request),
+    "models": EditKind(_OPTIONS, _models),
+    "picture": EditKind(_OPTIONS, _picture),
+    "name": EditKind({"name": str}, _name),
+}

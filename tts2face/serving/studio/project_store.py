@@ -15,7 +15,7 @@ from lexicon.dictionary import parse_dictionary
 from lexicon.errors import DataError, InputError
 from lexicon.values.files import read_text
 from lexicon.values.json_text import LARGEST_JSON_BYTES, parse_json
-from tts2face.serving.studio.editing import History, Step
+from tts2face.serving.studio.history import History, Step
 from tts2face.serving.studio.owned_folders import OwnedFolders
 from tts2face.session.project import Project
 from tts2face.session.project_file import parse_project, project_json

@@ -13,7 +13,8 @@ from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.studio.comparison import ComparedProject
-from tts2face.serving.studio.editing import Edit, History, apply
+from tts2face.serving.studio.editing import Edit, apply
+from tts2face.serving.studio.history import History
 from tts2face.serving.studio.preview_bundle import PieceMemory, Preview
 from tts2face.serving.studio.previews import ProjectPreview
 from tts2face.serving.studio.project_store import ProjectStore

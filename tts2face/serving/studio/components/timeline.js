@@ -2,13 +2,13 @@
 
 import { clock } from "tts2face-studio/clock.js";
 import { comparison, loadPreview, preview } from "tts2face-studio/preview.js";
+import { EDITS, EXPRESSIONS, FEATURES, HEAD_CHANNELS } from "tts2face-studio/protocol.js";
 import { addStyle } from "tts2face-studio/style.js";
 import { TimelineHost } from "tts2face-studio/timeline_host.js";
 import { describeItem, rowItems } from "tts2face-studio/timeline_items.js";
 import { same } from "tts2face-studio/timeline_keyboard.js";
-import { FEATURES, HEAD_CHANNELS, formatTime, layoutRows } from "tts2face-studio/timeline_view.js";
+import { formatTime, layoutRows } from "tts2face-studio/timeline_view.js";
 
-const EXPRESSIONS = ["sad", "happy", "afraid", "angry", "surprised"];
 const HELP = `Up and Down choose a row, Left and Right an element. Space plays. Left bracket and right bracket set the ends
   of the selection at the playhead; Enter paints it on a lane, opens an element or adds one; Delete removes. Alt with
   arrows moves an element. Plus and minus zoom.`;
@@ -188,10 +188,10 @@ export default {
       return this.timeline.seeds?.[row.feature] ?? this.laneOf(row).seed ?? 0;
     },
     emitLane(kind, row, on) {
-      this.$emit("edit", { kind, feature: row.feature, on });
+      this.$emit("edit", EDITS[kind]({ feature: row.feature, on }));
     },
     reroll(row) {
-      this.host.emit({ kind: "seed", feature: row.feature, seed: this.seedOf(row) + 1 });
+      this.host.emit(EDITS.seed({ feature: row.feature, seed: this.seedOf(row) + 1 }));
     },
     cellId(number) {
       return `studio-cell-${this.$.uid}-${number}`;

@@ -250,7 +250,7 @@ export class Painter {
     this.#axis(row, 0, low, high);
     const other = columnOf(comparison, chosen.channel);
     if (comparison.nFrames && other !== null) this.#frames(row, comparison, other, colors.compare, low, high, () => 0, [5, 3]);
-    const keys = model.channels.get(chosen.channel) ?? [];
+    const keys = model.edits.get(chosen.channel) ?? [];
     const shift = (time) => curveValue(keys, time) - curveValue(baseKeys, time);
     this.#frames(row, preview, column, colors.curve, low, high, shift, []);
     for (const [time] of keys) this.#handle(state.view.x(time), valueY(row, frameValue(preview, column, time) + shift(time), low, high));

@@ -1,6 +1,7 @@
 // Forms in which the values of an element are typed.
 
 import { clock } from "./clock.js";
+import { EDITS, KINDS } from "./protocol.js";
 import { SPAN_ROWS } from "./timeline_values.js";
 import { rounded } from "./timeline_view.js";
 
@@ -25,29 +26,29 @@ function openSpan(host, row, item) {
   const fields = [{ name: "style", label: "Style", value: style, options: styles.map((one) => one.name) }, ...times(start, end, view.duration)];
   const apply = (values) => {
     if (values.end <= values.start) return host.component.say("The end must lie after the start.");
-    if (values.start > start || values.end < end) host.emit({ kind: "erase", feature, start, end });
-    return host.emit({ kind: "paint", feature, style: values.style, start: values.start, end: values.end });
+    if (values.start > start || values.end < end) host.emit(EDITS.erase({ feature, start, end }));
+    return host.emit(EDITS.paint({ feature, ...values }));
   };
   host.component.openEditor(`Style on ${row.label}`, fields, apply, () => host.remove(row, item));
 }
 
 function openNod(host, row, item) {
   const { time, size } = item.nod;
-  const fields = [number("time", "Time in seconds", time, 0, host.state.view.duration, 0.01), number("size", "Size (1 is 6°)", size, 0.1, 2, 0.1)];
+  const fields = [number("time", "Time in seconds", time, 0, host.state.view.duration, 0.01), number("size", "Size (1 is 6°)", size, ...KINDS.nods.limits, 0.1)];
   host.component.openEditor("Nod", fields, (values) => host.replaceNod(item.nod, values.time, values.size), () => host.remove(row, item));
 }
 
 function openElement(host, row, item) {
-  const { element } = item, { kind, title } = SPAN_ROWS[row.id];
+  const { element } = item, { list, title } = SPAN_ROWS[row.id], { add, remove, limits } = KINDS[list];
   const fields = times(element.start, element.end, host.state.view.duration);
-  if (kind === "gaze") {
-    fields.push(number("down_deg", "Degrees down", element.down_deg, -35, 35, 1));
-    fields.push(number("left_deg", "Degrees to the person’s left", element.left_deg, -35, 35, 1));
+  if (list === "gaze") {
+    fields.push(number("down_deg", "Degrees down", element.down_deg, ...limits, 1));
+    fields.push(number("left_deg", "Degrees to the person’s left", element.left_deg, ...limits, 1));
   }
   const apply = (values) => {
     if (values.end <= values.start) return host.component.say("The end must lie after the start.");
-    host.emit({ kind: `remove_${kind}`, time: element.start });
-    return host.emit({ kind, ...values });
+    host.emit(EDITS[remove]({ time: element.start }));
+    return host.emit(EDITS[add](values));
   };
   host.component.openEditor(title, fields, apply, () => host.remove(row, item));
 }

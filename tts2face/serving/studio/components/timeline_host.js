@@ -4,6 +4,7 @@ import { clock } from "./clock.js";
 import { metrics, Meter } from "./metrics.js";
 import { comparison, preview } from "./preview.js";
 import { Frames, pace } from "./pace.js";
+import { EDITS, KINDS, LEAST_PHONE_S } from "./protocol.js";
 import { openEditor } from "./timeline_editor.js";
 import { Painter, readColors } from "./timeline_draw.js";
 import { rowItems } from "./timeline_items.js";
@@ -14,7 +15,6 @@ import { SPAN_ROWS } from "./timeline_values.js";
 import { curveValue, formatTime, rounded, View } from "./timeline_view.js";
 import { Waveform } from "./waveform.js";
 
-const EDGE_LEAST_S = 0.01;
 const TEXT_S = 0.2; // between two texts of the time that plays: each makes the browser draw a part of the page
 const NUDGE_PAUSE_MS = 350; // an edge that keys move is sent when they rest
 const WHEEL_ZOOM = 0.0015;
@@ -82,7 +82,7 @@ export class TimelineHost {
   takePreview() {
     const { state } = this, { view } = state;
     state.phones = preview.phones.map((phone) => [...phone]);
-    state.baseKeys = state.model.channels.get(state.chosen.channel) ?? [];
+    state.baseKeys = state.model.edits.get(state.chosen.channel) ?? [];
     if (this.pcm !== preview.pcm) {
       this.pcm = preview.pcm;
       state.waveform = preview.pcm.length ? new Waveform(preview.pcm, preview.rate) : null;
@@ -97,7 +97,7 @@ export class TimelineHost {
 
   choose(name, value) {
     this.state.chosen[name] = value;
-    if (name === "channel") this.state.baseKeys = this.state.model.channels.get(value) ?? [];
+    if (name === "channel") this.state.baseKeys = this.state.model.edits.get(value) ?? [];
     this.refocus();
   }
 
@@ -268,26 +268,27 @@ export class TimelineHost {
 
   remove(row, item) {
     const { state } = this;
-    if (item.kind === "span") this.emit({ kind: "erase", feature: row.feature, start: item.begin, end: Math.min(item.end, state.view.duration) });
-    else if (item.kind === "nod") this.emit({ kind: "remove_nod", time: item.nod.time });
-    else if (SPAN_ROWS[row.id]) this.emit({ kind: `remove_${item.kind}`, time: item.begin });
+    if (item.kind === "span") this.emit(EDITS.erase({ feature: row.feature, start: item.begin, end: Math.min(item.end, state.view.duration) }));
+    else if (item.kind === "nod") this.emit(EDITS.remove_nod({ time: item.nod.time }));
+    else if (SPAN_ROWS[row.id]) this.emit(EDITS[KINDS[SPAN_ROWS[row.id].list].remove]({ time: item.begin }));
     else if (item.kind === "key") this.emit(state.model.removeKey(state.model.curveOf(row, state.chosen), item.number));
   }
 
   replaceNod(nod, time, size) {
-    this.emit({ kind: "remove_nod", time: nod.time });
-    this.emit({ kind: "nod", time, size: rounded(Math.min(Math.max(size, 0.1), 2)) });
+    const [low, high] = KINDS.nods.limits;
+    this.emit(EDITS.remove_nod({ time: nod.time }));
+    this.emit(EDITS.nod({ time, size: rounded(Math.min(Math.max(size, low), high)) }));
   }
 
   moveEdge(index, time) {
     const phone = preview.phones[index], [text, occurrence, begin] = preview.sentences[phone[3]];
-    this.emit({ kind: "edge", text, occurrence, index: phone[4], time: rounded(time - begin) });
+    this.emit(EDITS.edge({ text, occurrence, index: phone[4], time: rounded(time - begin) }));
   }
 
   nudgeEdge(index, change) {
     const { phones } = this.state, [before, phone] = [phones[index - 1], phones[index]];
     if (!before || phone[4] === 0) return;
-    before[2] = phone[1] = rounded(Math.min(Math.max(phone[1] + change, before[1] + EDGE_LEAST_S), phone[2] - EDGE_LEAST_S));
+    before[2] = phone[1] = rounded(Math.min(Math.max(phone[1] + change, before[1] + LEAST_PHONE_S), phone[2] - LEAST_PHONE_S));
     this.focus(this.state.cursor.row, rowItems(this.state.cursor.row, this.state)[index]);
     clearTimeout(this.nudged);
     this.nudged = setTimeout(() => this.moveEdge(index, phone[1]), NUDGE_PAUSE_MS);

@@ -1,5 +1,6 @@
 // Elements of the rows of a timeline as a list: what keys reach, what a pointer hits, and what a screen reader says.
 
+import { KINDS } from "./protocol.js";
 import { SPAN_ROWS, columnOf, frameValue } from "./timeline_values.js";
 import { curveValue, firstAfter } from "./timeline_view.js";
 
@@ -41,8 +42,8 @@ export function rowAt(rows, y) {
 
 /** Limits of the values that a row shows: those of the chosen channel follow its curve. */
 export function shownLimits(row, state, channelRange) {
-  if (row.feature) return [0, 3];
-  return row.id === "curve" ? [-0.5, 1.5] : channelRange(state);
+  if (row.feature) return KINDS.strengths.limits;
+  return row.id === "curve" ? KINDS.curves.limits : channelRange(state);
 }
 
 /** Value at which a key of a row is drawn: that of the finished channel, else the key's own. */
@@ -55,7 +56,7 @@ export function shownValue(row, state, [time, value]) {
 export function channelValue(state, time) {
   const column = columnOf(state.preview, state.chosen.channel);
   if (column === null) return 0;
-  const keys = state.model.channels.get(state.chosen.channel) ?? [];
+  const keys = state.model.edits.get(state.chosen.channel) ?? [];
   return frameValue(state.preview, column, time) + curveValue(keys, time) - curveValue(state.baseKeys, time);
 }
 

@@ -2,6 +2,7 @@
 
 import { clock } from "./clock.js";
 import { rowItems } from "./timeline_items.js";
+import { EDITS } from "./protocol.js";
 import { SPAN_ROWS } from "./timeline_values.js";
 import { curveValue, rounded } from "./timeline_view.js";
 
@@ -95,8 +96,8 @@ function enter(state, host) {
   const { row, item } = state.cursor, time = rounded(clock.time);
   if (row.feature && state.range) {
     const range = { feature: row.feature, start: rounded(state.range[0]), end: rounded(state.range[1]) };
-    if (state.brush.tool === "eraser") host.emit({ kind: "erase", ...range });
-    else if (state.brush.style) host.emit({ kind: "paint", ...range, style: state.brush.style });
+    if (state.brush.tool === "eraser") host.emit(EDITS.erase(range));
+    else if (state.brush.style) host.emit(EDITS.paint({ ...range, style: state.brush.style }));
     return;
   }
   if (item && (item.begin === item.end ? Math.abs(item.begin - time) < 0.02 : true)) {
@@ -104,11 +105,11 @@ function enter(state, host) {
     host.open(row, item);
     return;
   }
-  if (row.id === "nods") host.emit({ kind: "nod", time, size: 1 });
+  if (row.id === "nods") host.emit(EDITS.nod({ time, size: 1 }));
   else if (SPAN_ROWS[row.id]) {
     const { kind, made } = SPAN_ROWS[row.id];
     const [start, end] = state.range ?? [time, Math.min(time + 1, state.view.duration)];
-    host.emit({ kind, start: rounded(start), end: rounded(end), ...made });
+    host.emit(EDITS[kind]({ start: rounded(start), end: rounded(end), ...made }));
   } else addKey(row, state, host, time);
 }
 
@@ -122,7 +123,7 @@ function addKey(row, state, host, time) {
 function remove(state, host) {
   const { row, item } = state.cursor;
   if (row.feature && state.range) {
-    host.emit({ kind: "erase", feature: row.feature, start: rounded(state.range[0]), end: rounded(state.range[1]) });
+    host.emit(EDITS.erase({ feature: row.feature, start: rounded(state.range[0]), end: rounded(state.range[1]) }));
     return;
   }
   if (item) host.remove(row, item);

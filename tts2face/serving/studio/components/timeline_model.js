@@ -1,10 +1,11 @@
 // The timeline of a project as the page shows it: what the server sent, with edits that it has not confirmed yet.
 
-import { FEATURES, curveValue, rounded } from "./timeline_view.js";
+import { EDITS, FEATURES, KINDS } from "./protocol.js";
+import { curveValue, rounded } from "./timeline_view.js";
 
 const LEAST_S = 0.01;
-export const STRENGTH = { low: 0, high: 3, rest: 1, flank: 0.5 };
-export const WEIGHT = { low: -0.5, high: 1.5, rest: 0, flank: 0.6 };
+/** Value without effect of each kind of curve, and the seconds from a first key to those beside it that have it. */
+const RESTS = { strengths: { rest: 1, flank: 0.5 }, curves: { rest: 0, flank: 0.6 }, edits: { rest: 0, flank: 0.3 } };
 const OPEN_END = Infinity;
 
 export class TimelineModel {
@@ -14,16 +15,14 @@ export class TimelineModel {
 
   set(timeline) {
     const copy = JSON.parse(JSON.stringify(timeline ?? {}));
-    const ended = (spans) => (spans ?? []).map((span) => ({ ...span, end: span.end ?? OPEN_END }));
+    const read = {
+      span: (spans) => spans.map((span) => ({ ...span, end: span.end ?? OPEN_END })),
+      instant: (instants) => instants,
+      curve: (curves, owner) => new Map(curves.map((curve) => [curve[owner], curve.keys])),
+    };
+    for (const [name, { shape, owner }] of Object.entries(KINDS)) this[name] = read[shape](copy[name] ?? [], owner);
+    this.spans = this.spans.flatMap((span) => expand(span));
     this.style = copy.style ?? {};
-    this.spans = ended(copy.spans).flatMap((span) => expand(span));
-    this.expressions = ended(copy.expressions);
-    this.nods = copy.nods ?? [];
-    this.gaze = ended(copy.gaze);
-    this.listens = ended(copy.listens);
-    this.strengths = byName(copy.strengths, "feature");
-    this.curves = byName(copy.curves, "expression");
-    this.channels = byName(copy.edits, "channel");
     this.seeds = copy.seeds ?? {};
     this.gains = copy.gains ?? {};
   }
@@ -32,15 +31,13 @@ export class TimelineModel {
     return this.spans.filter((span) => span.feature === feature).sort((a, b) => a.start - b.start);
   }
 
-  /** Keys of a row that has a curve, its limits, and what names it in an edit. */
+  /** The curve of a row: its kind and lane, keys and limits; null for a row without one. */
   curveOf(row, chosen) {
-    if (row.feature) return { keys: this.strengths.get(row.feature) ?? [], limits: STRENGTH, edit: { kind: "strength", feature: row.feature } };
-    if (row.id === "curve") {
-      return { keys: this.curves.get(chosen.expression) ?? [], limits: WEIGHT, edit: { kind: "curve", expression: chosen.expression } };
-    }
-    if (row.id !== "channel") return null;
-    const limits = { low: -1000, high: 1000, rest: 0, flank: 0.3 };
-    return { keys: this.channels.get(chosen.channel) ?? [], limits, edit: { kind: "channel", channel: chosen.channel } };
+    const rows = { curve: ["curves", chosen.expression], channel: ["edits", chosen.channel] };
+    const [name, lane] = row.feature ? ["strengths", row.feature] : rows[row.id] ?? [];
+    if (!name) return null;
+    const [low, high] = KINDS[name].limits;
+    return { name, lane, keys: this[name].get(lane) ?? [], limits: { low, high, ...RESTS[name] } };
   }
 
   /** The edit that adds a key; the first key of a curve gets one at rest on each side. */
@@ -66,27 +63,24 @@ export class TimelineModel {
     return this.withKeys(curve, idle ? [] : keys);
   }
 
-  withKeys(curve, keys) {
-    return { ...curve.edit, keys: [...keys].sort((a, b) => a[0] - b[0]) };
+  withKeys({ name, lane }, keys) {
+    const { add, owner } = KINDS[name];
+    return EDITS[add]({ [owner]: lane, keys: [...keys].sort((a, b) => a[0] - b[0]) });
   }
 
   /** Apply an edit as the server will. */
   apply(edit) {
-    const change = {
-      paint: () => this.#paint(edit, edit.style),
-      erase: () => this.#paint(edit, null),
-      strength: () => setKeys(this.strengths, edit.feature, edit.keys),
-      curve: () => setKeys(this.curves, edit.expression, edit.keys),
-      channel: () => setKeys(this.channels, edit.channel, edit.keys),
-      nod: () => (this.nods = [...this.nods, { time: edit.time, size: edit.size }].sort((a, b) => a.time - b.time)),
-      remove_nod: () => (this.nods = this.nods.filter((nod) => Math.abs(nod.time - edit.time) > 1e-6)),
-      gaze: () => (this.gaze = placed(this.gaze, edit)),
-      remove_gaze: () => (this.gaze = without(this.gaze, edit.time)),
-      listen: () => (this.listens = placed(this.listens, edit)),
-      remove_listen: () => (this.listens = without(this.listens, edit.time)),
-      seed: () => (this.seeds = { ...this.seeds, [edit.feature]: edit.seed }),
-    }[edit.kind];
-    change?.();
+    const { kind, ...element } = edit;
+    const name = Object.keys(KINDS).find((one) => KINDS[one].add === kind || KINDS[one].remove === kind);
+    if (name === undefined) {
+      if (kind === "seed") this.seeds = { ...this.seeds, [edit.feature]: edit.seed };
+      return;
+    }
+    const { shape, owner, add } = KINDS[name];
+    if (name === "spans") this.#paint(edit, kind === add ? edit.style : null);
+    else if (shape === "curve") setKeys(this[name], edit[owner], edit.keys);
+    else if (kind === add) this[name] = (shape === "span" ? placed : inserted)(this[name], element);
+    else this[name] = (shape === "span" ? without : withoutNear)(this[name], edit.time);
   }
 
   strengthAt(feature, time) {
@@ -104,10 +98,6 @@ function expand(span) {
   return span.feature === "all" ? FEATURES.map((feature) => ({ ...span, feature })) : [span];
 }
 
-function byName(curves, name) {
-  return new Map((curves ?? []).map((curve) => [curve[name], curve.keys]));
-}
-
 function setKeys(curves, name, keys) {
   if (keys.length) curves.set(name, keys);
   else curves.delete(name);
@@ -121,8 +111,17 @@ function cut(spans, start, end) {
 }
 
 /** Spans with one more, which replaces those under it. */
-function placed(spans, edit) {
-  return [...cut(spans, edit.start, edit.end), { ...edit }].sort((a, b) => a.start - b.start);
+function placed(spans, span) {
+  return [...cut(spans, span.start, span.end), span].sort((a, b) => a.start - b.start);
+}
+
+/** Instants with one more. */
+function inserted(instants, instant) {
+  return [...instants, instant].sort((a, b) => a.time - b.time);
+}
+
+function withoutNear(instants, time) {
+  return instants.filter((instant) => Math.abs(instant.time - time) > 1e-6);
 }
 
 function without(spans, time) {

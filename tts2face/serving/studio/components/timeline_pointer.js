@@ -1,11 +1,11 @@
 // What a pointer does on the timeline: each press begins one gesture, which moves with the pointer and ends in edits.
 
 import { clock } from "./clock.js";
+import { EDITS, LEAST_PHONE_S } from "./protocol.js";
 import { SPAN_ROWS, channelRange, valueY, yValue } from "./timeline_values.js";
 import { channelValue, edgeAt, hitKey, rowAt, rowItems, shownLimits, snapTimes } from "./timeline_items.js";
 import { rounded } from "./timeline_view.js";
 
-const EDGE_LEAST_S = 0.01; // of a phone
 const SPAN_LEAST_S = 0.02; // of a painted span
 const CLICK_PX = 3;
 const RESIZE_PX = 5;
@@ -124,7 +124,7 @@ export class PointerTools {
     if (index === null) return null;
     const [before, phone] = [state.phones[index - 1], state.phones[index]], first = phone[1];
     const set = (time) => {
-      before[2] = phone[1] = rounded(Math.min(Math.max(time, before[1] + EDGE_LEAST_S), phone[2] - EDGE_LEAST_S));
+      before[2] = phone[1] = rounded(Math.min(Math.max(time, before[1] + LEAST_PHONE_S), phone[2] - LEAST_PHONE_S));
       state.ghost = { time: phone[1] };
     };
     return {
@@ -158,7 +158,7 @@ export class PointerTools {
         if (!moved) return this.choose(row, place);
         if (span.end - span.start < SPAN_LEAST_S) return null;
         const range = { feature: row.feature, start: rounded(span.start), end: rounded(span.end) };
-        return this.host.emit(tool === "brush" ? { kind: "paint", ...range, style } : { kind: "erase", ...range });
+        return this.host.emit(tool === "brush" ? EDITS.paint({ ...range, style }) : EDITS.erase(range));
       },
     };
   }
@@ -187,9 +187,9 @@ export class PointerTools {
         Object.assign(span, old);
         if (!moved) return this.host.focus(row, rowItems(row, this.state).find((item) => item.span === span) ?? null);
         const grows = side === "start" ? start < old.start : end > old.end;
-        if (grows) return this.host.emit({ kind: "paint", feature, style, start: rounded(start), end: rounded(end) });
+        if (grows) return this.host.emit(EDITS.paint({ feature, style, start: rounded(start), end: rounded(end) }));
         const range = side === "start" ? [old.start, start] : [end, Math.min(old.end, this.state.view.duration)];
-        return range[1] - range[0] > 1e-3 && this.host.emit({ kind: "erase", feature, start: rounded(range[0]), end: rounded(range[1]) });
+        return range[1] - range[0] > 1e-3 && this.host.emit(EDITS.erase({ feature, start: rounded(range[0]), end: rounded(range[1]) }));
       },
       cancel: () => Object.assign(span, old),
     };
@@ -209,7 +209,7 @@ export class PointerTools {
         this.host.focus(row, rowItems(row, state).find((item) => item.kind === "key" && item.number === number) ?? null);
         if (edit) this.host.emit(edit);
       },
-      cancel: () => state.model.apply({ ...curve.edit, keys: curve.keys }),
+      cancel: () => state.model.apply(state.model.withKeys(curve, curve.keys)),
     };
   }
 
@@ -223,8 +223,8 @@ export class PointerTools {
         const { time, size } = nod;
         nod.time = first;
         if (!moved) return this.choose(row, state.view.x(first));
-        this.host.emit({ kind: "remove_nod", time: first });
-        return this.host.emit({ kind: "nod", time, size });
+        this.host.emit(EDITS.remove_nod({ time: first }));
+        return this.host.emit(EDITS.nod({ time, size }));
       },
       cancel: () => (nod.time = first),
     };
@@ -237,10 +237,10 @@ export class PointerTools {
     const curve = state.model.curveOf(row, state.chosen);
     const onKey = curve && hitKey(row, state, x, y, (value) => this.valueY(row, value));
     if (onKey || (item && !curve)) this.host.open(row, item);
-    else if (row.id === "nods") this.host.emit({ kind: "nod", time: rounded(time), size: 1 });
+    else if (row.id === "nods") this.host.emit(EDITS.nod({ time: rounded(time), size: 1 }));
     else if (SPAN_ROWS[row.id]) {
       const end = rounded(Math.min(time + NEW_S, state.view.duration)), { kind, made } = SPAN_ROWS[row.id];
-      this.host.emit({ kind, start: rounded(time), end, ...made });
+      this.host.emit(EDITS[kind]({ start: rounded(time), end, ...made }));
     } else if (curve && this.canAdd(row)) {
       const value = yValue(row, y, ...shownLimits(row, state, channelRange));
       this.host.emit(state.model.addKey(curve, time, this.keyValue(row, curve, time, value)));

@@ -1,6 +1,6 @@
 // Values of curves and where they are drawn.
 
-import { HEAD_CHANNELS } from "./timeline_view.js";
+import { HEAD_CHANNELS, KINDS } from "./protocol.js";
 
 export function valueY(row, value, low, high) {
   return row.y + row.height - 6 - ((value - low) / (high - low)) * (row.height - 12);
@@ -43,14 +43,14 @@ export function channelRange(state) {
   return state.kept.range;
 }
 
-/** Rows of spans of which one element at most holds at a time: kind of its edits, list of the model, and values of a new one. */
+/** Rows of spans of which one element at most holds at a time: kind of its elements, and values of a new one. */
 export const SPAN_ROWS = {
   targets: {
-    kind: "gaze", list: "gaze", title: "Gaze target", hint: "Double-click to add a direction of the eyes",
+    kind: KINDS.gaze.add, list: "gaze", title: "Gaze target", hint: "Double-click to add a direction of the eyes",
     made: { down_deg: 0, left_deg: 0 }, text: describeGaze, label: (one) => `eyes look ${describeGaze(one)}`,
   },
   listens: {
-    kind: "listen", list: "listens", title: "Listening", hint: "Double-click where nothing is said to let the face listen",
+    kind: KINDS.listens.add, list: "listens", title: "Listening", hint: "Double-click where nothing is said to let the face listen",
     made: {}, text: () => "listens", label: () => "the face listens",
   },
 };

@@ -1,6 +1,5 @@
 // What of a clip a timeline shows, and where: rows, seconds and pixels, places to snap to.
 
-export const FEATURES = ["expression", "brows", "blink", "gaze", "cheeks", "head"];
 export const FEATURE_LABELS = {
   expression: "Expression",
   brows: "Brows",
@@ -9,7 +8,6 @@ export const FEATURE_LABELS = {
   cheeks: "Cheeks, nose",
   head: "Head",
 };
-export const HEAD_CHANNELS = ["pitch", "yaw", "roll", "x", "y", "z"];
 const MAX_SCALE = 2000; // pixels per second
 const SNAP_PX = 7;
 
