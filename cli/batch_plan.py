@@ -8,15 +8,15 @@ from cli.process import progress_bar
 
 if TYPE_CHECKING:
     from tts2face.serving.batch.output import Plan
-    from tts2face.serving.batch.segment import SegmentResult
+    from tts2face.serving.batch.segment_result import SegmentResult
 
 
 def print_plan(plan: "Plan", out: Path, files: tuple[str | None, Path | None], *, quiet: bool) -> None:
     """Print what a batch will make; `files` are the store and the table of lines to write."""
+    from tts2face.serving.batch.estimate import estimate_batch
     from tts2face.serving.batch.report import measure_plan, write_table
     from tts2face.serving.batch.run import SEGMENT_FOLDER
     from tts2face.serving.batch.store import open_store
-    from tts2face.serving.batch.windows import estimate_batch
 
     store, table = files
     place = store if store is not None else str(out / SEGMENT_FOLDER)

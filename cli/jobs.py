@@ -154,7 +154,7 @@ def prune(
 
 def _prune_store(store: str, database: str | None, outputs: tuple[Path, ...], days: float, *, dry_run: bool) -> str:
     """What was removed from a store."""
-    from tts2face.serving.batch.run import prune_segments
+    from tts2face.serving.batch.prune import prune_segments
     from tts2face.serving.batch.store import open_store
 
     if "://" not in store and not Path(store).is_dir():

@@ -47,7 +47,7 @@ from tts2face.serving.batch.cast import Cast, Role
 from tts2face.serving.batch.lines import LineSettings
 from tts2face.serving.batch.options import BatchOptions
 from tts2face.serving.service.settings import ServiceSettings
-from tts2face.serving.studio.comparison import KEPT, Reference
+from tts2face.serving.studio.reference import KEPT, Reference
 from tts2face.session.corrections import SentenceEdges
 from tts2face.session.encoded_stream import StreamFormat
 from tts2face.session.named_models import Models

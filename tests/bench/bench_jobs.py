@@ -18,7 +18,8 @@ from typing import Any
 
 from tests.bench.bench_batch import plan_of
 from tests.serving.work.conftest import Postgres
-from tts2face.serving.batch.segment import Segment, SegmentResult
+from tts2face.serving.batch.segment import Segment
+from tts2face.serving.batch.segment_result import SegmentResult
 from tts2face.serving.batch.store import open_store
 from tts2face.serving.work.database import database_url, prepare_database
 from tts2face.serving.work.engine import DatabaseEngine

@@ -18,8 +18,8 @@ from tts2face.photo.fit import read_fit
 from tts2face.serving.batch.cast import read_cast
 from tts2face.serving.service.keys import read_keys
 from tts2face.serving.service.settings import read_settings
-from tts2face.serving.studio.comparison import parse_reference
 from tts2face.serving.studio.editing import apply
+from tts2face.serving.studio.reference import parse_reference
 from tts2face.session.project import Project
 from tts2face.session.project_file import load_project
 

@@ -7,9 +7,9 @@ import pytest
 from cli.batch_plan import _duration
 from tests.serving.batch.conftest import Planner
 from tts2face.picture.options import Picture
+from tts2face.serving.batch.estimate import estimate_batch
 from tts2face.serving.batch.options import BatchOptions
 from tts2face.serving.batch.plan import plan_batch
-from tts2face.serving.batch.windows import estimate_batch
 
 CUES = "".join(
     f"{n + 1}\n00:{n:02d}:01,000 --> 00:{n:02d}:05,000\nPlease put the books back on shelf {n}.\n\n" for n in range(12)

@@ -15,7 +15,7 @@ from tts2face.serving.batch.options import BatchOptions
 from tts2face.serving.batch.output import Plan
 from tts2face.serving.batch.plan import plan_batch
 from tts2face.serving.batch.report import fitted_lines, line_notes, line_rows, summarise
-from tts2face.serving.batch.segment import SegmentResult
+from tts2face.serving.batch.segment_result import SegmentResult
 
 DIALOGUE = SRT + "\n4\n00:00:13,000 --> 00:00:15,000\n- No. - Yes.\n"
 

@@ -12,8 +12,9 @@ from lexicon.errors import DataError, InputError
 from tests.packages import needs
 from tests.serving.batch.conftest import Planner
 from tests.world import LetterVoice, World
-from tts2face.serving.batch.run import MIN_AGE_S, SEGMENT_FOLDER, prune_segments, run_batch
-from tts2face.serving.batch.segment import SegmentResult
+from tts2face.serving.batch.prune import MIN_AGE_S, prune_segments
+from tts2face.serving.batch.run import SEGMENT_FOLDER, run_batch
+from tts2face.serving.batch.segment_result import SegmentResult
 from tts2face.serving.batch.store import Store, open_store
 from tts2face.session.named_models import Models
 

@@ -6,7 +6,7 @@ import pytest
 
 from lexicon.errors import InputError
 from tests.packages import needs
-from tts2face.serving.batch.segment import SegmentResult
+from tts2face.serving.batch.segment_result import SegmentResult
 from tts2face.serving.batch.store import open_store
 
 ADDRESS = "ab" * 32

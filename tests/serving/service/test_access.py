@@ -316,7 +316,7 @@ def test_a_client_that_reads_nothing_does_not_keep_its_socket(monkeypatch: pytes
 
 def test_the_login_of_a_closed_service_lets_nobody_in(keys: Keys, tmp_path: Path) -> None:
     pytest.importorskip("nicegui")
-    from tts2face.serving.studio.pages.frame import make_router
+    from tts2face.serving.studio.pages.login import make_router
 
     keys.path.write_text("")
     settings = ServiceSettings(workers=0, data=tmp_path / "data", keys=keys.path, studio=False)

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from tts2face.serving.studio.pages.inspector import common_cell, opening_mm, strip_svg
+from tts2face.serving.studio.pages.lip_strips import common_cell, opening_mm, strip_svg
 
 
 def lips(width: float, gap: float) -> dict[str, list[list[float]]]:

@@ -8,7 +8,7 @@ from lexicon.errors import DataError, InputError
 from tts2face.gestures.elements import StyleSpan
 from tts2face.gestures.timeline import Timeline
 from tts2face.request import Request
-from tts2face.serving.studio.comparison import Reference, parse_reference, reference_json, reference_project
+from tts2face.serving.studio.reference import Reference, parse_reference, reference_json, reference_project
 from tts2face.session.project import Project
 
 PROJECT = Project("One", Request(text="Hello.", style="delighted", pitch=True), timeline=Timeline(

@@ -10,7 +10,8 @@ from pathlib import Path
 
 from lexicon.errors import InputError
 from tts2face.processes.child import exit_after
-from tts2face.serving.batch.segment import Segment, SegmentResult
+from tts2face.serving.batch.segment import Segment
+from tts2face.serving.batch.segment_result import SegmentResult
 from tts2face.serving.work.worker import Worker
 
 

@@ -16,8 +16,8 @@ from lexicon.errors import DataError
 from tts2face.picture.film import MOV, MP4, WEBM, make_temporary, move_into_place
 from tts2face.picture.movie import MOV_MOVIE, MP4_MOVIE, WEBM_MOVIE, MovieKind, mux_pictures
 from tts2face.picture.provenance import append_to_mp4
+from tts2face.serving.batch.audio_track import open_track
 from tts2face.serving.batch.output import Sound
-from tts2face.serving.batch.segment import open_track
 from tts2face.storage.files import translate_disk_errors
 from tts2face.types import SOUND_RATE, exact_rate, first_sample
 

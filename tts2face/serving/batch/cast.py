@@ -14,44 +14,23 @@
     [[role]]
     subtitle_style = "Sign*"
     silent = true            # signs and credits are left out
-
-Looks of those who must not be taken for the speaker beside them.
-
-Checks of names that a renderer would refuse segment by segment: voices, identities, haircuts and styles.
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from fnmatch import fnmatchcase
-from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from lexicon.errors import DataError, InputError
-from lexicon.languages import language_code
 from lexicon.values.checks import check_type, format_value
 from lexicon.values.fields import check_fields
 from lexicon.values.files import is_file, read_text
 from lexicon.values.toml_text import parse_toml
 from tts2face.interchange.subtitles.cues import Cue
-from tts2face.models.face_loading import load_face
-from tts2face.models.face_names import BALD
-from tts2face.models.palette import load_palette
-from tts2face.request import OPTIONS, OWN_FACE, Request
-from tts2face.session.catalogue import identities
+from tts2face.request import OPTIONS, Request
 from tts2face.session.named_models import Models
-from tts2face.sound.voice_pool import (
-    SHIPPED_VOICES,
-    default_voice,
-    find_voice,
-    has_voice,
-    is_installed,
-    speaks,
-    voice_names,
-)
-from tts2face.source import NATURAL, parse_articulation
-from tts2face.storage.shipped import present_name
 
 MODEL_NAMES = tuple(option.name for option in fields(Models))
 PATTERN_NAMES = ("speaker", "subtitle_style", "file", "text")
@@ -193,72 +172,3 @@ def _resolve(name: str, value: Any, folder: Path | None) -> Any:
     if name in PATH_NAMES and isinstance(value, str) and Path(value).suffix and is_file(folder / value):
         return str(folder / value)
     return value
-
-
-# Shipped faces of other speakers, by the sex of their voices.
-_OTHER_FACES: Mapping[str, tuple[str, ...]] = MappingProxyType({"male": ("ben", "tomas"), "female": ("mara", "noor")})
-
-
-def other_look(
-    models: Models, request: Mapping[str, Any], number: int, *, keeps_face: bool = False
-) -> tuple[Models, dict[str, Any]]:
-    """Models and request of another speaker than the one that is shown with these; `number` counts such, from 1.
-
-    An installed voice that speaks the language, of the other sex first, and a shipped face that goes with it.
-
-    Parameters
-    ----------
-    keeps_face
-        Whether only the voice is another one, for exports, which hold one face.
-    """
-    language = language_code(str(request.get("language", Request().language)))
-    own = str(request.get("voice") or default_voice(language))
-    usable = [name for name in SHIPPED_VOICES if name != own and speaks(name, language) and is_installed(name)]
-    is_male = has_voice(own) and find_voice(own).sex == "male"
-    wanted = "female" if is_male == (number % 2 == 1) else "male"
-    voice = next((name for name in usable if find_voice(name).sex == wanted), usable[0] if usable else own)
-    sex = find_voice(voice).sex if has_voice(voice) else wanted
-    faces = [face for face in _OTHER_FACES[sex] if face != models.face]
-    if not keeps_face:
-        models = replace(models, face=faces[(number - 1) // 2 % len(faces)], identity=None, hair=None, hair_color=None)
-    return models, {**request, "voice": voice}
-
-
-def check_names(models: Models, request: Mapping[str, Any]) -> None:
-    """Refuse a voice, an identity, a haircut or a style that does not exist.
-
-    Raises
-    ------
-    InputError
-        There is no such voice, identity, haircut or style, or no such model.
-    DataError
-        A model is damaged.
-    """
-    voice = request.get("voice")
-    if voice is not None and not has_voice(voice) and not str(voice).endswith(".onnx"):
-        raise InputError(f"there is no voice {voice!r}; give {', '.join(voice_names())}, or a Piper voice (.onnx)")
-    if models.identity is not None:
-        known = _identities(models.face)
-        if present_name(models.identity, "identity", known) not in known:
-            offered = ", ".join(known) or "none"
-            raise InputError(f"the face {models.face} has no identity {models.identity!r}; it has {offered}")
-    if models.hair not in (None, BALD) or models.hair_color is not None:
-        _check_hair(models.face, models.hair, models.hair_color)
-    if request.get("articulation") is not None:
-        factor = parse_articulation(str(request["articulation"]))
-        if models.face == OWN_FACE and factor != NATURAL:
-            raise InputError("a talker's own face articulates as recorded; remove articulation, or choose another face")
-    if request.get("style") is not None and models.palette is not None:
-        load_palette(models.palette).require(str(request["style"]))
-
-
-@lru_cache(maxsize=64)
-def _check_hair(face: str, hair: str | None, colour: str | None) -> None:
-    if face == OWN_FACE:
-        raise InputError("a talker's own face has no haircuts; remove hair and hair_color, or choose another face")
-    load_face(face, hair=hair, hair_color=colour)
-
-
-@lru_cache(maxsize=64)
-def _identities(face: str) -> tuple[str, ...]:
-    return () if face == OWN_FACE else tuple(one.name for one in identities(face))

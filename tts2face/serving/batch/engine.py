@@ -17,7 +17,8 @@ from typing import Protocol
 from lexicon.errors import BackendError, Tts2faceError
 from tts2face.processes.parent import ChildEndedError
 from tts2face.serving.batch.render_process import RenderProcess
-from tts2face.serving.batch.segment import SEGMENT_SUFFIX, Segment, SegmentResult
+from tts2face.serving.batch.segment import SEGMENT_SUFFIX, Segment
+from tts2face.serving.batch.segment_result import SegmentResult
 from tts2face.serving.batch.store import Store, wait_for_store
 
 MAX_TRIES = 3  # of a segment whose process ended; then it counts as failed

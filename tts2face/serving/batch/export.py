@@ -102,7 +102,7 @@ def joined_clips(
     DataError
         A track is damaged.
     """
-    from tts2face.serving.batch.segment import open_track
+    from tts2face.serving.batch.audio_track import open_track
 
     rate, at, sounding = exact_rate(fps), 0, np.zeros(0, np.float32)
     parts = zip(tracks, sounds or [None] * len(tracks), lengths or [None] * len(tracks), strict=True)

@@ -13,14 +13,16 @@ from tts2face.interchange.exports.table import batch_format
 from tts2face.interchange.subtitles.cues import Cue
 from tts2face.interchange.subtitles.reader import read_subtitles
 from tts2face.request import Request
-from tts2face.serving.batch.cast import Cast, check_names
+from tts2face.serving.batch.cast import Cast
+from tts2face.serving.batch.cast_checks import check_names
+from tts2face.serving.batch.content_address import file_hash
 from tts2face.serving.batch.cue_sentences import MAX_GAP_S, has_end_mark, sentence_groups, spoken_part
 from tts2face.serving.batch.export import check_faces
 from tts2face.serving.batch.lines import Lines
 from tts2face.serving.batch.options import REPORT, BatchOptions, non_defaults
 from tts2face.serving.batch.output import Output, PlannedCue, PlannedLine, PlanWarning, Sound
 from tts2face.serving.batch.recordings import Recordings, find_recordings
-from tts2face.serving.batch.segment import ALPHA_MOVIE, MOVIE, Part, Segment, file_hash
+from tts2face.serving.batch.segment import ALPHA_MOVIE, MOVIE, Part, Segment
 from tts2face.serving.batch.speakers import Speakers
 from tts2face.serving.batch.windows import Window, cue_lines, cue_windows, scenes
 from tts2face.session.named_models import Models

@@ -1,21 +1,15 @@
-"""Rendering of one segment with the sessions of this process.
-
-Requests for the recordings of segments: the words where the recording contains them, else the sound alone.
-"""
+"""Rendering of one segment with the sessions of this process."""
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from lexicon.errors import DataError
 from lexicon.sentence_length import n_letters
 from lexicon.sentences import text_prefix
 from tts2face.interchange.exports.writer import ExportWriter, plan_exports
@@ -28,109 +22,19 @@ from tts2face.processes.child import Call, Handler
 from tts2face.request import DRAWN_FACE, Request
 from tts2face.serving.batch.fit import EASY_S, RELEASE_S, Fit, Limits, Room, fit_speech, without_overlap
 from tts2face.serving.batch.options import REPORT
+from tts2face.serving.batch.recorded_segment import excerpt_of, fit_recording
 from tts2face.serving.batch.render_process import RENDER
-from tts2face.serving.batch.segment import (
-    ALPHA_MOVIE,
-    FILE_PREFIX,
-    TRACK,
-    Part,
-    Segment,
-    SegmentResult,
-    open_track,
-    segment_from_json,
-)
+from tts2face.serving.batch.segment import ALPHA_MOVIE, FILE_PREFIX, TRACK, Part, Segment, segment_from_json
+from tts2face.serving.batch.segment_result import SegmentResult
 from tts2face.session.joining import Excerpt, fade_out
 from tts2face.session.prepared import PreparedRequest, prepare
 from tts2face.session.session import Session
 from tts2face.session.session_cache import SessionCache
-from tts2face.sound.pauses import speech_onset
-from tts2face.source import IDLE_LIMITS_S, FromPhones, Idle, Recorded, Spoken
+from tts2face.source import Idle, Recorded, Spoken
 from tts2face.storage.files import translate_disk_errors
 from tts2face.storage.temporary import Temporary
-from tts2face.types import (
-    SOUND_RATE,
-    Clip,
-    Speech,
-    Waveform,
-    concatenate_clips,
-    exact_rate,
-    first_sample,
-    frame_count,
-)
+from tts2face.types import Clip, Speech, Waveform, concatenate_clips, exact_rate, frame_count
 from tts2face.video.media import read_sound
-
-ONSET_S = 60  # of a recording of a cue, within which its first sound lies
-
-
-@contextmanager
-def excerpt_of(segment: Segment, request: Request) -> Iterator[Request]:
-    """The request of a segment, with its lead, or with its part of a recording as a temporary file."""
-    fps, source = exact_rate(request.fps), request.source
-    if isinstance(source, Spoken) and segment.lead_frames is not None:
-        yield replace(request, source=replace(source, lead=float(segment.lead_frames / fps)))
-        return
-    if not isinstance(source, Recorded):
-        yield request
-        return
-    if segment.audio_begin is None and segment.lead_frames is None:
-        yield request
-        return
-    track = open_track(source.audio)
-    begin, end = segment.audio_begin, segment.audio_end
-    if begin is None:
-        heard = Waveform(track.read(0, min(track.n_samples, ONSET_S * SOUND_RATE)) / np.float32(32768), SOUND_RATE)
-        begin = round(speech_onset(heard) * SOUND_RATE) - first_sample(segment.lead_frames or 0, SOUND_RATE, fps)
-        end = track.n_samples
-        if not heard.samples.any():  # it is refused by its name
-            yield request
-            return
-    with TemporaryDirectory(prefix="tts2face-") as folder:
-        path = Path(folder) / f"{source.audio.stem}.wav"
-        track.write_excerpt(path, begin, end)
-        yield replace(request, source=replace(source, audio=path))
-
-
-def fit_recording(session: Session, request: Request, segment: Segment) -> tuple[Request, float, list[str]]:
-    """A request that can be synthesised, seconds of its sound, and warnings.
-
-    An excerpt of a dubbing track may contain other words than the subtitles, or none: then lips follow the sound, or
-    rest.
-
-    Raises
-    ------
-    InputError, DataError, BackendError
-        As `Session.stream`; of an excerpt only where the recording cannot be read.
-    """
-    try:
-        pieces = list(session.stream(request))
-    except DataError as wrong:
-        if segment.audio_begin is None:
-            raise
-        if request.source.text:
-            return _without_words(session, request, segment)
-        seconds = segment.window_frames / float(exact_rate(request.fps))
-        idle = replace(request, source=Idle(max(seconds, IDLE_LIMITS_S[0])))
-        return idle, 0.0, [f"the recording has no speech here ({_reason(wrong)})"]
-    found = [f"{' '.join(one.words)!r}" for piece in pieces for one in piece.mismatches]
-    if found and segment.audio_begin is not None:
-        return _without_words(session, request, segment)
-    warnings = [f"the recording probably does not contain {', '.join(found)}"] if found else []
-    return request, sum(piece.clip.speech.waveform.duration for piece in pieces), warnings
-
-
-def _without_words(session: Session, request: Request, segment: Segment) -> tuple[Request, float, list[str]]:
-    source = request.source
-    assert isinstance(source, Recorded)
-    wordless = replace(request, source=replace(source, lips=FromPhones("", source.lips.articulation)))
-    wordless, seconds, warnings = fit_recording(session, wordless, segment)
-    if not isinstance(wordless.source, Idle):
-        warnings = [f"the recording contains other words than {source.text[:40]!r}; lips follow its sound", *warnings]
-    return wordless, seconds, warnings
-
-
-def _reason(error: DataError) -> str:
-    """A reason without the path of the temporary file."""
-    return "it is silent" if "silent" in str(error) else str(error).rpartition("/")[2]
 
 
 class SegmentRenderer:

@@ -4,7 +4,8 @@ from pathlib import Path
 
 from tts2face.processes.parent import Child
 from tts2face.processes.program import Program
-from tts2face.serving.batch.segment import Segment, SegmentResult, result_from_json
+from tts2face.serving.batch.segment import Segment
+from tts2face.serving.batch.segment_result import SegmentResult, result_from_json
 
 RENDER = "render"  # name of the call
 HANDLERS = "tts2face.serving.batch.render:HANDLERS"  # what the parent itself does not import

@@ -10,7 +10,8 @@ from lexicon.languages import language_code
 from tts2face.request import Request
 from tts2face.serving.batch.lines import LineSettings, write_lines
 from tts2face.serving.batch.output import Plan, PlannedLine
-from tts2face.serving.batch.segment import Segment, SegmentResult
+from tts2face.serving.batch.segment import Segment
+from tts2face.serving.batch.segment_result import SegmentResult
 from tts2face.serving.batch.speakers import Look, shown_name
 from tts2face.serving.batch.store import Store
 from tts2face.session.named_models import Models

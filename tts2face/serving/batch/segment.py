@@ -1,130 +1,19 @@
-"""Segments: the units that are rendered once and kept by their content address.
+"""Segments: the units that are rendered once and kept by their content address."""
 
-The result of a rendered segment; a module without heavy imports.
-
-Content addresses: a hash of everything that determines a segment.
-
-A recording of a whole subtitle file, such as a dubbing track, of which segments take excerpts.
-"""
-
-import hashlib
-import json
-import wave
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
-from functools import cached_property, lru_cache
-from importlib.metadata import PackageNotFoundError, version
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryFile, gettempdir
-from typing import IO, Any
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from lexicon.errors import DataError, InputError
-from tts2face import __version__
 from tts2face.models.face_names import BALD
 from tts2face.request import OWN_FACE, Request
+from tts2face.serving.batch.audio_track import open_track
+from tts2face.serving.batch.content_address import content_address, file_hash, model_hash, program_version
 from tts2face.session.named_models import Models
-from tts2face.storage.content_store import content_hash
-from tts2face.storage.files import translate_disk_errors
-from tts2face.storage.shipped import find_file
 from tts2face.types import SOUND_RATE, exact_rate, first_sample
-from tts2face.video.media import sound_blocks
 
 SEGMENT_SUFFIX = ".mov"
-
-
-@dataclass(frozen=True, slots=True)
-class SegmentResult:
-    """A rendered segment.
-
-    Parameters
-    ----------
-    n_frames, fps
-        Its length.
-    rate
-        Speaking rate of the fit; 1 for silence and recordings.
-    speech_s
-        Seconds from its cue to the end of its last word, of an excerpt from its begin; 0 without words.
-    overflow_s
-        Seconds by which the speech ends after its cue.
-    cut_s
-        Seconds of speech that is left out or cut off, as the next cue begins.
-    warnings
-        What does not match the subtitles.
-    took_s
-        Seconds of work.
-    overlap_s
-        Seconds of speech that sound on after the next cue has begun.
-    """
-
-    n_frames: int
-    fps: float
-    rate: float = 1.0
-    speech_s: float = 0.0
-    overflow_s: float = 0.0
-    cut_s: float = 0.0
-    warnings: tuple[str, ...] = ()
-    took_s: float = 0.0
-    overlap_s: float = 0.0
-
-    def as_json(self) -> dict[str, Any]:
-        """JSON object from which `result_from_json` makes the result again."""
-        return asdict(self) | {"warnings": list(self.warnings)}
-
-
-def result_from_json(content: Mapping[str, Any]) -> SegmentResult:
-    """The result of `SegmentResult.as_json`; unknown names are ignored."""
-    known = {field.name for field in fields(SegmentResult)}
-    found = {name: value for name, value in content.items() if name in known}
-    return SegmentResult(**{**found, "warnings": tuple(found.get("warnings", ()))})
-
-
-SEGMENT_FORMAT = 4  # raised when equal requests give other segments
-VOICE_PACKAGES = ("hibari-tts", "onnxruntime", "espeakng-loader", "piper-tts", "hama", "pyopenjtalk-plus", "av")
-
-
-def content_address(content: Mapping[str, Any]) -> str:
-    """SHA-256 of a JSON object, in hexadecimal digits; the order of its names does not matter."""
-    text = json.dumps(content, sort_keys=True, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
-    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
-
-
-def file_hash(path: Path) -> str:
-    """SHA-256 of a file, kept while its size and time do not change.
-
-    Raises
-    ------
-    InputError
-        The file does not exist or cannot be read.
-    """
-    try:
-        return content_hash(path)
-    except OSError as refused:
-        raise InputError(f"cannot read {path}: {refused.strerror}; check the path") from refused
-
-
-def model_hash(name: str, kind: str) -> str:
-    """Hash of a talker, face or palette by name or path; errors as `file_hash`."""
-    try:
-        return file_hash(find_file(name, kind))
-    except DataError as wrong:
-        raise InputError(str(wrong)) from wrong
-
-
-@lru_cache(maxsize=1)
-def program_version() -> dict[str, str]:
-    """Versions of the program and of the packages that determine sound and pictures."""
-    found = {"tts2face": __version__, "format": str(SEGMENT_FORMAT)}
-    for package in VOICE_PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            continue
-    return found
-
-
 MOVIE, ALPHA_MOVIE, TRACK = "movie", "vp9", "track"  # what a segment is stored as: H.264, VP9, or motion for exports
 FILE_PREFIX = "file."  # of the medium of a whole clip in a format of `Session.stream_file`
 REQUEST_FILES = ("audio", "partner", "dictionary", "voice", "timeline")
@@ -286,72 +175,3 @@ def input_hashes(models: Models, request: Mapping[str, Any], picture: Mapping[st
     if background is not None and Path(str(background)).suffix:
         hashes["background"] = file_hash(Path(str(background)))
     return hashes
-
-
-SAMPLE_BYTES = 2
-
-
-@dataclass(frozen=True, slots=True)
-class Track:
-    """Sound of a recording on the disk, mono with 16 bits at `SOUND_RATE`; a temporary file without a name."""
-
-    file: IO[bytes]
-    n_samples: int
-
-    def __del__(self) -> None:
-        """Close the file, which removes it."""
-        self.file.close()
-
-    def read(self, begin: int, end: int) -> NDArray[np.int16]:
-        """Samples [begin, end); silence before the start and after the end of the recording."""
-        samples = np.zeros(max(end - begin, 0), np.int16)
-        first, last = max(begin, 0), min(end, self.n_samples)
-        if first < last:
-            self.file.seek(first * SAMPLE_BYTES)
-            content = self.file.read((last - first) * SAMPLE_BYTES)
-            samples[first - begin : last - begin] = np.frombuffer(content, np.int16)
-        return samples
-
-    def excerpt_hash(self, begin: int, end: int) -> str:
-        """SHA-256 of samples [begin, end)."""
-        return hashlib.sha256(self.read(begin, end).tobytes()).hexdigest()
-
-    def write_excerpt(self, path: Path, begin: int, end: int) -> None:
-        """Write samples [begin, end) as a .wav file."""
-        with translate_disk_errors(path), wave.open(str(path), "wb") as file:
-            file.setparams((1, SAMPLE_BYTES, SOUND_RATE, 0, "NONE", ""))
-            file.writeframes(self.read(begin, end).tobytes())
-
-
-def open_track(path: Path) -> Track:
-    """Track of a recording, which is decoded once; the last one stays open.
-
-    Raises
-    ------
-    InputError, DataError
-        The recording does not exist or cannot be read.
-    BackendError
-        The disk of temporary files is full; an hour takes 350 MB.
-    """
-    try:
-        status = path.stat()
-    except OSError as refused:
-        raise InputError(f"cannot read {path}: {refused.strerror}; check the path") from refused
-    return _open_track(path, status.st_size, status.st_mtime_ns)
-
-
-@lru_cache(maxsize=1)
-def _open_track(path: Path, _size: int, _time: int) -> Track:
-    file = TemporaryFile(prefix="tts2face-")  # noqa: SIM115 - as long as the track is used
-    n_samples = 0
-    try:
-        for block in sound_blocks(path, SOUND_RATE):
-            samples = np.round(block * 32767.0).astype(np.int16)
-            n_samples += len(samples)
-            with translate_disk_errors(Path(gettempdir())):
-                file.write(samples.tobytes())
-        file.flush()
-    except BaseException:
-        file.close()
-        raise
-    return Track(file, n_samples)

@@ -8,7 +8,8 @@ from lexicon.errors import InputError
 from lexicon.languages import language_code
 from tts2face.interchange.subtitles.cues import Cue
 from tts2face.request import DRAWN_FACE
-from tts2face.serving.batch.cast import MODEL_NAMES, REQUEST_NAMES, Cast, Role, other_look
+from tts2face.serving.batch.cast import MODEL_NAMES, REQUEST_NAMES, Cast, Role
+from tts2face.serving.batch.distinct_faces import other_look
 from tts2face.serving.batch.lines import NO_SETTINGS, Lines, LineSettings
 from tts2face.session.named_models import Models
 

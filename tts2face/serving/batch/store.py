@@ -8,7 +8,8 @@ from typing import TypeVar
 
 from lexicon.errors import BackendError, DataError
 from lexicon.values.json_text import parse_json
-from tts2face.serving.batch.segment import SEGMENT_SUFFIX, SegmentResult, result_from_json
+from tts2face.serving.batch.segment import SEGMENT_SUFFIX
+from tts2face.serving.batch.segment_result import SegmentResult, result_from_json
 from tts2face.storage.bucket import StoreAwayError, Stored
 from tts2face.storage.content_store import ContentStore, FolderStore, divided, open_content_store
 

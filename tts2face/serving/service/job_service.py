@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from lexicon.errors import BackendError, Tts2faceError
 from tts2face.serving.batch.engine import lack_of_room
-from tts2face.serving.batch.run import prune_unused
+from tts2face.serving.batch.prune import prune_unused
 from tts2face.serving.batch.store import open_store
 from tts2face.serving.service.errors import RefusedError, as_refused
 from tts2face.serving.service.job_views import message_of

@@ -3,7 +3,7 @@
 import asyncio
 from pathlib import Path
 
-from tts2face.serving.batch.segment import file_hash
+from tts2face.serving.batch.content_address import file_hash
 from tts2face.serving.service.decoders import Decoders
 from tts2face.serving.service.uploads import RESOURCE_TIMEOUT_S
 from tts2face.serving.work.uploaded_file import DRAW

@@ -14,7 +14,7 @@ from lexicon.errors import InputError
 from tts2face.serving.service.application import NO_TELEMETRY, Mount
 from tts2face.serving.service.page_addresses import PAGES
 from tts2face.serving.service.state import ServiceState
-from tts2face.serving.studio.pages import animate, frame, projects, puppet, reports, styles
+from tts2face.serving.studio.pages import animate, login, projects, puppet, reports, styles
 from tts2face.serving.studio.pages.record import add_record_page
 from tts2face.serving.studio.requests import TASKS
 from tts2face.serving.studio.routes import comparing as comparison_routes
@@ -31,7 +31,7 @@ RECONNECT_S = 30.0  # for which the state of a page is kept while its connection
 def mount_studio(app: FastAPI, state: ServiceState) -> None:
     """Add the studio to an application: pages under `PAGES`, what they fetch, and the login."""
     studio = Studio(state)
-    app.include_router(frame.make_router(state))
+    app.include_router(login.make_router(state))
     app.state.studio = studio
     for room in (projects_routes, comparison_routes, report_routes, style_routes, take_routes):
         app.include_router(room.router)

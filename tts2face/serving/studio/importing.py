@@ -1,7 +1,4 @@
-"""New projects: from a text, a recording, subtitles, a project file, or as an example.
-
-What the parts of a studio need of it, without an import circle.
-"""
+"""New projects: from a text, a recording, subtitles, a project file, or as an example."""
 
 import asyncio
 import tempfile
@@ -9,7 +6,6 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
 
 from lexicon.errors import InputError
 from lexicon.values.json_text import parse_json
@@ -21,40 +17,10 @@ from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.service.uploads import MAX_TEXT_BYTES
-from tts2face.serving.studio.project_store import ProjectEntry, ProjectStore
 from tts2face.serving.studio.requests import check_project
-from tts2face.serving.studio.work import WorkList
-from tts2face.serving.studio.workspace import Workspace
+from tts2face.serving.studio.studio_host import StudioHost
 from tts2face.serving.work.uploaded_file import SOUND, SUBTITLES
 from tts2face.session.project import MAX_NAME, Project
-
-
-class StudioHost(Protocol):
-    """Projects of all keys, those that are open, and the service around them (`studio.Studio`)."""
-
-    state: ServiceState
-    store: ProjectStore
-    work: WorkList
-
-    @property
-    def folder(self) -> Path:
-        """Folder of projects, styles and takes."""
-
-    async def entries(self, key: ApiKey) -> list[ProjectEntry]:
-        """Projects of a key."""
-
-    async def create(self, key: ApiKey, project: Project) -> str:
-        """Id of a new project."""
-
-    async def open(self, key: ApiKey, number: str) -> Workspace:
-        """An open project."""
-
-    def open_projects(self, key: ApiKey) -> list[Workspace]:
-        """Open projects of a key."""
-
-    def check_scope(self, key: ApiKey) -> None:
-        """Refuse keys that may not make speech."""
-
 
 SOUND_SUFFIXES = (
     ".wav", ".mp3", ".ogg", ".oga", ".opus", ".flac", ".aac", ".m4a", ".mp4", ".mov", ".webm", ".mkv", ".aiff",

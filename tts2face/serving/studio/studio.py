@@ -1,7 +1,4 @@
-"""The studio of a service: its projects, those that are open, and what is made of them.
-
-A face that is kept compressed, as a page fetches it.
-"""
+"""The studio of a service: its projects, those that are open, and what is made of them."""
 
 import asyncio
 import gzip
@@ -12,9 +9,6 @@ from contextlib import suppress
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
-
-from fastapi import Request as HttpRequest
-from fastapi.responses import Response
 
 from lexicon.errors import InputError, Tts2faceError
 from tts2face import __version__
@@ -206,22 +200,3 @@ def _keep_last(folder: Path, count: int) -> None:
     files = sorted(folder.glob("*.glb*"), key=lambda path: path.stat().st_mtime)
     for path in files[: max(0, len(files) - count)]:
         path.unlink(missing_ok=True)
-
-
-async def face_answer(request: HttpRequest, path: Path, *, is_named: bool = True) -> Response:
-    """The binary glTF of a file compressed by gzip; decompressed for a program that does not take it so.
-
-    Parameters
-    ----------
-    is_named
-        Whether the query of the address says what is drawn: then the answer never changes, and a browser keeps it.
-    """
-    content = await asyncio.to_thread(path.read_bytes)
-    headers = {"Vary": "Accept-Encoding"}
-    if is_named:
-        headers["Cache-Control"] = "private, max-age=31536000, immutable"
-    if "gzip" in request.headers.get("accept-encoding", ""):
-        headers["Content-Encoding"] = "gzip"
-    else:
-        content = gzip.decompress(content)
-    return Response(content, media_type="model/gltf-binary", headers=headers)

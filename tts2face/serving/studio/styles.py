@@ -18,11 +18,11 @@ from tts2face.models.palette_editing import (
     rename_style,
 )
 from tts2face.serving.service.keys import ApiKey
-from tts2face.serving.studio.importing import StudioHost
 from tts2face.serving.studio.palette_store import CACHE, MADE, SHIPPED, TAKE, PaletteStore, is_own_palette
 from tts2face.serving.studio.project_store import ProjectEntry
 from tts2face.serving.studio.recordings import REFUSED, judge
 from tts2face.serving.studio.requests import data_of, key_of
+from tts2face.serving.studio.studio_host import StudioHost
 from tts2face.serving.studio.work import BackgroundWork, WorkKind
 from tts2face.serving.work.job_record import FAILED
 from tts2face.session import project as style_names

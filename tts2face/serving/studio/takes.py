@@ -15,9 +15,10 @@ import numpy as np
 from lexicon.errors import InputError
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
-from tts2face.serving.studio.importing import StudioHost, add_recording
+from tts2face.serving.studio.importing import add_recording
 from tts2face.serving.studio.palette_store import SUFFIXES
 from tts2face.serving.studio.requests import events_of
+from tts2face.serving.studio.studio_host import StudioHost
 from tts2face.serving.studio.styles import Styles
 from tts2face.serving.studio.take_store import FILM, PREVIEW, READY, SOUND, TABLE, VIDEO, TakeEntry, TakeStore
 from tts2face.serving.studio.work import BackgroundWork, WorkKind

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from lexicon.errors import BackendError
-from tts2face.serving.batch.segment import file_hash
+from tts2face.serving.batch.content_address import file_hash
 from tts2face.storage.content_store import ContentStore, FolderStore, content_hash, divided, open_content_store
 from tts2face.storage.files import translate_disk_errors
 from tts2face.storage.user_folders import user_cache

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from tts2face.serving.batch.segment import SEGMENT_FORMAT
+from tts2face.serving.batch.content_address import SEGMENT_FORMAT
 
 APPLICATION = "tts2face"
 APPLICATION_VERSION = f"segments-{SEGMENT_FORMAT}"  # pinned: workers of equal segments share their work

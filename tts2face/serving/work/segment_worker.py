@@ -12,7 +12,8 @@ from lexicon.errors import DataError, InputError, Tts2faceError
 from tts2face.processes.parent import ChildEndedError
 from tts2face.serving.batch.engine import OnMessage, SegmentRenderer, render_into
 from tts2face.serving.batch.render_process import RenderProcess
-from tts2face.serving.batch.segment import Segment, SegmentResult, segment_from_json
+from tts2face.serving.batch.segment import Segment, segment_from_json
+from tts2face.serving.batch.segment_result import SegmentResult
 from tts2face.serving.batch.store import Store, wait_for_store
 from tts2face.serving.work.blobs import BlobStore
 from tts2face.serving.work.placed_files import place_segment_files

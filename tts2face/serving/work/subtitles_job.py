@@ -7,8 +7,9 @@ from lexicon.errors import DataError
 from tts2face.picture.options import Picture
 from tts2face.request import Request
 from tts2face.serving.batch.cast import cast_from_tables
+from tts2face.serving.batch.manifest import CSV_NAME, JSON_NAME
 from tts2face.serving.batch.options import BatchOptions
-from tts2face.serving.batch.output import CSV_NAME, JSON_NAME, Plan
+from tts2face.serving.batch.output import Plan
 from tts2face.serving.batch.plan import plan_batch
 from tts2face.serving.batch.report import measure_plan, write_table
 from tts2face.serving.batch.run import run_batch

@@ -23,7 +23,8 @@ from tts2face.serving.batch.engine import LocalEngine, Rendered
 from tts2face.serving.batch.render import SegmentRenderer
 from tts2face.serving.batch.render_process import RenderProcess
 from tts2face.serving.batch.run import SEGMENT_FOLDER, run_batch
-from tts2face.serving.batch.segment import Segment, SegmentResult
+from tts2face.serving.batch.segment import Segment
+from tts2face.serving.batch.segment_result import SegmentResult
 from tts2face.serving.batch.store import Store, open_store
 
 HALF_FRAME_S = 0.5 / FPS

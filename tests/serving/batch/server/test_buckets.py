@@ -35,7 +35,8 @@ from tests.world import LetterVoice
 from tts2face.serving.batch import engine as engines
 from tts2face.serving.batch import store
 from tts2face.serving.batch.run import run_batch
-from tts2face.serving.batch.segment import Segment, SegmentResult
+from tts2face.serving.batch.segment import Segment
+from tts2face.serving.batch.segment_result import SegmentResult
 from tts2face.serving.batch.store import open_store
 from tts2face.storage import bucket as bucket_stores
 

@@ -16,7 +16,7 @@ from PIL import Image
 
 from tests.packages import package
 from tests.running import eventually, serve_process
-from tts2face.serving.studio.pages.inspector import opening_mm
+from tts2face.serving.studio.pages.lip_strips import opening_mm
 from tts2face.serving.studio.preview_bundle import read_bundle
 from tts2face.session.project_file import load_project
 from tts2face.session.session import Session

@@ -18,7 +18,7 @@ from fastapi.responses import JSONResponse, Response, StreamingResponse
 from pydantic import BaseModel, ValidationError
 from starlette.datastructures import FormData, UploadFile
 
-from tts2face.serving.batch.segment import content_address
+from tts2face.serving.batch.content_address import content_address
 from tts2face.serving.service.access import require_scope
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.guard import VIDEO_PATH

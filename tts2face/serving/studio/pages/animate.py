@@ -15,7 +15,8 @@ from tts2face.serving.studio.components.stage import StageElement
 from tts2face.serving.studio.components.timeline import TimelineElement
 from tts2face.serving.studio.editing import Edit
 from tts2face.serving.studio.pages.animate_bar import Bar
-from tts2face.serving.studio.pages.frame import begin_page, heading, sentence, shown_errors, styles
+from tts2face.serving.studio.pages.choices import styles
+from tts2face.serving.studio.pages.frame import begin_page, heading, sentence, shown_errors
 from tts2face.serving.studio.pages.inspector import Inspector
 from tts2face.serving.studio.pages.speech_panel import SpeechPanel
 from tts2face.serving.studio.studio import Studio

@@ -5,7 +5,8 @@ from typing import Any
 from fastapi import Request as HttpRequest
 from nicegui import ui
 
-from tts2face.serving.studio.pages.frame import OpenPage, dark_button, heading, icon_button, shown_errors
+from tts2face.serving.studio.pages.frame import dark_button, heading, icon_button, shown_errors
+from tts2face.serving.studio.pages.open_page import OpenPage
 from tts2face.serving.studio.renders import RENDER, formats
 from tts2face.serving.studio.work import BackgroundWork
 from tts2face.serving.studio.workspace import Workspace

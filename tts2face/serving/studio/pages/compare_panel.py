@@ -9,8 +9,11 @@ from typing import Any
 
 from nicegui import events, ui
 
-from tts2face.serving.studio.comparison import MAX_TAKE_BYTES, RECORDING, SETTINGS, TAKE
-from tts2face.serving.studio.pages.frame import OpenPage, heading, models, shown_errors
+from tts2face.serving.studio.comparison import MAX_TAKE_BYTES
+from tts2face.serving.studio.pages.choices import models
+from tts2face.serving.studio.pages.frame import heading, shown_errors
+from tts2face.serving.studio.pages.open_page import OpenPage
+from tts2face.serving.studio.reference import RECORDING, SETTINGS, TAKE
 from tts2face.serving.work.resource_check import TALKER
 from tts2face.types import HEAD_CHANNELS
 

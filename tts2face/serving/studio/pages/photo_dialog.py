@@ -25,7 +25,8 @@ from tts2face.serving.service.sent_resources import (
 )
 from tts2face.serving.service.uploads import UPLOAD_PREFIX, UploadFolder
 from tts2face.serving.studio.components.photo_places import PhotoPlacesElement
-from tts2face.serving.studio.pages.frame import OpenPage, heading, shown_errors
+from tts2face.serving.studio.pages.frame import heading, shown_errors
+from tts2face.serving.studio.pages.open_page import OpenPage
 from tts2face.serving.work.resource_check import FACE
 
 PICTURES = ".jpg,.jpeg,.png,.webp,.heic,.heif,.tif,.tiff,.bmp,.gif"

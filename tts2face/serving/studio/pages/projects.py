@@ -10,15 +10,8 @@ from nicegui import events, ui
 from tts2face.interchange.subtitles.reader import SUFFIXES
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.studio.importing import SOUND_SUFFIXES, TEXT_SUFFIXES, import_file, import_sample, import_text
-from tts2face.serving.studio.pages.frame import (
-    LOGOUT_PATH,
-    begin_page,
-    confirm,
-    heading,
-    icon_button,
-    page_bar,
-    shown_errors,
-)
+from tts2face.serving.studio.pages.frame import begin_page, confirm, heading, icon_button, page_bar, shown_errors
+from tts2face.serving.studio.pages.login import LOGOUT_PATH
 from tts2face.serving.studio.project_archive import has_files
 from tts2face.serving.studio.project_store import ProjectEntry
 from tts2face.serving.studio.studio import Studio

@@ -12,7 +12,8 @@ from lexicon.errors import InputError, Tts2faceError
 from tts2face.interchange.exports.visemes import viseme_table
 from tts2face.serving.service.page_addresses import PAGES, RECORDINGS
 from tts2face.serving.studio.components.recorder import STYLE, Recorder, VisemeMap
-from tts2face.serving.studio.pages.frame import RECORD_PAGE, begin_page, confirm, heading, languages, page_bar, sentence
+from tts2face.serving.studio.pages.choices import languages
+from tts2face.serving.studio.pages.frame import RECORD_PAGE, begin_page, confirm, heading, page_bar, sentence
 from tts2face.serving.studio.recorded_talker import CLIP, REPORT, TALKER
 from tts2face.serving.studio.recording_work import Recordings
 from tts2face.serving.studio.recordings import RecordingEntry

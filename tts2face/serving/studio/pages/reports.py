@@ -8,15 +8,8 @@ from nicegui import ui
 
 from lexicon.errors import InputError
 from tts2face.serving.service.keys import ApiKey
-from tts2face.serving.studio.pages.frame import (
-    begin_page,
-    confirm,
-    heading,
-    icon_button,
-    models,
-    page_bar,
-    shown_errors,
-)
+from tts2face.serving.studio.pages.choices import models
+from tts2face.serving.studio.pages.frame import begin_page, confirm, heading, icon_button, page_bar, shown_errors
 from tts2face.serving.studio.reports import KINDS, REPORT
 from tts2face.serving.studio.studio import Studio
 from tts2face.serving.studio.work import BackgroundWork

@@ -6,7 +6,9 @@ from typing import Any
 from nicegui import ui
 
 from tts2face.request import GESTURES, OWN_FACE
-from tts2face.serving.studio.pages.frame import OpenPage, heading, languages, looks, models, voices
+from tts2face.serving.studio.pages.choices import languages, looks, models, voices
+from tts2face.serving.studio.pages.frame import heading
+from tts2face.serving.studio.pages.open_page import OpenPage
 from tts2face.serving.studio.pages.photo_dialog import TITLE, PhotoDialog, may_make_faces
 from tts2face.serving.work.resource_check import FACE, PALETTE, TALKER
 from tts2face.source import Recorded

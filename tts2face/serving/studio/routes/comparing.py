@@ -10,7 +10,8 @@ from fastapi.responses import Response
 
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.uploads import BLOCK_BYTES
-from tts2face.serving.studio.comparison import KEPT, NOT_READY, ComparedProject
+from tts2face.serving.studio.comparison import NOT_READY, ComparedProject
+from tts2face.serving.studio.reference import KEPT
 from tts2face.serving.studio.routes.projects import API, WAIT_S, opened
 
 router = APIRouter(prefix=f"{API}/projects/{{project}}", include_in_schema=False)

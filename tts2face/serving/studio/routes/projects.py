@@ -16,10 +16,11 @@ from lexicon.errors import InputError
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.page_addresses import PAGES
 from tts2face.serving.service.uploads import BLOCK_BYTES
+from tts2face.serving.studio.face_answer import face_answer
 from tts2face.serving.studio.importing import import_file, import_text
 from tts2face.serving.studio.project_archive import archive
 from tts2face.serving.studio.requests import data_of, events_of
-from tts2face.serving.studio.studio import Studio, face_answer
+from tts2face.serving.studio.studio import Studio
 from tts2face.serving.studio.work import BackgroundWork
 from tts2face.serving.studio.workspace import Workspace
 from tts2face.serving.work.job_record import DONE

@@ -1,0 +1,91 @@
+"""Requests for the recordings of segments: the words where the recording contains them, else the sound alone."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from lexicon.errors import DataError
+from tts2face.request import Request
+from tts2face.serving.batch.audio_track import open_track
+from tts2face.serving.batch.segment import Segment
+from tts2face.session.session import Session
+from tts2face.sound.pauses import speech_onset
+from tts2face.source import IDLE_LIMITS_S, FromPhones, Idle, Recorded, Spoken
+from tts2face.types import SOUND_RATE, Waveform, exact_rate, first_sample
+
+ONSET_S = 60  # of a recording of a cue, within which its first sound lies
+
+
+@contextmanager
+def excerpt_of(segment: Segment, request: Request) -> Iterator[Request]:
+    """The request of a segment, with its lead, or with its part of a recording as a temporary file."""
+    fps, source = exact_rate(request.fps), request.source
+    if isinstance(source, Spoken) and segment.lead_frames is not None:
+        yield replace(request, source=replace(source, lead=float(segment.lead_frames / fps)))
+        return
+    if not isinstance(source, Recorded):
+        yield request
+        return
+    if segment.audio_begin is None and segment.lead_frames is None:
+        yield request
+        return
+    track = open_track(source.audio)
+    begin, end = segment.audio_begin, segment.audio_end
+    if begin is None:
+        heard = Waveform(track.read(0, min(track.n_samples, ONSET_S * SOUND_RATE)) / np.float32(32768), SOUND_RATE)
+        begin = round(speech_onset(heard) * SOUND_RATE) - first_sample(segment.lead_frames or 0, SOUND_RATE, fps)
+        end = track.n_samples
+        if not heard.samples.any():  # it is refused by its name
+            yield request
+            return
+    with TemporaryDirectory(prefix="tts2face-") as folder:
+        path = Path(folder) / f"{source.audio.stem}.wav"
+        track.write_excerpt(path, begin, end)
+        yield replace(request, source=replace(source, audio=path))
+
+
+def fit_recording(session: Session, request: Request, segment: Segment) -> tuple[Request, float, list[str]]:
+    """A request that can be synthesised, seconds of its sound, and warnings.
+
+    An excerpt of a dubbing track may contain other words than the subtitles, or none: then lips follow the sound, or
+    rest.
+
+    Raises
+    ------
+    InputError, DataError, BackendError
+        As `Session.stream`; of an excerpt only where the recording cannot be read.
+    """
+    try:
+        pieces = list(session.stream(request))
+    except DataError as wrong:
+        if segment.audio_begin is None:
+            raise
+        if request.source.text:
+            return _without_words(session, request, segment)
+        seconds = segment.window_frames / float(exact_rate(request.fps))
+        idle = replace(request, source=Idle(max(seconds, IDLE_LIMITS_S[0])))
+        return idle, 0.0, [f"the recording has no speech here ({_reason(wrong)})"]
+    found = [f"{' '.join(one.words)!r}" for piece in pieces for one in piece.mismatches]
+    if found and segment.audio_begin is not None:
+        return _without_words(session, request, segment)
+    warnings = [f"the recording probably does not contain {', '.join(found)}"] if found else []
+    return request, sum(piece.clip.speech.waveform.duration for piece in pieces), warnings
+
+
+def _without_words(session: Session, request: Request, segment: Segment) -> tuple[Request, float, list[str]]:
+    source = request.source
+    assert isinstance(source, Recorded)
+    wordless = replace(request, source=replace(source, lips=FromPhones("", source.lips.articulation)))
+    wordless, seconds, warnings = fit_recording(session, wordless, segment)
+    if not isinstance(wordless.source, Idle):
+        warnings = [f"the recording contains other words than {source.text[:40]!r}; lips follow its sound", *warnings]
+    return wordless, seconds, warnings
+
+
+def _reason(error: DataError) -> str:
+    """A reason without the path of the temporary file."""
+    return "it is silent" if "silent" in str(error) else str(error).rpartition("/")[2]

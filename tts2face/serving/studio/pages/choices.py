@@ -1,0 +1,88 @@
+"""What a person can choose from in a project: voices, languages, models, styles with their colours."""
+
+import asyncio
+import os
+from contextlib import suppress
+from functools import lru_cache
+
+from lexicon.errors import Tts2faceError
+from tts2face.request import OWN_FACE
+from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.keys import ApiKey
+from tts2face.serving.service.library import Library, shipped_names
+from tts2face.serving.work.resource_check import FACE, PALETTE
+from tts2face.session import catalogue
+from tts2face.storage.shipped import find_file
+
+# Of styles in their order: far apart in hue and lightness also for colour-blind people (Okabe and Ito 2008, extended).
+COLOURS = (
+    "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c564b", "#7f3fbf", "#b5bd00", "#5d6d7e",
+    "#c0392b", "#17706e",
+)  # fmt: skip
+
+
+@lru_cache(maxsize=1)
+def voices() -> dict[str, str]:
+    """Voices by name with what is said of them; the empty one is the best for the language."""
+    found = {
+        one.name: f"{one.name} - {one.summary}" for one in catalogue.voices() if one.languages and one.is_installed
+    }
+    return {"": "best for the language", **found}
+
+
+@lru_cache(maxsize=1)
+def languages() -> dict[str, str]:
+    """Languages by code."""
+    return {one.code: f"{one.name} ({one.code})" for one in catalogue.languages()}
+
+
+def _haircuts(face: str) -> dict[str, str]:
+    return {one.name: f"{one.name} - {one.summary}" for one in catalogue.haircuts_of(face)}
+
+
+@lru_cache(maxsize=1)
+def _hair_colours() -> dict[str, str]:
+    return {one.name: one.name for one in catalogue.hair_colors()}
+
+
+async def models(library: Library, key: ApiKey, kind: str) -> list[str]:
+    """Names of the shipped models of a kind and of those that a key has uploaded."""
+    own = await asyncio.to_thread(library.uploads, kind, key.name)
+    more = [OWN_FACE] if kind == FACE else []
+    return [*shipped_names(kind), *more, *(one.name for one in own)]
+
+
+async def looks(library: Library, key: ApiKey, face: str) -> dict[str, dict[str, str]]:
+    """Identities, haircuts and hair colours of a face by the names of the options; the empty one is its own."""
+    names: tuple[str, ...] = ()
+    takes_haircuts = False
+    if face in shipped_names(FACE):
+        entry = await asyncio.to_thread(catalogue.describe_face, find_file(face, FACE))
+        names, takes_haircuts = entry.identities, entry.takes_haircuts
+    elif face != OWN_FACE:
+        with suppress(RefusedError):  # the face has been deleted; the preview says so
+            about = (await asyncio.to_thread(library.resolve, key, FACE, face))[1]
+            names, takes_haircuts = tuple(about["identities"]), about.get("takes_haircuts", True)
+    own = {"": "as the face"}
+    return {
+        "identity": own | {name: name for name in names},
+        "hair": own | (_haircuts(face) if takes_haircuts else {}),
+        "hair_color": own | (_hair_colours() if takes_haircuts else {}),
+    }
+
+
+async def styles(library: Library, key: ApiKey, palette: str | None) -> list[dict[str, str]]:
+    """Styles of a palette with a colour for each; none without a palette, or if it has been deleted."""
+    if palette is None:
+        return []
+    try:
+        path = palette  # the own palette is given as its path, which no client can choose
+        if palette not in shipped_names(PALETTE) and os.sep not in palette:
+            path, _ = await asyncio.to_thread(library.resolve, key, PALETTE, palette)
+        found = await asyncio.to_thread(catalogue.styles, path)
+    except (RefusedError, Tts2faceError):
+        return []
+    return [
+        {"name": one.name, "color": COLOURS[number % len(COLOURS)], "summary": one.summary}
+        for number, one in enumerate(found)
+    ]
