@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from tts2face.serving.batch.run import BatchResult
     from tts2face.serving.batch.store import Store
 
-
 NOT_IN_BATCH = frozenset(
     {"text", "exports", "audio", "audio_map", "idle", "listen", "partner", "timeline", "expression"}
 )

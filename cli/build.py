@@ -6,9 +6,9 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from cli.corpus import Provenance, check_suffix
-from cli.flags import Cache, Jobs, Model, switch
-from cli.photo import Yes
+from cli.flags import switch
 from cli.process import stage_bar, write_message
+from cli.tool_flags import DEFAULTS, ToolFlags
 from tts2face.storage.output_paths import refuse_overwriting
 
 
@@ -40,25 +40,23 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
         float, Parameter(help="Slack of the expression weights beyond [0, 1], from 0 to 1; 0 is the most stable.")
     ] = 0.0,
     provenance: Provenance = None,
-    jobs: Jobs = None,
-    cache: Cache = None,
-    model: Model = None,
-    yes: Yes = False,
+    tool: ToolFlags = DEFAULTS,
 ) -> None:
     """Build a gesture style for `--palette` from recordings of a person; transcripts are not needed."""
-    del yes  # read where the model is missing
     check_suffix(out, "palette")
     from corpus_tools.build_palette import StyleSource, build_style
     from corpus_tools.decomposition.basis import find_stills, parse_stills
     from corpus_tools.decomposition.markers import DEFAULT_MARKER_TABLE
     from corpus_tools.decomposition.recordings import MarkerOptions
-    from corpus_tools.run_options import RunOptions, ignore_stage
+    from corpus_tools.run_options import ignore_stage
     from tts2face.models.palette import load_palette
 
     named_stills = parse_stills(still or [])
     inputs = {"the recordings": recordings, "--stills": stills, "--markers": markers, "--neutral": neutral}
     inputs |= {f"--still {name}": one.path for name, one in named_stills.items()}
-    refuse_overwriting({"--out": out}, inputs | {"--palette": palette, "--provenance": provenance, "--model": model})
+    refuse_overwriting(
+        {"--out": out}, inputs | {"--palette": palette, "--provenance": provenance, "--model": tool.model}
+    )
     still_files = (find_stills(stills) if stills is not None else {}) | named_stills
     marker_options = MarkerOptions(markers or DEFAULT_MARKER_TABLE, neutral, marker_rate)
     source = StyleSource(
@@ -73,7 +71,7 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
             base=base,
             estimator=estimator,
             epsilon=epsilon,
-            run_options=RunOptions(cache, jobs, model),
+            run_options=tool.run_options(),
             stages=stages or ignore_stage,
         )
     for refusal in result.refused:

@@ -1,8 +1,6 @@
-"""``tts2face corpus``: build talkers from recordings and show them; `cli.evaluate` adds their evaluation.
+"""``tts2face corpus``: sentences to read aloud, checks of recordings, talkers and heads from them.
 
-``tts2face corpus prompts``: sentences to read aloud for a talker of one's own.
-
-``tts2face corpus check``: what is wrong or weak about recordings, before anything is built.
+`cli.build` adds the styles of gestures, `cli.evaluate` the evaluation of talkers.
 """
 
 from collections.abc import Mapping
@@ -11,14 +9,26 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from cli.flags import Cache, Jobs, Model, switch, whole_number
+from cli.flags import Cache, Model, switch, whole_number
 from cli.photo import Yes
 from cli.process import ask, progress_bar, stage_bar, write_message
+from cli.tool_flags import DEFAULTS, ToolFlags
 from lexicon.errors import InputError
 from tts2face.storage.files import write_atomically
 from tts2face.storage.output_paths import check_file_name, refuse_overwriting
 
+corpus = App(name="corpus", help="Build, show and evaluate talkers.")
+OutTalker = Annotated[Path, Parameter(help="Output talker (.talker).", alias="-o")]
+TalkerName = Annotated[str, Parameter(help="A shipped talker or a .talker file.")]
+Provenance = Annotated[
+    Path | None,
+    Parameter(
+        help="JSON with name, language, sources, licence and attribution; by default provenance.json of the folder."
+    ),
+]
 
+
+@corpus.command
 def prompts(
     *,
     out: Annotated[Path, Parameter(help="Output text, one prompt a line (.txt).", alias="-o")],
@@ -44,6 +54,7 @@ def prompts(
     write_message(f"wrote {out}: {len(chosen.texts)} prompts")
 
 
+@corpus.command
 def check(
     recordings: Annotated[Path, Parameter(help="Folder of videos, or one video, with transcripts beside them.")],
     /,
@@ -68,20 +79,6 @@ def check(
             print(f"{recording.name}: {finding.severity}: {finding.message}")  # noqa: T201 - the result
         if not findings:
             print(f"{recording.name}: good")  # noqa: T201 - the result
-
-
-corpus = App(name="corpus", help="Build, show and evaluate talkers.")
-corpus.command(check)
-corpus.command(prompts)
-
-OutTalker = Annotated[Path, Parameter(help="Output talker (.talker).", alias="-o")]
-TalkerName = Annotated[str, Parameter(help="A shipped talker or a .talker file.")]
-Provenance = Annotated[
-    Path | None,
-    Parameter(
-        help="JSON with name, language, sources, licence and attribution; by default provenance.json of the folder."
-    ),
-]
 
 
 @corpus.command
@@ -118,21 +115,17 @@ def build(  # noqa: PLR0913 - one parameter a flag
         ),
     ] = "grid_s1",
     strict: Annotated[bool, switch("Reject recordings with warnings, too.")] = False,
-    jobs: Jobs = None,
-    cache: Cache = None,
-    model: Model = None,
-    yes: Yes = False,
+    tool: ToolFlags = DEFAULTS,
 ) -> None:
     """Build a talker from recordings. After an interruption, the same command resumes the build."""
-    del yes  # read where the model is missing
     check_suffix(out, "talker")
     folder = recordings if recordings.is_dir() else recordings.parent  # transcripts are beside the video
-    inputs = {"the recordings": recordings, "--provenance": provenance, "--model": model}
+    inputs = {"the recordings": recordings, "--provenance": provenance, "--model": tool.model}
     refuse_overwriting({"--out": out, "--report": report}, inputs | {"the folder of recordings": folder})
     if report is not None:
         check_file_name(report, "a report", (".html", ".htm"))
     from corpus_tools.build_talker import build_talker
-    from corpus_tools.run_options import RunOptions, ignore_stage
+    from corpus_tools.run_options import ignore_stage
 
     consent_fields = _request_consent(name or recordings.resolve().name, consent) if appearance else None
     with stage_bar() as stages:
@@ -141,7 +134,7 @@ def build(  # noqa: PLR0913 - one parameter a flag
             out,
             name=name,
             provenance=provenance,
-            run_options=RunOptions(cache, jobs, model),
+            run_options=tool.run_options(),
             consent=consent_fields,
             report=report,
             base=base,
@@ -249,27 +242,23 @@ def clone(
 
 
 @corpus.command
-def audio_maps(  # noqa: PLR0913 - one parameter a flag
+def audio_maps(
     recordings: Annotated[Path, Parameter(help="Folder of recordings from which the talker was built.")],
     /,
     *,
     talker: TalkerName,
     out: OutTalker,
-    jobs: Jobs = None,
-    cache: Cache = None,
-    model: Model = None,
-    yes: Yes = False,
+    tool: ToolFlags = DEFAULTS,
 ) -> None:
     """Train the audio maps of a talker that was built without them: speech motion from sound alone (`--audio`)."""
-    del yes  # read where the model is missing
     check_suffix(out, "talker")
-    refuse_overwriting({"--out": out}, {"the recordings": recordings, "--talker": talker, "--model": model})
+    refuse_overwriting({"--out": out}, {"the recordings": recordings, "--talker": talker, "--model": tool.model})
     from corpus_tools.build_talker import add_audio_maps
-    from corpus_tools.run_options import RunOptions, ignore_stage
+    from corpus_tools.run_options import ignore_stage
     from tts2face.models.talker_file import load_talker
 
     with stage_bar() as stages:
-        run_options = RunOptions(cache, jobs, model)
+        run_options = tool.run_options()
         result = add_audio_maps(
             recordings, load_talker(talker), out, run_options=run_options, stages=stages or ignore_stage
         )

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from tts2face.interchange.characters.importing import ImportReport
     from tts2face.models.face import Face
 
-
 OUTPUTS = {
     "--out": ("a face", (".face",)),
     "--preview": ("a picture", (".png",)),
@@ -25,7 +24,6 @@ OUTPUTS = {
     "--write-mapping": ("a mapping", (".tsv",)),
     "--write-fit": ("a fit", (".json",)),
 }  # what each flag of a file that is written is, and its endings
-
 face = App(name="face", help="Import characters as faces, show faces.")
 
 

@@ -16,7 +16,6 @@ from tts2face.request import option_fields
 if TYPE_CHECKING:
     from cyclopts import Token
 
-
 END_OF_OPTIONS = "--"  # everything after it is text or a path
 Out = Annotated[
     Path | None,
@@ -43,6 +42,8 @@ Exports = Annotated[
     ),
 ]
 _SHORT_OPTION = re.compile(r"-[A-Za-z]")
+Cache = Annotated[Path | None, Parameter(help="Folder for intermediate results; by default the user's cache folder.")]
+Model = Annotated[Path | None, Parameter(help="Path of face_landmarker.task; by default found or set up.")]
 
 
 def switch(help_text: str) -> Parameter:
@@ -64,8 +65,6 @@ def parse_whole_number(_: Any, tokens: "Sequence[Token]") -> int:
 
 
 Jobs = Annotated[int | None, whole_number("Number of processes; by default one per core.")]
-Cache = Annotated[Path | None, Parameter(help="Folder for intermediate results; by default the user's cache folder.")]
-Model = Annotated[Path | None, Parameter(help="Path of face_landmarker.task; by default found or set up.")]
 
 
 def add_option_flags(

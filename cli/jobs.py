@@ -24,7 +24,6 @@ from tts2face.serving.service.settings import ServiceSettings, read_settings
 if TYPE_CHECKING:
     from tts2face.serving.work.queue_control import QueuedSegment
 
-
 DEFAULT_DATABASE = "tts2face-jobs.sqlite"
 Database = Annotated[
     str, Parameter(help="SQLite file on a local disk, or postgresql://user@host/name for many machines.")
@@ -32,7 +31,8 @@ Database = Annotated[
 Names = Annotated[str, Parameter(help="Names of jobs, or at least six characters of each; without any, all of them.")]
 WAIT_S = 0.5
 SHOWN_CHARACTERS = 50  # of a text in the list
-
+keys = App(name="keys", help="API keys of the service.")
+SECRETS = frozenset(one.name for one in fields(ServiceSettings) if one.metadata["is_secret"])
 jobs = App(name="jobs", help="List, show, cancel, retry and prune the jobs of a database.")
 
 
@@ -180,12 +180,6 @@ def _row(one: "QueuedSegment") -> tuple[str, ...]:
     took = "" if one.took_s is None else f"{one.took_s:.1f} s"
     text = one.text if len(one.text) <= SHOWN_CHARACTERS else f"{one.text[:SHOWN_CHARACTERS]}..."
     return one.name[:12], one.state.ljust(9), str(one.priority).rjust(4), took.rjust(8), text, one.reason
-
-
-keys = App(name="keys", help="API keys of the service.")
-
-
-SECRETS = frozenset(one.name for one in fields(ServiceSettings) if one.metadata["is_secret"])
 
 
 @add_option_flags(("Settings", ServiceSettings), without=SECRETS, has_defaults=False)  # lists of processes show flags

@@ -10,7 +10,6 @@ from cyclopts import Parameter
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-
 AsJson = Annotated[bool, Parameter(help="Print JSON instead of a table.", name="--json", negative="")]
 EMPTY_CELL = "-"
 

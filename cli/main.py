@@ -40,7 +40,7 @@ from cli.process import (
     use_one_thread_of_blas,
     write_message,
 )
-from cli.speak import convert, render
+from cli.render import convert, render
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
 from lexicon.values.files import LARGEST_TEXT_BYTES, decode_utf8, read_bounded, read_text
 from tts2face import __version__
@@ -52,7 +52,6 @@ from tts2face.storage.temporary import remove_held
 
 MAKE_CLIPS = (["batch"], ["mimic"], ["render"])  # as a text does
 Shell = Literal["bash", "zsh", "fish", "powershell"]
-
 app = App(
     name="tts2face",
     help='Text to talking face: tts2face "Hello there." --out hello.mp4',

@@ -19,7 +19,6 @@ from tts2face.models.consent import consent_record
 if TYPE_CHECKING:
     from tts2face.models.face import Face
 
-
 Photo = Annotated[
     str | None,
     Parameter(help="Picture of a person who shall speak, in place of --face; photo.jpg@2 is its second largest face."),
@@ -34,6 +33,8 @@ Fit = Annotated[
 Smile = Annotated[
     str | None, Parameter(help="Second picture of the person in the photo, with a smile whose teeth the clips show.")
 ]
+YES, AGREED = "--yes", ("y", "yes")
+Yes = Annotated[bool, switch("Download the face landmark model without asking, if it is not installed.")]
 
 
 def face_of_photo(
@@ -99,10 +100,6 @@ def check_photo(photo: str, others: Mapping[str, str | Path | None], outputs: Ma
     if all(output is None for output in outputs.values()):
         raise InputError("there is no output; add --out clip.mp4 (or .webm, .gif, or a folder for .png files)")
     refuse_overwriting(outputs, {"--photo": path} | dict(others))
-
-
-YES, AGREED = "--yes", ("y", "yes")
-Yes = Annotated[bool, switch("Download the face landmark model without asking, if it is not installed.")]
 
 
 def is_missing_model(error: BackendError) -> bool:

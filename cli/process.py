@@ -43,6 +43,8 @@ TRIM_THRESHOLD, MMAP_THRESHOLD, MOST_ARENAS = -1, -3, -8  # parameter numbers of
 N_ARENAS = 2  # heaps from which threads allocate; one for each thread takes 14 MB more in a clip
 LARGE_BYTES = 1 << 20  # blocks of at least this size are mapped one by one; pictures of 512 x 512 are smaller
 FIRST_BYTES = 8 << 20  # the same until a first result: each mapped block clears its pages, 80,000 by then
+COMPILATION = "tts2face.numeric.kernels"  # name of its logger; the module itself would load numpy
+Progress = Callable[[int, int], None]  # as in `tts2face.types`, which would load numpy for --help
 
 
 def exit_code(error: Exception) -> int:
@@ -266,10 +268,6 @@ def use_one_thread_of_blas() -> None:
     The products of a clip are small: OpenBLAS's other threads turn in circles between them, a 25th of its time.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-
-COMPILATION = "tts2face.numeric.kernels"  # name of its logger; the module itself would load numpy
-Progress = Callable[[int, int], None]  # as in `tts2face.types`, which would load numpy for --help
 
 
 @contextmanager

@@ -5,9 +5,10 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from cli.flags import Cache, Face, Jobs, Model, whole_number
+from cli.flags import Face, whole_number
 from cli.photo import Yes
 from cli.process import progress_bar, stage_bar, write_message
+from cli.tool_flags import DEFAULTS, ToolFlags
 from lexicon.errors import InputError
 from tts2face.storage.output_paths import refuse_overwriting
 
@@ -102,22 +103,18 @@ def moods(  # noqa: PLR0913 - one parameter a flag
 
 
 @report.command
-def retarget(  # noqa: PLR0913 - one parameter a flag
+def retarget(
     recordings: Annotated[Path, Parameter(help="Folder of recordings of a person, or one video.")],
     /,
     *,
     out: Annotated[Path, Parameter(help="Output: .html, .csv, .json or .png.", alias="-o")],
     face: Face = None,
     identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
-    jobs: Jobs = None,
-    cache: Cache = None,
-    model: Model = None,
-    yes: Yes = False,
+    tool: ToolFlags = DEFAULTS,
 ) -> None:
     """Compare what the face tracker reads in recordings and in a face that mimics them, phone by phone."""
-    del yes  # read where the model is missing
-    refuse_overwriting({"--out": out}, {"the recordings": recordings, "--face": face, "--model": model})
-    from corpus_tools.run_options import RunOptions, ignore_stage
+    refuse_overwriting({"--out": out}, {"the recordings": recordings, "--face": face, "--model": tool.model})
+    from corpus_tools.run_options import ignore_stage
     from corpus_tools.studies.retargeting.page import write_retargeting
     from tts2face.models.face_names import default_face
 
@@ -127,7 +124,7 @@ def retarget(  # noqa: PLR0913 - one parameter a flag
             out,
             face=face or default_face(identity, None),
             identity=identity,
-            run_options=RunOptions(cache, jobs, model),
+            run_options=tool.run_options(),
             stages=stages or ignore_stage,
         )
     write_message(

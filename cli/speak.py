@@ -1,20 +1,12 @@
-"""``tts2face "text"``: write, explain or show a clip from the parsed flags.
-
-``tts2face render``: the clip of a project.
-
-``tts2face convert``: write a lossless track to files of other formats.
-"""
+"""``tts2face "text"``: write, explain or show a clip from the parsed flags."""
 
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from json import dumps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING
 
-from cyclopts import Parameter
-
-from cli.flags import Exports, Face, Hair, HairColor, Out, switch
 from cli.process import compilation_messages, progress_bar, return_large_blocks, write_message
 from lexicon.errors import InputError
 from tts2face.picture.options import Picture
@@ -34,7 +26,6 @@ if TYPE_CHECKING:
     from tts2face.sound.alignment import TextMismatch
     from tts2face.sound.voice_pool import VoicePool
     from tts2face.types import Progress
-
 
 EXPLANATION_SUFFIXES = (".json", ".txt")
 WITHOUT_WORDS = (
@@ -259,58 +250,3 @@ def _write_explanation(explanations: "tuple[PhoneExplanation, ...]", path: Path)
     is_json = path.suffix == ".json"
     text = dumps(explanation_json(explanations), ensure_ascii=False) if is_json else explanation_text(explanations)
     write_atomically(path, text.encode())
-
-
-def render(  # noqa: PLR0913 - one parameter a flag
-    project: Annotated[Path, Parameter(help="Project (.json), as the studio and tts2face.save_project write it.")],
-    /,
-    *,
-    out: Out = None,
-    export: Exports = None,
-    size: Annotated[str | None, Parameter(help="Width x height in pixels in place of the project's.")] = None,
-    quality: Annotated[str | None, Parameter(help="draft, standard or high in place of the project's.")] = None,
-    explain: Annotated[
-        Path | None, Parameter(help="File (.json or .txt) that lists the recorded tokens used for each phone.")
-    ] = None,
-    quiet: Annotated[bool, switch("Print neither progress nor summary.")] = False,
-) -> None:
-    """Render a project: the same motion as the studio shows."""
-    from tts2face.session.project_file import load_project
-
-    content = load_project(project)
-    chosen: dict[str, Any] = {
-        name: value for name, value in (("size", size), ("quality", quality)) if value is not None
-    }
-    options = SpeakOptions(
-        out, content.models, explain, view=False, quiet=quiet, file=project, exports=tuple(export or ())
-    )
-    run_prepared(content.prepare(), replace(content.picture, **chosen), options.with_export_of_out())
-
-
-def convert(  # noqa: PLR0913 - one parameter a flag
-    track: Annotated[Path, Parameter(help="Track written by --export clip.track.json.")],
-    outs: Annotated[
-        list[str], Parameter(help="Outputs; the suffix selects the format (`tts2face formats`), or FORMAT:PATH.")
-    ],
-    /,
-    *,
-    face: Face = None,
-    identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
-    hair: Hair = None,
-    hair_color: HairColor = None,
-    palette: Annotated[str, Parameter(help="Palette of the track: a shipped palette or a .palette file.")] = "starter",
-    fps: Annotated[
-        float | None, Parameter(help="Frames per second of formats with frames; by default those of the track.")
-    ] = None,
-    quiet: Annotated[bool, switch("Print no summary.")] = False,
-) -> None:
-    """Write a track to files of other programs."""
-    from tts2face.session.clip_files import convert as convert_track
-
-    began = time.perf_counter()
-    written = convert_track(
-        track, outs, face=face, identity=identity, hair=hair, hair_color=hair_color, palette=palette, fps=fps
-    )
-    if not quiet:
-        names = ", ".join(str(path) for path in written)
-        write_message(f"wrote {names} in {time.perf_counter() - began:.1f} s")

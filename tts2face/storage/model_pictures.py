@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.storage.pictures import open_picture
+
 if TYPE_CHECKING:
     pass
-from tts2face.storage.pictures import open_picture
 
 JPEG_QUALITY = 92
 

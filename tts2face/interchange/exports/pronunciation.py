@@ -5,9 +5,10 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from tts2face.interchange.exports.textgrid import textgrid
+
 if TYPE_CHECKING:
     from lexicon.pronounce import Pronunciation, Word
-from tts2face.interchange.exports.textgrid import textgrid
 
 NOMINAL_NOTE = "nominal durations: no voice has spoken this"
 
