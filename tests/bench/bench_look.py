@@ -54,7 +54,6 @@ def ladder(face: Face) -> None:
     bald = keep_parts(face, lambda part: part.kind != "strands")
     for name, ms in {
         "standard": frame_ms(standard),
-        "2 x 2 samples in every pixel": frame_ms(standard, samples_all=True),
         "one sample": frame_ms(mesh_renderer(face, Picture(supersampling=1))),
         "draft": frame_ms(mesh_renderer(face, Picture(quality="draft"))),
         "high": frame_ms(mesh_renderer(face, Picture(quality="high"))),

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from tts2face.picture.kernels.picture import sort_into_bands
 from tts2face.picture.kernels.raster import (
     BACK_BIAS,
     FIRST,
@@ -15,8 +14,11 @@ from tts2face.picture.kernels.raster import (
     N_PHASES,
     NO_TRIANGLE,
     TRANSLUCENT,
+    Batch,
+    Geometry,
     draw_band,
     gather_triangles,
+    sort_into_bands,
     transform_to_camera,
 )
 
@@ -38,7 +40,7 @@ def rasterised(points, triangles, translucent=None, band_rows=SIZE[1]):
     starts, members = np.zeros(n_bands * N_PHASES + 1, np.int64), np.zeros(n_bands * 2 * len(triangles), np.int32)
     marks = np.zeros(len(triangles), bool) if translucent is None else np.asarray(translucent, bool)
     phase = np.where(marks[:, None], TRANSLUCENT, np.array([FIRST, LATER])).astype(np.int8)
-    sort_into_bands((boxes, source, phase), count, (band_rows, 0), starts, members)
+    sort_into_bands((boxes, source, phase), count, band_rows, starts, members)
     owner, depth = [], []
     for band in range(n_bands):
         near, who = (
@@ -46,8 +48,8 @@ def rasterised(points, triangles, translucent=None, band_rows=SIZE[1]):
             np.full((3, band_rows, SIZE[0]), NO_TRIANGLE, np.int32),
         )
         bounds = starts[N_PHASES * band : N_PHASES * (band + 1) + 1]
-        batch = (corners, boxes, source, members, bounds)
-        draw_band((camera, triangles, LENS), batch, (band * band_rows, 1), np.zeros((0, 0), np.uint8), near, who)
+        batch = Batch(corners, boxes, source, members, bounds)
+        draw_band(Geometry(camera, triangles, LENS), batch, band * band_rows, near, who)
         owner.append(who)
         depth.append(near)
     return np.concatenate(owner, axis=1)[:, : SIZE[1]], np.concatenate(depth, axis=1)[:, : SIZE[1]]

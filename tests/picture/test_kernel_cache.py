@@ -31,8 +31,7 @@ from tts2face.numeric import compiler, least_squares, object_code
 from tts2face.numeric import kernels as compilation
 from tts2face.numeric.kernels import CACHE_VARIABLE, Kernel, cache_folder, inlined_kernel, kernel
 from tts2face.picture.baked import cut_out, eyes, response, shading, surface
-from tts2face.picture.kernels import fragments, raster, shade, strands
-from tts2face.picture.kernels import strands as strand_light
+from tts2face.picture.kernels import fragments, raster, shade, strand_light, strands
 from tts2face.request import OWN_FACE
 from tts2face.serving.service.logs import LineFormatter
 from tts2face.session import warm_up

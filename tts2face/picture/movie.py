@@ -249,20 +249,20 @@ class ClipFrames:
         if self._clock != (clip.fps, clip.speech.waveform.rate):
             raise InputError(f"clips of one file must share fps and sound rate; this one has {clip.fps:g} fps")
         first = self.n_frames
-        begin = self._first_sample(first)
-        yield None, np.zeros(begin - self._n_samples, np.float32)  # the previous clip ended within a frame
+        start = self._first_sample(first)
+        yield None, np.zeros(start - self._n_samples, np.float32)  # the previous clip ended within a frame
         self.n_added += len(clip.motion)
         at, samples = 0, clip.speech.waveform.samples
         for number, pixels in self._pictures(clip):
             while self.n_frames <= first + number:
                 is_drawn = self.n_frames == first + number
                 self.n_frames += 1
-                until = min(self._first_sample(self.n_frames) - begin, len(samples))
+                until = min(self._first_sample(self.n_frames) - start, len(samples))
                 yield pixels if is_drawn else None, samples[at:until]
                 at = until
                 if self._pace is not None:
                     self._pace.advance(clip.fps)
-        self._n_samples = begin + at
+        self._n_samples = start + at
 
     def _pictures(self, clip: Clip) -> Iterator[tuple[int, NDArray[np.uint8]]]:
         """Numbers of the frames that are drawn, the first and the last among them, and their pictures."""

@@ -23,7 +23,7 @@ from tts2face.picture.kernels.raster import NOT_DRAWN
 from tts2face.picture.kernels.tables import FIRST_LIGHT_ROW, OPEN_SURFACE, lamp_directions, light_table
 from tts2face.picture.light import Exposure, compute_exposure
 from tts2face.picture.occlusion import occlusion_poses
-from tts2face.picture.options import BLUR, DRAFT, HIGH, STUDIO, CameraView, Picture, parse_background
+from tts2face.picture.options import BLUR, DRAFT, STUDIO, CameraView, Picture, parse_background
 from tts2face.picture.surface import Surface, build_surface
 from tts2face.processes.threads import available_cores
 from tts2face.storage.pictures import open_picture
@@ -68,7 +68,7 @@ class Scene:
     def allocate_buffers(self) -> DrawingBuffers:
         """Buffers for pictures of this scene."""
         picture, size = self.picture, (self.picture.width, self.picture.height)
-        return allocate_buffers(self.surface, size, picture.samples_per_side, samples_all=picture.quality == HIGH)
+        return allocate_buffers(self.surface, size, picture.samples_per_side)
 
     def draw(
         self,

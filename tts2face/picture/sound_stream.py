@@ -88,8 +88,8 @@ def _open_encoder(kind: SoundKind, rate: int, path: Path | None, *, has_header: 
 
 def _blocks(sound: Waveform) -> Iterator[Waveform]:
     size = round(BLOCK_S * sound.rate)
-    for begin in range(0, len(sound.samples), size):
-        yield sound.part(begin, begin + size)
+    for start in range(0, len(sound.samples), size):
+        yield sound.part(start, start + size)
 
 
 def wav_header(rate: int, n_bytes: int | None) -> bytes:

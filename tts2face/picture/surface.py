@@ -36,7 +36,6 @@ from tts2face.picture.textures import pack_textures
 from tts2face.processes.shared import shared
 
 SKIN, EYE_KIND, STRANDS = "skin", "eye", "strands"  # kinds of parts
-THIN_MM = 0.4  # median height of the triangles of parts that are thinner than a pixel
 OPEN_SHARE = 0.05  # parts with a larger share of boundary edges are open sheets, lit from both sides
 SKIN_ROUGHNESS = 0.0448  # squared width of the wide lobe of skin: a roughness of 0.46
 SKIN_GLOSS = 0.5  # wide lobe of skin, as a share of the part's specular
@@ -107,20 +106,6 @@ def _free_edge_share(triangles: NDArray[np.int32]) -> float:
     return float((uses == 1).mean())
 
 
-def thin_triangles(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """Whether each triangle (F,) belongs to a thin part, such as modelled lashes."""
-    corners = face.vertices[triangles].astype(np.float64)
-    sides = corners - np.roll(corners, 1, axis=1)
-    longest = np.linalg.norm(sides, axis=2).max(axis=1, initial=0.0)
-    height = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / np.maximum(longest, 1e-9)
-    thin = [
-        bool(np.any(part_of == at)) and float(np.median(height[part_of == at])) < THIN_MM
-        for at in range(len(face.parts))
-    ]
-    chosen: NDArray[np.bool_] = np.array(thin, bool)[part_of]
-    return chosen
-
-
 SKULL_CENTRE_MM = np.array([0.0, 20.0, -75.0])  # middle of the skull, from midway between the eyes
 STRAND_GLOSS = 0.25  # specular of a part of strands at which its highlights are those of hair
 
@@ -164,8 +149,8 @@ def find_strands(
     texels, levels = packed
     means = np.ones(len(levels), np.float32)
     for number in np.unique(texture):
-        begin, width, height = levels[number, 0]
-        seen = texels[begin : begin + width * height : 7]
+        start, width, height = levels[number, 0]
+        seen = texels[start : start + width * height : 7]
         light = linear_light(seen[:, :3]).mean(axis=1)
         means[number] = max(float(np.average(light, weights=seen[:, 3] + 1e-3)), 1e-4)
     return Strands(
@@ -215,11 +200,10 @@ class Surface:
 
     ``triangles`` (F, 3); ``colours`` (V, 3) linear light; ``uv`` (V, 2); ``textures`` their pixels and coverage,
     ``texels`` and ``levels`` as `tts2face.picture.textures` packs them; ``part_of`` and ``texture_of`` (F,); ``phase``
-    (F, 2) of the front and the back of triangles as `tts2face.picture.kernels.raster` names them; ``thin`` (F,) marks
-    triangles of thin parts;
-    ``materials`` (P, 9) as `tts2face.picture.kernels.tables` names its columns; ``wrap`` (V,); the
-    triangles around vertex v are ``members[starts[v]:starts[v + 1]]``, those of vertices at the same place and of the
-    same part included, so that a seam of the texture does not show.
+    (F, 2) of the front and the back of triangles as `tts2face.picture.kernels.raster` names them; ``materials`` (P, 9)
+    as `tts2face.picture.kernels.tables` names its columns; ``wrap`` (V,); the triangles around vertex v are
+    ``members[starts[v]:starts[v + 1]]``, those of vertices at the same place and of the same part included, so that a
+    seam of the texture does not show.
     """
 
     rig: FaceRig
@@ -232,7 +216,6 @@ class Surface:
     part_of: NDArray[np.int32]
     texture_of: NDArray[np.int32]
     phase: NDArray[np.int8]
-    thin: NDArray[np.bool_]
     materials: NDArray[np.float32]
     wrap: NDArray[np.float32]
     starts: NDArray[np.int64]
@@ -266,7 +249,6 @@ def build_surface(face: Face, *, scatters: bool = True) -> Surface:
         part_of=part_of,
         texture_of=np.repeat([max(part.texture, 0) for part in parts], counts).astype(np.int32),
         phase=_phases(face, part_of),
-        thin=thin_triangles(face, every, part_of),
         materials=materials,
         wrap=vertex_wrap(face, every, part_of, materials),
         starts=starts,
@@ -308,11 +290,11 @@ def triangles_by_vertex(
     corner = weld[triangles.ravel()]
     order = np.argsort(corner, kind="stable")
     counts = np.bincount(corner, minlength=int(weld.max(initial=-1)) + 1)
-    begins = np.concatenate([[0], np.cumsum(counts)])
+    firsts = np.concatenate([[0], np.cumsum(counts)])
     around = (order // 3).astype(np.int32)
     sizes = counts[weld]
     starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-    picks = np.repeat(begins[weld] - starts[:-1], sizes) + np.arange(starts[-1])
+    picks = np.repeat(firsts[weld] - starts[:-1], sizes) + np.arange(starts[-1])
     return starts, around[picks]
 
 

@@ -29,17 +29,17 @@ def read_texel(
     texels: Array, place: tuple[int, int, int], linear: Array, u: float, v: float
 ) -> tuple[float, float, float, float]:
     """Bilinear colour in linear light, and coverage in [0, 1], at (u, v) of a level (first texel, width, height)."""
-    begin, width, height = place
+    start, width, height = place
     zero, half = np.float32(0), np.float32(0.5)
     x = min(max(u * np.float32(width) - half, zero), np.float32(width - 1))
     y = min(max(v * np.float32(height) - half, zero), np.float32(height - 1))
     left, top = int(x), int(y)
     across, along = x - np.float32(left), y - np.float32(top)
-    one = np.float32(1)
+    unit = np.float32(1)
     right, below = 1 if left + 1 < width else 0, width if top + 1 < height else 0
-    p = begin + top * width + left
-    w0, w1 = (one - across) * (one - along), across * (one - along)
-    w2, w3 = (one - across) * along, across * along
+    p = start + top * width + left
+    w0, w1 = (unit - across) * (unit - along), across * (unit - along)
+    w2, w3 = (unit - across) * along, across * along
     q, r, s = p + right, p + below, p + below + right
     red = linear[texels[p, 0]] * w0 + linear[texels[q, 0]] * w1 + linear[texels[r, 0]] * w2 + linear[texels[s, 0]] * w3
     green = (
@@ -61,14 +61,14 @@ def pack_textures(
     parts: list[NDArray[np.uint8]] = []
     levels = np.zeros((max(len(textures), 1), N_LEVELS, 3), np.int64)
     levels[:, :, 1:] = 1
-    begin = 0
+    start = 0
     for number, texture in enumerate(textures):
         level = np.zeros((*texture.pixels.shape[:2], 4), np.uint8)
         level[:, :, :3], level[:, :, 3] = texture.pixels, 255 if texture.alpha is None else texture.alpha
         for depth in range(N_LEVELS):
             parts.append(level.reshape(-1, 4))
-            levels[number, depth] = begin, level.shape[1], level.shape[0]
-            begin += level.shape[0] * level.shape[1]
+            levels[number, depth] = start, level.shape[1], level.shape[0]
+            start += level.shape[0] * level.shape[1]
             if depth < N_LEVELS - 1:
                 coarse = np.zeros(((level.shape[0] + 1) // 2, (level.shape[1] + 1) // 2, 4), np.uint8)
                 halve(level, tables[0], tables[1], coarse)

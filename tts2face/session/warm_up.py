@@ -103,7 +103,7 @@ def compile_strands() -> None:
     """Compile the kernels of hair, lashes and brows, a quarter of the drawing kernels' time, without the others."""
     from tts2face.picture.camera import camera_matrices
     from tts2face.picture.kernels.picture import allocate_buffers, arrange_cards, blend_strands
-    from tts2face.picture.kernels.strands import light_strands
+    from tts2face.picture.kernels.strand_light import light_strands
     from tts2face.picture.kernels.tables import FIRST_LIGHT_ROW, LAMPS
     from tts2face.picture.surface import build_surface
 

@@ -62,13 +62,13 @@ def without_background(surface: LitSurface, texels: Array, width: int) -> LitSur
 @vectorized_kernel
 def find_covers(corners: Array, share: Array, count: int, covers: Array) -> None:
     """Write the cover (N,), 0 to 1, between the four texels (4, N) around fragments at places (2, N) between them."""
-    one, most = np.float32(1), np.float32(1 / OPAQUE)
+    unit, most = np.float32(1), np.float32(1 / OPAQUE)
     for i in range(count):
         x, y = share[0, i], share[1, i]
         a, b = (corners[0, i] >> COVER_SHIFT) & OPAQUE, (corners[1, i] >> COVER_SHIFT) & OPAQUE
         c, d = (corners[2, i] >> COVER_SHIFT) & OPAQUE, (corners[3, i] >> COVER_SHIFT) & OPAQUE
-        above, below = np.float32(a) * (one - x) + np.float32(b) * x, np.float32(c) * (one - x) + np.float32(d) * x
-        covers[i] = (above * (one - y) + below * y) * most
+        above, below = np.float32(a) * (unit - x) + np.float32(b) * x, np.float32(c) * (unit - x) + np.float32(d) * x
+        covers[i] = (above * (unit - y) + below * y) * most
 
 
 @kernel
@@ -86,7 +86,7 @@ def compose_over(
     """
     pixels, samples, n_samples = fragments
     height, width, channels = picture.shape
-    part, half, zero, one = np.float32(1) / np.float32(n_samples), np.float32(0.5), np.float32(0), np.float32(1)
+    part, half, zero, unit = np.float32(1) / np.float32(n_samples), np.float32(0.5), np.float32(0), np.float32(1)
     most, least = np.float32(OPAQUE), np.float32(1e-3)
     pixel = 0
     for row in range(height):
@@ -104,10 +104,10 @@ def compose_over(
                 red += share * min(max(colour[0, i], zero), most)
                 green += share * min(max(colour[1, i], zero), most)
                 blue += share * min(max(colour[2, i], zero), most)
-            rest, scale = one - seen, one
+            rest, scale = unit - seen, unit
             if channels == 4:
                 rest *= np.float32(picture[row, column, 3]) / most
-                scale = one / max(cover + rest, least)
+                scale = unit / max(cover + rest, least)
             else:
                 behind = seen - cover
                 red += behind * np.float32(wall[row, column, 0])

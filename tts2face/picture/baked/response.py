@@ -167,7 +167,7 @@ def write_mouth_terms(points: Array, mouth: Array, table: Array, ring: Array, te
     The curve is flat where the opening is narrow or wide, as that of a display. `ways` (6, M) is scratch space: places,
     and ways to the corner before, of length 1.
     """
-    zero, one, half, least = np.float32(0), np.float32(1), np.float32(0.5), np.float32(1e-7)
+    zero, unit, half, least = np.float32(0), np.float32(1), np.float32(0.5), np.float32(1e-7)
     n = len(mouth)
     px, py, pz, bx, by, bz = ways[0], ways[1], ways[2], ways[3], ways[4], ways[5]
     right, up, ahead = terms[3], terms[4], terms[5]
@@ -181,7 +181,7 @@ def write_mouth_terms(points: Array, mouth: Array, table: Array, ring: Array, te
         cx, cy, cz = corner[0], corner[1], corner[2]
         for i in range(n):
             x, y, z = cx - px[i], cy - py[i], cz - pz[i]
-            scale = one / np.sqrt(x * x + y * y + z * z + least)
+            scale = unit / np.sqrt(x * x + y * y + z * z + least)
             x, y, z = x * scale, y * scale, z * scale
             a, b, c = bx[i], by[i], bz[i]
             cosine = a * x + b * y + c * z
@@ -189,7 +189,7 @@ def write_mouth_terms(points: Array, mouth: Array, table: Array, ring: Array, te
             near = (np.float32(0.8543985) + (np.float32(0.4965155) + np.float32(0.0145206) * off) * off) / (
                 np.float32(3.4175940) + (np.float32(4.1616724) + off) * off
             )  # angle over its sine and 2 pi, below a right angle
-            share = near if cosine > zero else half / np.sqrt(max(one - cosine * cosine, least)) - near
+            share = near if cosine > zero else half / np.sqrt(max(unit - cosine * cosine, least)) - near
             right[i] += share * (y * c - z * b)
             up[i] += share * (z * a - x * c)
             ahead[i] += share * (x * b - y * a)

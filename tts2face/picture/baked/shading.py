@@ -48,7 +48,7 @@ def list_fragments(
     line = flat_view(nearest)
     middle, n_samples = np.float32(side - 1) / np.float32(2), side * side
     half = np.uint64(n_samples // 2 // side * stride + n_samples // 2 % side)
-    one, below = np.uint64(1), np.uint64(stride)
+    unit, below = np.uint64(1), np.uint64(stride)
     for s in range(n_samples):
         right[s], low[s], way[s] = s % side, s // side, s // side * stride + s % side
     count = np.uint64(0)
@@ -60,7 +60,7 @@ def list_fragments(
             pixels[np.uint64(row * width + column)] = count
             at = np.uint64(side * (row * stride + column))
             if side == 2:  # as the loop, written out
-                a, b, c, d = line[at], line[at + one], line[at + below], line[at + below + one]
+                a, b, c, d = line[at], line[at + unit], line[at + below], line[at + below + unit]
                 least, most, piece = min(a, b, c, d), max(a, b, c, d), piece_of[(a & TRIANGLE_MASK) - 1]
                 is_one = (piece_of[(b & TRIANGLE_MASK) - 1] == piece) & (piece_of[(c & TRIANGLE_MASK) - 1] == piece)
                 is_one &= piece_of[(d & TRIANGLE_MASK) - 1] == piece
@@ -77,7 +77,7 @@ def list_fragments(
             if is_one:
                 triangle[count] = (line[at + half] & TRIANGLE_MASK) - 1
                 across[count], down[count], samples[count] = x + middle, y + middle, n_samples
-                count += one
+                count += unit
                 continue
             for s in range(n_samples):
                 keys[s] = line[at + np.uint64(way[s])]
@@ -100,7 +100,7 @@ def list_fragments(
                 share = np.float32(1) / np.float32(n)
                 triangle[count], samples[count] = own, n
                 across[count], down[count] = x + np.float32(total_right) * share, y + np.float32(total_below) * share
-                count += one
+                count += unit
         for column in range(end_pixel, width):
             pixels[row * width + column] = count
     pixels[height * width] = count
@@ -167,11 +167,11 @@ def find_texels(values: Array, count: int, size: tuple[int, int], texel: Array, 
 @kernel
 def fetch(texels: Array, width: int, texel: Array, count: int, corners: Array) -> None:
     """Write the four texels (4, N) around fragments."""
-    one, below = np.uint64(1), np.uint64(width)
+    unit, below = np.uint64(1), np.uint64(width)
     for i in range(count):
         at = np.uint64(texel[i])
-        corners[0, i], corners[1, i] = texels[at], texels[at + one]
-        corners[2, i], corners[3, i] = texels[at + below], texels[at + below + one]
+        corners[0, i], corners[1, i] = texels[at], texels[at + unit]
+        corners[2, i], corners[3, i] = texels[at + below], texels[at + below + unit]
 
 
 @vectorized_kernel
@@ -182,12 +182,12 @@ def add_texels(corners: Array, share: Array, count: int, coding: tuple[int, Any,
     them is not read.
     """
     bits, zero, step = coding
-    mask, one = (1 << bits) - 1, np.float32(1)
+    mask, unit = (1 << bits) - 1, np.float32(1)
     for i in range(count):
         x, y = share[0, i], share[1, i]
         w3 = x * y
         w1, w2 = x - w3, y - w3
-        w0 = one - x - w2
+        w0 = unit - x - w2
         a, b, c, d = corners[0, i], corners[1, i], corners[2, i], corners[3, i]
         red = w0 * np.float32(a & mask) + w1 * np.float32(b & mask)
         red += w2 * np.float32(c & mask) + w3 * np.float32(d & mask)
@@ -210,7 +210,7 @@ def compose(pixels: Array, samples: Array, n_samples: int, colour: Array, pictur
     """
     n_pixels, channels, line = len(pixels) - 1, picture.shape[2], flat_view(picture)
     part, half, zero, most = np.float32(1) / np.float32(n_samples), np.float32(0.5), np.float32(0), np.float32(255)
-    first, one, two, three = pixels[0], np.uint64(1), np.uint64(2), np.uint64(3)
+    first, unit, two, three = pixels[0], np.uint64(1), np.uint64(2), np.uint64(3)
     for pixel in range(n_pixels):
         end = pixels[pixel + 1]
         if first == end:
@@ -231,8 +231,8 @@ def compose(pixels: Array, samples: Array, n_samples: int, colour: Array, pictur
         elif seen < n_samples:
             rest = np.float32(1) - np.float32(seen) * part
             red += rest * np.float32(line[at])
-            green += rest * np.float32(line[at + one])
+            green += rest * np.float32(line[at + unit])
             blue += rest * np.float32(line[at + two])
         line[at] = np.uint8(np.int32(red + half))
-        line[at + one] = np.uint8(np.int32(green + half))
+        line[at + unit] = np.uint8(np.int32(green + half))
         line[at + two] = np.uint8(np.int32(blue + half))

@@ -44,14 +44,14 @@ def project(points: Array, source: Array, view: Array, lens: Array, table: Array
     `view` (3, 4) transforms world to camera space; `lens` is (focal length in samples, centre x, centre y, near plane).
     Samples have whole coordinates at their centres.
     """
-    half, one = np.float32(0.5), np.float32(1)
+    half, unit = np.float32(0.5), np.float32(1)
     for v in range(len(source)):
         p = source[v]
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         right = view[0, 0] * x + view[0, 1] * y + view[0, 2] * z + view[0, 3]
         down = view[1, 0] * x + view[1, 1] * y + view[1, 2] * z + view[1, 3]
         ahead = view[2, 0] * x + view[2, 1] * y + view[2, 2] * z + view[2, 3]
-        near = one / ahead if ahead >= lens[3] else np.float32(0)
+        near = unit / ahead if ahead >= lens[3] else np.float32(0)
         table[v, X] = lens[1] + lens[0] * right * near - half
         table[v, Y] = lens[2] + lens[0] * down * near - half
         table[v, NEAR] = near
@@ -199,10 +199,10 @@ def add_modes(base: Array, modes: Array, weights: Array, out: Array) -> None:
     last, zero = len(weights) - 1, np.float32(0)
     for c in range(0, last + 1, 2):  # two at once: the sums are read and written half as often
         d = min(c + 1, last)
-        one = weights[c] if abs(weights[c]) >= LEAST_WEIGHT else zero
-        other = weights[d] if (d > c) & (abs(weights[d]) >= LEAST_WEIGHT) else zero
+        first = weights[c] if abs(weights[c]) >= LEAST_WEIGHT else zero
+        second = weights[d] if (d > c) & (abs(weights[d]) >= LEAST_WEIGHT) else zero
         for i in range(len(base)):
-            out[i] += one * np.float32(modes[c, i]) + other * np.float32(modes[d, i])
+            out[i] += first * np.float32(modes[c, i]) + second * np.float32(modes[d, i])
 
 
 @vectorized_kernel

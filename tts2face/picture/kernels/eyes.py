@@ -57,10 +57,10 @@ class EyeGeometry:
             row[ACROSS : ACROSS + 3], row[UP : UP + 3] = turned[:, 0], turned[:, 1]
             row[SCALE], row[IRIS], row[HAS_LIDS] = scale, self.iris[number], self.lids[number, 0, 0] >= 0
             if row[HAS_LIDS]:
-                for begin, lid in zip((UPPER, LOWER), self.lids[number], strict=True):
+                for start, lid in zip((UPPER, LOWER), self.lids[number], strict=True):
                     margin = np.einsum("lcx,lc->lx", points[self.corners[lid]], self.weights[lid])
                     offset = (margin @ view[:, :3].T + view[:, 3] - centre) * scale
-                    row[begin : begin + 2 * N_LID] = (offset @ turned[:, :2]).ravel()
+                    row[start : start + 2 * N_LID] = (offset @ turned[:, :2]).ravel()
         return rows
 
 
@@ -86,13 +86,13 @@ def eye_geometry(face: Face, rig: FaceRig) -> EyeGeometry:
 
 
 @kernel
-def lid_height(eye: Array, begin: int, across: float) -> float:
+def lid_height(eye: Array, start: int, across: float) -> float:
     """Height of a lid's margin above the eye's centre at a place across the eye, mm."""
     for k in range(N_LID - 1):
-        x0, x1 = eye[begin + 2 * k], eye[begin + 2 * k + 2]
+        x0, x1 = eye[start + 2 * k], eye[start + 2 * k + 2]
         if across <= x1 or k == N_LID - 2:
             share = min(max((across - x0) / (x1 - x0), np.float32(0)), np.float32(1)) if x1 > x0 else np.float32(0)
-            return float(eye[begin + 2 * k + 1] + share * (eye[begin + 2 * k + 3] - eye[begin + 2 * k + 1]))
+            return float(eye[start + 2 * k + 1] + share * (eye[start + 2 * k + 3] - eye[start + 2 * k + 1]))
     return 0.0
 
 
@@ -121,7 +121,7 @@ def reflected_lamps(eye: Array, normal: tuple[float, float, float], view: tuple[
 @kernel
 def light_eye(eyes: Array, point: tuple[float, float, float], g: int, table: Array) -> None:
     """Change albedo, light and glow of fragment `g` at a point (3,) of an eyeball in camera space."""
-    one, zero = np.float32(1), np.float32(0)
+    unit, zero = np.float32(1), np.float32(0)
     best, nearest = 0, np.float32(1e30)
     for e in range(len(eyes)):
         dx, dy, dz = point[0] - eyes[e, 0], point[1] - eyes[e, 1], point[2] - eyes[e, 2]
@@ -133,19 +133,19 @@ def light_eye(eyes: Array, point: tuple[float, float, float], g: int, table: Arr
     nx, ny, nz = ox / length, oy / length, oz / length
     gx, gy, gz = eye[GAZE], eye[GAZE + 1], eye[GAZE + 2]
     ahead = nx * gx + ny * gy + nz * gz
-    bump = min(max((ahead - eye[IRIS] + np.float32(0.008)) * np.float32(20), zero), one) * np.float32(0.85)
+    bump = min(max((ahead - eye[IRIS] + np.float32(0.008)) * np.float32(20), zero), unit) * np.float32(0.85)
     cx, cy, cz = nx + bump * (nx - gx * ahead), ny + bump * (ny - gy * ahead), nz + bump * (nz - gz * ahead)
-    scale = one / np.sqrt(cx * cx + cy * cy + cz * cz + np.float32(1e-9))
-    far = -one / np.sqrt(point[0] * point[0] + point[1] * point[1] + point[2] * point[2] + np.float32(1e-9))
+    scale = unit / np.sqrt(cx * cx + cy * cy + cz * cz + np.float32(1e-9))
+    far = -unit / np.sqrt(point[0] * point[0] + point[1] * point[1] + point[2] * point[2] + np.float32(1e-9))
     view = (point[0] * far, point[1] * far, point[2] * far)
     glow = reflected_lamps(eye, (cx * scale, cy * scale, cz * scale), view)
     ring = (ahead - eye[IRIS] - np.float32(0.006)) * np.float32(80)
-    ring = one - np.float32(0.6) * np.exp(-ring * ring)
+    ring = unit - np.float32(0.6) * np.exp(-ring * ring)
     inside = ahead > eye[IRIS]
     towards = (nx - gx * ahead) * eye[KEY] + (ny - gy * ahead) * eye[KEY + 1]
-    focus = one + np.float32(1.6) * max(-towards, zero) + np.float32(0.15) if inside else one
-    corner = zero if inside else min(max((one - ahead) * np.float32(1.6), zero), one)
-    shade = one
+    focus = unit + np.float32(1.6) * max(-towards, zero) + np.float32(0.15) if inside else unit
+    corner = zero if inside else min(max((unit - ahead) * np.float32(1.6), zero), unit)
+    shade = unit
     if eye[HAS_LIDS] > zero:
         mm = eye[SCALE]
         across = (ox * eye[ACROSS] + oy * eye[ACROSS + 1] + oz * eye[ACROSS + 2]) * mm
@@ -159,8 +159,8 @@ def light_eye(eyes: Array, point: tuple[float, float, float], g: int, table: Arr
     table[AT_GLOW, g] = glow * shade
     for k in range(3):
         redness = np.float32(0.05) + np.float32(0.06) * np.float32(k)
-        white = one if inside else SCLERA
-        table[AT_ALBEDO + k, g] *= ring * focus * white * (one - corner * redness)
+        white = unit if inside else SCLERA
+        table[AT_ALBEDO + k, g] *= ring * focus * white * (unit - corner * redness)
         table[AT_DIFFUSE + k, g] *= shade
     for k in range(N_EXPOSURES):
         table[AT_EXPOSURE + k, g] *= shade

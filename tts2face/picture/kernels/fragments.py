@@ -3,7 +3,7 @@
 Lighting one fragment instead of its samples takes a third of the time of full supersampling.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,61 @@ BACK_LIGHT_SHARE = np.float32(0.3)  # share of the light that reaches the back o
 PIXEL_X, PIXEL_Y, PIXEL_ENDS = 0, 1, 2  # columns of the pixel table; from 2 on: begin, then the end of each layer
 
 
+class Band(NamedTuple):
+    """A band of rows of samples.
+
+    First row of samples, its number of rows, and samples along a pixel's side; visible triangles of the samples
+    (3, R, W), as `tts2face.picture.kernels.raster.draw_band` writes them; the share of light that passes strands before
+    each sample, and the strands' colour, (R / side, W / side, side * side) and (R / side, W / side, 3), of size 0
+    without strands.
+    """
+
+    first_row: int
+    n_rows: int
+    side: int
+    owner: Array
+    through: Array
+    strand_colour: Array
+
+
+class Facets(NamedTuple):
+    """Normals of the triangles (F, 3) and part of each (F,)."""
+
+    normals: Array
+    part_of: Array
+
+
+class Fragments(NamedTuple):
+    """Fragments of a band.
+
+    First triangle of each (G,), sums over its samples of column, row and 1 (G, 3), its attributes (N_ROWS, G) by the
+    rows of `tts2face.picture.kernels.tables`, its light (3, G); and the pixels that are not empty (P, 6): x, y, first
+    fragment, end of the fragments of each layer.
+    """
+
+    number_of: Array
+    spread: Array
+    table: Array
+    colour: Array
+    pixels: Array
+
+
+class Materials(NamedTuple):
+    """Constants of fragments.
+
+    Triangles (F, 3), part of each (F,), materials (P, 9), texels and levels of `tts2face.picture.textures`, linear
+    light of 8 bits (256,), and eyes (E, N_EYE_COLUMNS) of `tts2face.picture.kernels.eyes`.
+    """
+
+    triangles: Array
+    part_of: Array
+    materials: Array
+    texels: Array
+    levels: Array
+    linear: Array
+    eyes: Array
+
+
 @kernel
 def face_normals(vertex: Array, triangles: Array, normals: Array) -> None:
     """Write normals (F, 3) of triangles in camera space, each of a length of twice the triangle's area."""
@@ -63,11 +118,12 @@ def vertex_normals(flat: Array, starts: Array, members: Array, vertex: Array) ->
 
 
 @kernel
-def is_same_surface(number: int, other: int, flat: Array, part_of: Array) -> bool:
+def is_same_surface(number: int, other: int, facets: Facets) -> bool:
     """Whether two visible triangles lie on one smooth surface: same part, same side, similar normals."""
     if (number < 0) != (other < 0):
         return number == other
     t, u = (number, other) if number >= 0 else (~number, ~other)
+    flat, part_of = facets.normals, facets.part_of
     cosine = flat[t, 0] * flat[u, 0] + flat[t, 1] * flat[u, 1] + flat[t, 2] * flat[u, 2]
     squared = flat[t, 0] ** 2 + flat[t, 1] ** 2 + flat[t, 2] ** 2
     squared *= flat[u, 0] ** 2 + flat[u, 1] ** 2 + flat[u, 2] ** 2
@@ -78,64 +134,42 @@ def is_same_surface(number: int, other: int, flat: Array, part_of: Array) -> boo
 
 
 @kernel
-def find_fragments(
-    owners: tuple[Any, Any, Any, Any],
-    n_layers: int,
-    place: tuple[int, int, int],
-    facets: tuple[Any, Any],
-    found: Any,
-    pixels: Array,
-) -> int:
-    """Find the fragments of each pixel of a band; returns the number of pixels that are not empty.
-
-    Parameters
-    ----------
-    owners
-        Visible triangles of the samples (3, R, W) and at the centres of pixels (3, R / side + 2, W / side), as
-        `draw_band` writes them, the marks of `find_edges` (samples are valid in marked pixels only), and the share of
-        light that passes strands before each sample (R / side, W / side, side * side), of size 0 without strands.
-    place
-        The band's first row of samples, its number of rows, samples along a pixel's side.
-    facets
-        Normals of the triangles (F, 3) and part of each (F,).
-    found
-        Out, for each fragment: its first triangle (G,); sums over its samples of column, row and 1 (G, 3).
-    pixels : (P, 6)
-        Out: x, y, first fragment, end of the fragments of each layer.
-    """
-    first_row, n_rows, side = place
-    owner, centres, edges, through = owners
-    number_of, spread = found
-    flat, part_of = facets
+def find_fragments(band: Band, n_layers: int, facets: Facets, fragments: Fragments) -> int:
+    """Write triangles, samples and pixels of the fragments of a band; returns the number of pixels."""
+    side, owner, through = band.side, band.owner, band.through
+    number_of, spread, pixels = fragments.number_of, fragments.spread, fragments.pixels
     n_fragments = n_pixels = 0
-    one, n_samples = np.float32(1), side * side
-    for r in range(n_rows // side):
-        for x in range(edges.shape[1]):
-            begin = n_fragments
-            seen = one
+    unit, n_samples, middle = np.float32(1), side * side, 0.5 * (side - 1)
+    for r in range(band.n_rows // side):
+        for x in range(owner.shape[2] // side):
+            start = n_fragments
+            seen = unit
             if through.size > 0:
                 seen = np.float32(0)
                 for s in range(n_samples):
                     seen = max(seen, through[r, x, s])
             if seen < HIDDEN_SHARE:
                 for layer in range(4):
-                    pixels[n_pixels, PIXEL_ENDS + layer] = begin
-                pixels[n_pixels, PIXEL_X], pixels[n_pixels, PIXEL_Y] = x, r + first_row // side
+                    pixels[n_pixels, PIXEL_ENDS + layer] = start
+                pixels[n_pixels, PIXEL_X], pixels[n_pixels, PIXEL_Y] = x, r + band.first_row // side
                 n_pixels += 1
                 continue
             for layer in range(n_layers):
                 first = n_fragments
                 pixels[n_pixels, PIXEL_ENDS + layer] = first
-                if edges[r, x] == 0:
-                    number = centres[layer, r + 1, x]
+                last, g = NO_TRIANGLE, first
+                number, is_one = owner[layer, r * side, x * side], True
+                for row in range(r * side, r * side + side):
+                    for column in range(x * side, x * side + side):
+                        is_one &= owner[layer, row, column] == number
+                if is_one:  # as the loops, written out
                     if number != NO_TRIANGLE:
                         number_of[n_fragments] = number
-                        spread[n_fragments, 0] = (x * side + 0.5 * (side - 1)) * n_samples
-                        spread[n_fragments, 1] = (r * side + first_row + 0.5 * (side - 1)) * n_samples
+                        spread[n_fragments, 0] = n_samples * (x * side + middle)
+                        spread[n_fragments, 1] = n_samples * (r * side + band.first_row + middle)
                         spread[n_fragments, 2] = n_samples
                         n_fragments += 1
                     continue
-                last, g = NO_TRIANGLE, first
                 for row in range(r * side, r * side + side):
                     for column in range(x * side, x * side + side):
                         number = owner[layer, row, column]
@@ -143,38 +177,32 @@ def find_fragments(
                             continue
                         if number != last:
                             last, g = number, first
-                            while g < n_fragments and not is_same_surface(number, number_of[g], flat, part_of):
+                            while g < n_fragments and not is_same_surface(number, number_of[g], facets):
                                 g += 1
                         if g == n_fragments:
                             n_fragments += 1
                             number_of[g] = number
                             spread[g, 0] = spread[g, 1] = spread[g, 2] = np.float32(0)
                         spread[g, 0] += np.float32(column)
-                        spread[g, 1] += np.float32(row + first_row)
-                        spread[g, 2] += one
-            if n_fragments > begin or seen < one:
+                        spread[g, 1] += np.float32(row + band.first_row)
+                        spread[g, 2] += unit
+            if n_fragments > start or seen < unit:
                 for layer in range(n_layers, 4):
                     pixels[n_pixels, PIXEL_ENDS + layer] = n_fragments
-                pixels[n_pixels, PIXEL_X], pixels[n_pixels, PIXEL_Y] = x, r + first_row // side
+                pixels[n_pixels, PIXEL_X], pixels[n_pixels, PIXEL_Y] = x, r + band.first_row // side
                 n_pixels += 1
     return n_pixels
 
 
 @kernel
-def evaluate_fragments(found: Any, n_fragments: int, vertex: Array, scene: Any, lens: Array, table: Array) -> None:
-    """Interpolate vertex attributes at the centre of each fragment's samples (Moeller and Trumbore 1997).
-
-    Parameters
-    ----------
-    scene
-        Triangles (F, 3), part of each (F,), materials (P, 9), textures, linear table (256,), samples along a pixel's
-        side, eyes (E, 12) as `tts2face.picture.kernels.eyes` names their columns.
-    table : (N_ROWS, G)
-        Out: the attributes in the rows named at the top of this module.
-    """
-    number_of, spread = found
-    triangles, part_of, materials, (texels, levels), linear, side, eyes = scene
-    one, zero = np.float32(1), np.float32(0)
+def evaluate_fragments(
+    fragments: Fragments, n_fragments: int, vertex: Array, scene: Materials, lens: Array, side: int
+) -> None:
+    """Write attributes of fragments, interpolated at the centre of their samples (Moeller and Trumbore 1997)."""
+    number_of, spread, table = fragments.number_of, fragments.spread, fragments.table
+    triangles, part_of, materials, eyes = scene.triangles, scene.part_of, scene.materials, scene.eyes
+    texels, levels, linear = scene.texels, scene.levels, scene.linear
+    unit, zero = np.float32(1), np.float32(0)
     focal, middle_x, middle_y = np.float32(1 / lens[0]), np.float32(lens[1] - 0.5), np.float32(lens[2] - 0.5)
     pixel = np.float32((side / lens[0]) ** 2)
     sx = sy = sz = e1x = e1y = e1z = e2x = e2y = e2z = rx = ry = rz = zero
@@ -197,14 +225,14 @@ def evaluate_fragments(found: Any, n_fragments: int, vertex: Array, scene: Any, 
                 u1, v1, u2, v2 = vertex[b, UV] - ua, vertex[b, UV + 1] - va, vertex[c, UV] - ua, vertex[c, UV + 1] - va
                 texel_area = abs(u1 * v2 - u2 * v1)
                 texel_area *= np.float32(levels[texture, 0, 1]) * np.float32(levels[texture, 0, 2])
-        share = one / spread[g, 2]
+        share = unit / spread[g, 2]
         dx, dy = (spread[g, 0] * share - middle_x) * focal, (spread[g, 1] * share - middle_y) * focal
         qx, qy, qz = dy * e2z - e2y, e2x - dx * e2z, dx * e2y - dy * e2x
         determinant = e1x * qx + e1y * qy + e1z * qz
-        inverse = one / determinant if determinant != zero else zero
-        wb = min(max((sx * qx + sy * qy + sz * qz) * inverse, zero), one)
-        wc = min(max((dx * rx + dy * ry + rz) * inverse, zero), one - wb)
-        wa = one - wb - wc
+        inverse = unit / determinant if determinant != zero else zero
+        wb = min(max((sx * qx + sy * qy + sz * qz) * inverse, zero), unit)
+        wc = min(max((dx * rx + dy * ry + rz) * inverse, zero), unit - wb)
+        wa = unit - wb - wc
         for k in range(3):
             n, d = NORMAL + k, DIFFUSE + k
             table[AT_NORMAL + k, g] = wa * vertex[a, n] + wb * vertex[b, n] + wc * vertex[c, n]

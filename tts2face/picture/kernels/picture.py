@@ -1,7 +1,4 @@
-"""Drawing of one picture: the rasterisation and shading kernels, band by band.
-
-Sorting of projected triangles into bands of rows.
-"""
+"""Drawing of one picture by the rasterisation and shading kernels, band by band."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,109 +6,64 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.numeric.kernels import kernel
 from tts2face.picture.camera import CameraMatrices
-from tts2face.picture.kernels.edges import draw_cutouts, find_edges, mark_thin, mark_tiles
+from tts2face.picture.kernels.cutouts import Textures, draw_cutouts
 from tts2face.picture.kernels.fragments import (
     PIXEL_ENDS,
+    Band,
+    Facets,
+    Fragments,
+    Materials,
     evaluate_fragments,
     face_normals,
     find_fragments,
     vertex_normals,
 )
 from tts2face.picture.kernels.raster import (
-    GRID_SHIFT,
     HOLES,
-    LATER,
     N_LAYERS,
     N_PHASES,
-    NOT_DRAWN,
-    TILE_SAMPLES,
     TRANSLUCENT,
+    Batch,
+    Geometry,
     draw_band,
     gather_triangles,
+    sort_into_bands,
     transform_to_camera,
 )
 from tts2face.picture.kernels.resolve import compose_band
 from tts2face.picture.kernels.shade import N_SCRATCH_ROWS, light_vertices, scatter_light, shade_fragments
-from tts2face.picture.kernels.strands import (
+from tts2face.picture.kernels.strand_light import (
     AT_NEAR,
     AT_U,
     AT_X,
     AT_Y,
-    FRAGMENTS_AT_ONCE,
     N_FRAGMENT_ROWS,
     N_STRAND_COLUMNS,
-    draw_strands,
+    Cards,
+    StrandFragments,
     light_strands,
 )
+from tts2face.picture.kernels.strands import FRAGMENTS_AT_ONCE, Covered, StrandScene, draw_strands
 from tts2face.picture.kernels.tables import COLOUR, N_ROWS, N_VERTEX_COLUMNS, TONE_TABLES, UV
 from tts2face.picture.surface import Strands, Surface
 
 Array = NDArray[Any]
 
 
-@kernel
-def sort_into_bands(batch: Any, count: int, rows: tuple[int, int], starts: Array, members: Array) -> None:
-    """Sort triangles stably by the bands of rows that they overlap, and by phase within a band (counting sort).
-
-    Phase p of band b is ``members[starts[4 * b + p]:starts[4 * b + p + 1]]``. With `members` too short, only `starts`
-    is written.
-
-    Parameters
-    ----------
-    batch
-        Boxes and source of `gather_triangles`, and the phase of the front and the back of each triangle (F, 2).
-    rows
-        Rows of a band, and the rows beyond it that it draws as well, on either side.
-    """
-    boxes, source, phase = batch
-    n_bands = (len(starts) - 1) // N_PHASES
-    band_rows, beyond = rows
-    for bucket in range(len(starts)):
-        starts[bucket] = 0
-    for turn in range(2):
-        for i in range(count):
-            own = phase[source[i], 0] if source[i] >= 0 else phase[~source[i], 1]
-            if own == NOT_DRAWN:
-                continue
-            low: Any = (np.int64(boxes[i, 2]) >> GRID_SHIFT) - beyond
-            high: Any = (np.int64(boxes[i, 3]) >> GRID_SHIFT) + beyond
-            for band in range(max(low // band_rows, 0), min(high // band_rows, n_bands - 1) + 1):
-                bucket = band * N_PHASES + own
-                if turn == 0:
-                    starts[bucket + 1] += 1
-                else:
-                    members[starts[bucket]] = i
-                    starts[bucket] += 1
-        if turn == 0:
-            for bucket in range(len(starts) - 1):
-                starts[bucket + 1] += starts[bucket]
-            if starts[-1] > len(members):
-                return
-    for bucket in range(len(starts) - 1, 0, -1):
-        starts[bucket] = starts[bucket - 1]
-    starts[0] = 0
-
-
 BAND_SAMPLES = 65_536  # per band of rows; the time is the same from 16,384 to 262,144
 ROW_PADDING = 80  # extra entries per table row, so that rows do not all start in one cache set
-EDGE_STEP_MM = 0.8  # bend of a surface in depth, over two pixels, beyond which a pixel needs its samples
-EVERY_TILE = np.zeros((0, 0), np.uint8)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawingBuffers:
     """Buffers for drawing one picture at a time; `tts2face.picture.kernels.raster` and `fragments` describe the arrays.
 
-    ``side`` is the number of samples along a pixel's side; with ``samples_all`` every pixel has them, else those at
-    edges; ``vertex`` is initialised with colours and uv, ``strands``
-    with uv. ``near`` and ``centre`` are depth and owner at the centres of pixels, with a row of pixels above and below
-    the band. ``through`` and ``strand_colour`` are of size 0 for a face without strands.
+    ``side`` is the number of samples along a pixel's side; ``vertex`` is initialised with colours and uv, ``strands``
+    with uv. ``through`` and ``strand_colour`` are of size 0 for a face without strands.
     """
 
     side: int
-    samples_all: bool
     vertex: NDArray[np.float32]
     grid: NDArray[np.int32]
     flat: NDArray[np.float32]
@@ -122,19 +74,12 @@ class DrawingBuffers:
     band_starts: NDArray[np.int64]
     depth: NDArray[np.float32]
     owner: NDArray[np.int32]
-    near: NDArray[np.float32]
-    centre: NDArray[np.int32]
-    edges: NDArray[np.uint8]
-    tiles: NDArray[np.uint8]
-    found: tuple[NDArray[np.int32], NDArray[np.float32]]
-    fragments: NDArray[np.float32]
+    fragments: Fragments
     scratch: NDArray[np.float32]
-    colour: NDArray[np.float32]
-    pixels: NDArray[np.int32]
     strands: NDArray[np.float32]
     through: NDArray[np.float32]
     strand_colour: NDArray[np.float32]
-    strand_fragments: tuple[NDArray[np.int32], NDArray[np.float32]]
+    strand_fragments: StrandFragments
 
     @property
     def band_rows(self) -> int:
@@ -157,10 +102,8 @@ class Pose:
     turn: NDArray[np.float32]
 
 
-def allocate_buffers(
-    surface: Surface, size: tuple[int, int], side: int, *, samples_all: bool = False
-) -> DrawingBuffers:
-    """Buffers for a surface and pictures of `size` (width, height) px, with side x side samples at edges, or in all."""
+def allocate_buffers(surface: Surface, size: tuple[int, int], side: int) -> DrawingBuffers:
+    """Buffers for a surface and pictures of `size` (width, height) px, with side x side samples a pixel."""
     n_vertices, n_triangles = len(surface.rig.rest), len(surface.triangles)
     width, height = size[0] * side, size[1] * side
     rows = side * max(1, BAND_SAMPLES // (width * side))
@@ -174,7 +117,6 @@ def allocate_buffers(
     covered = pixels if len(strands) else (0, 0)
     return DrawingBuffers(
         side=side,
-        samples_all=samples_all or side == 1,
         vertex=vertex,
         grid=np.zeros((n_vertices, 2), np.int32),
         flat=np.zeros((n_triangles, 3), np.float32),
@@ -185,21 +127,20 @@ def allocate_buffers(
         band_starts=np.zeros(-(-height // rows) * N_PHASES + 1, np.int64),
         depth=np.zeros((N_LAYERS, rows, width), np.float32),
         owner=np.zeros((N_LAYERS, rows, width), np.int32),
-        near=np.zeros((N_LAYERS, pixels[0] + 2, pixels[1]), np.float32),
-        centre=np.zeros((N_LAYERS, pixels[0] + 2, pixels[1]), np.int32),
-        edges=np.zeros(pixels, np.uint8),
-        tiles=np.zeros((-(-rows // TILE_SAMPLES), -(-width // TILE_SAMPLES)), np.uint8),
-        found=(np.zeros(max_fragments, np.int32), np.zeros((max_fragments, 3), np.float32)),
-        fragments=np.zeros((N_ROWS, max_fragments), np.float32),
+        fragments=Fragments(
+            number_of=np.zeros(max_fragments, np.int32),
+            spread=np.zeros((max_fragments, 3), np.float32),
+            table=np.zeros((N_ROWS, max_fragments), np.float32),
+            colour=np.zeros((3, max_fragments), np.float32),
+            pixels=np.zeros((pixels[0] * pixels[1], PIXEL_ENDS + N_LAYERS + 1), np.int32),
+        ),
         scratch=np.zeros((N_SCRATCH_ROWS, max_fragments), np.float32),
-        colour=np.zeros((3, max_fragments), np.float32),
-        pixels=np.zeros((pixels[0] * pixels[1], PIXEL_ENDS + N_LAYERS + 1), np.int32),
         strands=strands,
         through=np.zeros((*covered, side * side), np.float32),
         strand_colour=np.zeros((*covered, 3), np.float32),
-        strand_fragments=(
-            np.zeros((3, FRAGMENTS_AT_ONCE), np.int32),
-            np.zeros((N_FRAGMENT_ROWS, FRAGMENTS_AT_ONCE), np.float32),
+        strand_fragments=StrandFragments(
+            which=np.zeros((3, FRAGMENTS_AT_ONCE), np.int32),
+            rows=np.zeros((N_FRAGMENT_ROWS, FRAGMENTS_AT_ONCE), np.float32),
         ),
     )
 
@@ -208,29 +149,33 @@ def draw_surface(
     pose: Pose, surface: Surface, optics: CameraMatrices, buffers: DrawingBuffers, picture: NDArray[np.uint8]
 ) -> None:
     """Draw a surface over the background in `picture` (H, W, 3 or 4), sRGB, in place."""
-    lens, side = optics.lens, buffers.side
+    lens, side, fragments = optics.lens, buffers.side, buffers.fragments
     height, width = picture.shape[0] * side, picture.shape[1] * side
-    batch = project_surface(pose.points, surface, (optics.view, lens), buffers, (width, height))
+    members = project_surface(pose.points, surface, (optics.view, lens), buffers, (width, height))
     light_surface(pose, surface, lens, buffers)
     cards = arrange_cards(surface.strands, buffers.strands)
-    facets = (buffers.flat, surface.part_of)
-    textures = (surface.texels, surface.levels)
-    scene = (surface.triangles, surface.part_of, surface.materials, textures, TONE_TABLES[0], side, pose.eyes)
-    for band in range(len(buffers.band_starts) // N_PHASES):
-        place = (band * buffers.band_rows, min(buffers.band_rows, height - band * buffers.band_rows), side)
-        layers = draw_samples(surface, lens, batch, place[0], buffers)
-        blend_strands(surface, cards, place[0], pose.lights, buffers)
-        samples = (buffers.owner, buffers.centre, buffers.edges)
-        owners = (*samples, buffers.through)
-        n_pixels = find_fragments(owners, layers, place, facets, buffers.found, buffers.pixels)
+    facets = Facets(buffers.flat, surface.part_of)
+    scene = Materials(
+        triangles=surface.triangles,
+        part_of=surface.part_of,
+        materials=surface.materials,
+        texels=surface.texels,
+        levels=surface.levels,
+        linear=TONE_TABLES[0],
+        eyes=pose.eyes,
+    )
+    for first_row in range(0, height, buffers.band_rows):
+        layers = draw_samples(surface, lens, members, first_row, buffers)
+        blend_strands(surface, cards, first_row, pose.lights, buffers)
+        n_rows = min(buffers.band_rows, height - first_row)
+        band = Band(first_row, n_rows, side, buffers.owner, buffers.through, buffers.strand_colour)
+        n_pixels = find_fragments(band, layers, facets, fragments)
         if n_pixels == 0:
             continue
-        n_fragments = int(buffers.pixels[n_pixels - 1, PIXEL_ENDS + N_LAYERS])
-        evaluate_fragments(buffers.found, n_fragments, buffers.vertex, scene, lens, buffers.fragments)
-        shade_fragments(buffers.fragments, n_fragments, pose.lights, buffers.scratch, buffers.colour)
-        shading = (buffers.fragments, buffers.colour, buffers.through, buffers.strand_colour)
-        which = (buffers.found[0], *facets)
-        compose_band(samples, place, (buffers.pixels, n_pixels), which, shading, (picture, TONE_TABLES))
+        n_fragments = int(fragments.pixels[n_pixels - 1, PIXEL_ENDS + N_LAYERS])
+        evaluate_fragments(fragments, n_fragments, buffers.vertex, scene, lens, side)
+        shade_fragments(fragments.table, n_fragments, pose.lights, buffers.scratch, fragments.colour)
+        compose_band(band, facets, fragments, n_pixels, picture, TONE_TABLES)
 
 
 def light_surface(pose: Pose, surface: Surface, lens: NDArray[np.float64], buffers: DrawingBuffers) -> None:
@@ -251,39 +196,19 @@ def light_surface(pose: Pose, surface: Surface, lens: NDArray[np.float64], buffe
 def draw_samples(
     surface: Surface, lens: NDArray[np.float64], members: NDArray[np.int32], first_row: int, buffers: DrawingBuffers
 ) -> int:
-    """Draw the band of the projected triangles `members` that begins at a row; the number of valid layers.
+    """Write ``depth`` and ``owner`` of the band of the projected triangles `members` that begins at a row.
 
-    Writes ``near`` and ``centre`` at the centres of pixels, ``edges`` where a pixel needs more samples, and ``depth``
-    and ``owner`` there. With one sample for each pixel all pixels need it.
+    Returns the number of valid layers.
     """
-    side = buffers.side
     phases = first_row // buffers.band_rows * N_PHASES
     bounds = buffers.band_starts[phases : phases + N_PHASES + 1]
-    geometry = (buffers.vertex, surface.triangles, lens)
-    batch = (buffers.corners, buffers.boxes, buffers.source, members, bounds)
-    has_holes = bounds[HOLES] < bounds[HOLES + 1]
+    geometry = Geometry(buffers.vertex, surface.triangles, lens)
+    batch = Batch(buffers.corners, buffers.boxes, buffers.source, members, bounds)
     layers = N_LAYERS if bounds[TRANSLUCENT] < bounds[TRANSLUCENT + 1] else 1
-    wanted = EVERY_TILE
-    buffers.edges[:] = 1
-    if not buffers.samples_all and not has_holes:
-        draw_band(geometry, batch, (first_row // side - 1, side), EVERY_TILE, buffers.near, buffers.centre)
-        buffers.edges[:] = 0
-        find_edges((buffers.near, buffers.centre), layers, surface.part_of, EDGE_STEP_MM, buffers.edges)
-        later = members[bounds[LATER] : bounds[LATER + 1]]
-        mark_thin(buffers.boxes, buffers.source, later, surface.thin, (first_row, side), buffers.edges)
-        mark_tiles(buffers.edges, side, buffers.tiles)
-        wanted = buffers.tiles
-    draw_band(geometry, batch, (first_row, 1), wanted, buffers.depth, buffers.owner)
-    if has_holes:
-        textures = (surface.texels, surface.levels, surface.texture_of)
-        draw_cutouts(
-            geometry,
-            textures,
-            (buffers.corners, buffers.source, members[bounds[HOLES] : bounds[HOLES + 1]]),
-            (first_row, side, layers),
-            buffers.depth,
-            buffers.owner,
-        )
+    draw_band(geometry, batch, first_row, buffers.depth, buffers.owner)
+    if bounds[HOLES] < bounds[HOLES + 1]:
+        textures = Textures(surface.texels, surface.levels, surface.texture_of)
+        draw_cutouts(geometry, textures, batch, (first_row, buffers.side, layers), buffers.depth, buffers.owner)
     return layers
 
 
@@ -309,12 +234,11 @@ def blend_strands(
     cards = surface.strands
     buffers.through[:], buffers.strand_colour[:] = 1, 0
     draw_strands(
-        (buffers.strands, cards.triangles, ends, cards.texture, cards.gloss, cards.mean_light),
+        Cards(buffers.strands, cards.triangles, ends, cards.texture, cards.gloss, cards.mean_light),
         order,
-        (surface.texels, surface.levels, TONE_TABLES[0], lights),
-        (first_row, buffers.side, buffers.depth[0], buffers.near[0], buffers.edges),
+        StrandScene(surface.texels, surface.levels, TONE_TABLES[0], lights),
+        Covered(first_row, buffers.side, buffers.depth[0], buffers.through, buffers.strand_colour),
         buffers.strand_fragments,
-        (buffers.through, buffers.strand_colour),
     )
 
 
@@ -333,11 +257,10 @@ def project_surface(
     transform_to_camera(points, view, lens, buffers.vertex, buffers.grid)
     found = (buffers.corners, buffers.boxes, buffers.source)
     count = gather_triangles(buffers.vertex, buffers.grid, surface.triangles, (lens, size), found)
-    rows = (buffers.band_rows, buffers.side)
     members = np.zeros(2 * len(surface.triangles), np.int32)
     triangles = (buffers.boxes, buffers.source, surface.phase)
-    sort_into_bands(triangles, count, rows, buffers.band_starts, members)
+    sort_into_bands(triangles, count, buffers.band_rows, buffers.band_starts, members)
     if buffers.band_starts[-1] > len(members):
         members = np.zeros(buffers.band_starts[-1], np.int32)
-        sort_into_bands(triangles, count, rows, buffers.band_starts, members)
+        sort_into_bands(triangles, count, buffers.band_rows, buffers.band_starts, members)
     return members

@@ -7,7 +7,7 @@ thread; each picture is drawn by one thread, so its bytes do not depend on the n
 y down, z ahead, mm. Sources: Pineda 1988 (edge functions), Olano and Greer 1997 (planes of the uncut triangle).
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,24 @@ N_LAYERS = 3  # the opaque surface and the two nearest translucent ones before i
 # Phases of drawing: the largest opaque part, what it may hide, translucent parts, parts with holes; strands in none.
 FIRST, LATER, TRANSLUCENT, HOLES, NOT_DRAWN = range(5)
 N_PHASES = 4
+
+
+class Geometry(NamedTuple):
+    """Camera coordinates (V, 3 or more) of vertices, triangles (F, 3) and the lens (4,)."""
+
+    vertex: Array
+    triangles: Array
+    lens: Array
+
+
+class Batch(NamedTuple):
+    """Corners, boxes and source of `gather_triangles`, their rows by bands and phases, bounds of a band's phases."""
+
+    corners: Array
+    boxes: Array
+    source: Array
+    members: Array
+    bounds: Array
 
 
 @kernel
@@ -127,6 +145,48 @@ def gather_triangles(
     return count
 
 
+@kernel
+def sort_into_bands(
+    batch: tuple[Array, Array, Array], count: int, band_rows: int, starts: Array, members: Array
+) -> None:
+    """Sort triangles stably by the bands of rows that they overlap, and by phase within a band (counting sort).
+
+    Phase p of band b is ``members[starts[4 * b + p]:starts[4 * b + p + 1]]``. With `members` too short, only `starts`
+    is written.
+
+    Parameters
+    ----------
+    batch
+        Boxes and source of `gather_triangles`, and the phase of the front and the back of each triangle (F, 2).
+    """
+    boxes, source, phase = batch
+    n_bands = (len(starts) - 1) // N_PHASES
+    for bucket in range(len(starts)):
+        starts[bucket] = 0
+    for turn in range(2):
+        for i in range(count):
+            own = phase[source[i], 0] if source[i] >= 0 else phase[~source[i], 1]
+            if own == NOT_DRAWN:
+                continue
+            low: Any = np.int64(boxes[i, 2]) >> GRID_SHIFT
+            high: Any = np.int64(boxes[i, 3]) >> GRID_SHIFT
+            for band in range(max(low // band_rows, 0), min(high // band_rows, n_bands - 1) + 1):
+                bucket = band * N_PHASES + own
+                if turn == 0:
+                    starts[bucket + 1] += 1
+                else:
+                    members[starts[bucket]] = i
+                    starts[bucket] += 1
+        if turn == 0:
+            for bucket in range(len(starts) - 1):
+                starts[bucket + 1] += starts[bucket]
+            if starts[-1] > len(members):
+                return
+    for bucket in range(len(starts) - 1, 0, -1):
+        starts[bucket] = starts[bucket - 1]
+    starts[0] = 0
+
+
 @inlined_kernel
 def edge_function(ax: int, ay: int, bx: int, by: int, px: int, py: int) -> int:
     """Edge function of a directed edge at a point, lowered by one where the edge does not own its samples."""
@@ -153,15 +213,14 @@ def depth_plane(camera: Array, triangles: Array, t: int, lens: Array) -> tuple[f
 
 
 @kernel
-def tile_depths(depth: Array, wanted: Array, tiles: Array) -> None:
-    """Write for each tile of samples its least 1/z: 0 where one is empty, infinite where the tile is not wanted."""
+def tile_depths(depth: Array, tiles: Array) -> None:
+    """Write for each tile of samples its least 1/z: 0 where one is empty."""
     for r in range(tiles.shape[0]):
         for x in range(tiles.shape[1]):
             least = np.float32(np.inf)
-            if wanted.size == 0 or wanted[r, x]:
-                for row in range(r * TILE_SAMPLES, min((r + 1) * TILE_SAMPLES, depth.shape[0])):
-                    for column in range(x * TILE_SAMPLES, min((x + 1) * TILE_SAMPLES, depth.shape[1])):
-                        least = min(least, depth[row, column])
+            for row in range(r * TILE_SAMPLES, min((r + 1) * TILE_SAMPLES, depth.shape[0])):
+                for column in range(x * TILE_SAMPLES, min((x + 1) * TILE_SAMPLES, depth.shape[1])):
+                    least = min(least, depth[row, column])
             tiles[r, x] = least
 
 
@@ -173,79 +232,45 @@ def clear_layer(depth: Array, owner: Array, layer: int) -> None:
             depth[layer, r, x], owner[layer, r, x] = np.float32(0), NO_TRIANGLE
 
 
-@kernel
-def clear_tiles(depth: Array, owner: Array, wanted: Array) -> None:
-    """Clear the opaque surface in the wanted tiles of a band; the other samples are not read."""
-    for r in range(depth.shape[1]):
-        for tile in range(wanted.shape[1]):
-            if wanted[r // TILE_SAMPLES, tile]:
-                for x in range(tile * TILE_SAMPLES, min((tile + 1) * TILE_SAMPLES, depth.shape[2])):
-                    depth[0, r, x], owner[0, r, x] = np.float32(0), NO_TRIANGLE
-
-
 @inlined_kernel
-def samples_below(value: int, side: int) -> int:
-    """Number of samples, `side` samples of the grid apart, whose centres lie below a grid coordinate."""
-    raised = value + ((side << GRID_SHIFT) >> 1) - 1
-    if side == 3:
-        return raised // (side << GRID_SHIFT)
-    return raised >> (GRID_SHIFT + side - 1)
+def samples_below(value: int) -> int:
+    """Number of samples whose centres lie below a grid coordinate."""
+    return (value + HALF_GRID - 1) >> GRID_SHIFT
 
 
 @kernel
-def draw_band(geometry: Any, batch: Any, place: tuple[int, int], wanted: Array, depth: Array, owner: Array) -> None:
-    """Clear a band of rows and draw its triangles, translucent ones last.
+def draw_band(geometry: Geometry, batch: Batch, first_row: int, depth: Array, owner: Array) -> None:
+    """Clear a band of rows and draw its triangles without holes, translucent ones last.
 
-    Parameters
-    ----------
-    geometry
-        Camera coordinates (V, 3 or more), triangles (F, 3), lens.
-    batch
-        Corners, boxes and source of `gather_triangles`, their rows by bands and phases, and the bounds of the band's
-        phases (4 or more).
-    place
-        The band's first row of samples, and their distance in samples of the lens: 1, or the side of a pixel.
-    wanted : (R / 4, W / 4)
-        Whether each tile of samples is drawn; of size 0 for all. The samples of the others are undefined.
-    depth, owner : (3, R, W)
-        Out: 1/z and triangle index of the opaque surface and of the two nearest translucent ones in front of it.
+    `depth` and `owner` (3, R, W) become 1/z and triangle index of the opaque surface and of the two nearest translucent
+    ones in front of it.
     """
-    camera, triangles, lens = geometry
-    corners, boxes, source, members, bounds = batch
+    corners, boxes, bounds = batch.corners, batch.boxes, batch.bounds
     nearest_of = boxes.view(np.float32)
-    first_row, side = place
-    step, half = side << GRID_SHIFT, (side << GRID_SHIFT) >> 1
     n_rows, width = depth.shape[1], depth.shape[2]
     tiles = np.zeros(
         ((n_rows + TILE_SAMPLES - 1) // TILE_SAMPLES, (width + TILE_SAMPLES - 1) // TILE_SAMPLES), np.float32
     )
-    is_partial = wanted.size > 0
-    if is_partial:
-        clear_tiles(depth, owner, wanted)
-        for r in range(tiles.shape[0]):
-            for x in range(tiles.shape[1]):
-                tiles[r, x] = np.float32(0) if wanted[r, x] else np.float32(np.inf)
-    else:
-        clear_layer(depth, owner, 0)
+    clear_layer(depth, owner, 0)
     for turn in range(TRANSLUCENT + 1):
         if bounds[turn] == bounds[turn + 1]:
             continue
         if turn == LATER:
-            tile_depths(depth[0], wanted, tiles)
+            tile_depths(depth[0], tiles)
         if turn == TRANSLUCENT:
             clear_layer(depth, owner, 1)
             clear_layer(depth, owner, 2)
         for m in range(bounds[turn], bounds[turn + 1]):
-            i = members[m]
-            number = source[i]
+            i = batch.members[m]
+            number = batch.source[i]
             t = number if number >= 0 else ~number
-            left = max(samples_below(np.int64(boxes[i, 0]), side), 0)
-            right = min(samples_below(np.int64(boxes[i, 1]) + 1, side), width) - 1
-            top = max(samples_below(np.int64(boxes[i, 2]), side), first_row) - first_row
-            bottom = min(samples_below(np.int64(boxes[i, 3]) + 1, side), first_row + n_rows) - 1 - first_row
+            left = max(samples_below(boxes[i, 0]), 0)
+            right = min(samples_below(boxes[i, 1] + 1), width) - 1
+            top = max(samples_below(boxes[i, 2]), first_row) - first_row
+            bottom = min(samples_below(boxes[i, 3] + 1), first_row + n_rows) - 1 - first_row
             if left > right or top > bottom:
                 continue
-            if turn == LATER or is_partial:
+            if turn == LATER:
                 nearest, hidden = nearest_of[i, 4], True
                 for r in range(top // TILE_SAMPLES, bottom // TILE_SAMPLES + 1):
                     for x in range(left // TILE_SAMPLES, right // TILE_SAMPLES + 1):
@@ -254,14 +279,13 @@ def draw_band(geometry: Any, batch: Any, place: tuple[int, int], wanted: Array, 
                     continue
             x0, y0, x1 = np.int64(corners[i, 0]), np.int64(corners[i, 1]), np.int64(corners[i, 2])
             y1, x2, y2 = np.int64(corners[i, 3]), np.int64(corners[i, 4]), np.int64(corners[i, 5])
-            across, along, origin, least, most = depth_plane(camera, triangles, t, lens)
+            across, along, origin, least, most = depth_plane(geometry.vertex, geometry.triangles, t, geometry.lens)
             bias = np.float32(1) if number >= 0 else BACK_BIAS
-            px, py = left * step + half, (top + first_row) * step + half
+            px, py = left * GRID + HALF_GRID, (top + first_row) * GRID + HALF_GRID
             row_0, row_1 = edge_function(x1, y1, x2, y2, px, py), edge_function(x2, y2, x0, y0, px, py)
             row_2 = edge_function(x0, y0, x1, y1, px, py)
-            right_0, right_1, right_2 = (y1 - y2) * step, (y2 - y0) * step, (y0 - y1) * step
-            base = origin + along * ((top + first_row + 0.5) * side) + across * ((left + 0.5) * side)
-            across, along = across * side, along * side
+            right_0, right_1, right_2 = (y1 - y2) * GRID, (y2 - y0) * GRID, (y0 - y1) * GRID
+            base = origin + along * (top + first_row + 0.5) + across * (left + 0.5)
             for r in range(top, bottom + 1):
                 e0, e1, e2, value = row_0, row_1, row_2, base
                 for x in range(left, right + 1):
@@ -278,5 +302,5 @@ def draw_band(geometry: Any, batch: Any, place: tuple[int, int], wanted: Array, 
                     value += across
                     e0, e1, e2 = e0 + right_0, e1 + right_1, e2 + right_2
                 base += along
-                row_0, row_1 = row_0 + (x2 - x1) * step, row_1 + (x0 - x2) * step
-                row_2 += (x1 - x0) * step
+                row_0, row_1 = row_0 + (x2 - x1) * GRID, row_1 + (x0 - x2) * GRID
+                row_2 += (x1 - x0) * GRID

@@ -6,7 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.numeric.kernels import inlined_kernel, kernel
-from tts2face.picture.kernels.fragments import PIXEL_ENDS, PIXEL_X, PIXEL_Y, is_same_surface
+from tts2face.picture.kernels.fragments import (
+    PIXEL_ENDS,
+    PIXEL_X,
+    PIXEL_Y,
+    Band,
+    Facets,
+    Fragments,
+    is_same_surface,
+)
 from tts2face.picture.kernels.raster import NO_TRIANGLE
 from tts2face.picture.kernels.tables import AT_OPACITY, AT_SHARE
 
@@ -18,141 +26,81 @@ def write_pixel(light: tuple[Any, Any, Any], cover: Any, tables: tuple[Any, Any]
     """Composite light and coverage over a pixel (y, x); a picture of four channels stores the coverage."""
     linear, encoded = tables
     y, x = at
-    one, zero, half = np.float32(1), np.float32(0), np.float32(0.5)
+    unit, zero, half = np.float32(1), np.float32(0), np.float32(0.5)
     top = np.float32(len(encoded) - 1)
-    behind, scale = one - cover, one
+    behind, scale = unit - cover, unit
     if picture.shape[2] == 4:
-        picture[y, x, 3] = np.uint8(min(cover, one) * np.float32(255) + half)
-        behind, scale = zero, one / max(cover, np.float32(1e-6))
+        picture[y, x, 3] = np.uint8(min(cover, unit) * np.float32(255) + half)
+        behind, scale = zero, unit / max(cover, np.float32(1e-6))
     red, green, blue = light[0] * scale, light[1] * scale, light[2] * scale
     if behind != zero:
         red += behind * linear[picture[y, x, 0]]
         green += behind * linear[picture[y, x, 1]]
         blue += behind * linear[picture[y, x, 2]]
-    picture[y, x, 0] = encoded[int(min(max(red, zero), one) * top + half)]
-    picture[y, x, 1] = encoded[int(min(max(green, zero), one) * top + half)]
-    picture[y, x, 2] = encoded[int(min(max(blue, zero), one) * top + half)]
+    picture[y, x, 0] = encoded[int(min(max(red, zero), unit) * top + half)]
+    picture[y, x, 1] = encoded[int(min(max(green, zero), unit) * top + half)]
+    picture[y, x, 2] = encoded[int(min(max(blue, zero), unit) * top + half)]
 
 
 @kernel
-def mix_samples(
-    samples: tuple[Any, Any, Any],
-    place: tuple[int, int, int],
-    which: tuple[Any, Any, Any],
-    shading: tuple[Any, Any, Any],
-    total: Array,
-) -> None:
-    """Add the mean over a pixel's samples of the composited layers: light and coverage (4,).
-
-    Parameters
-    ----------
-    samples
-        Visible triangles of samples and of the centres of pixels, and the marks of pixels whose samples are valid, as
-        for `tts2face.picture.kernels.fragments.find_fragments`.
-    place
-        The pixel's row and column in the band, and samples along its side.
-    which
-        First triangle of each fragment, and the facets of `find_fragments`.
-    shading
-        Fragment table, colours, and the first fragment of each layer (4,).
-    """
-    owner, centres, edges = samples
-    r, x, side = place
-    number_of, flat, part_of = which
-    table, colour, (begins, through) = shading
-    one = np.float32(1)
+def mix_samples(band: Band, p: int, facets: Facets, fragments: Fragments, total: Array) -> None:
+    """Add the mean over the samples of pixel number `p` of the composited layers: light and coverage (4,)."""
+    pixel, table, colour = fragments.pixels[p], fragments.table, fragments.colour
+    side, x, r = band.side, pixel[PIXEL_X], pixel[PIXEL_Y] - band.first_row // band.side
+    unit = np.float32(1)
     for s in range(side * side):
         red, green, blue, coverage = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
-        passing = through[s] if len(through) > 0 else one
+        passing = band.through[r, x, s] if band.through.size > 0 else unit
         for turn in range(3):
             layer = (0, 2, 1)[turn]
-            if begins[layer] == begins[layer + 1]:
+            g = pixel[PIXEL_ENDS + layer]
+            if g == pixel[PIXEL_ENDS + layer + 1]:
                 continue
-            if edges[r, x]:
-                number = owner[layer, r * side + s // side, x * side + s % side]
-            else:
-                number = centres[layer, r + 1, x]
+            number = band.owner[layer, r * side + s // side, x * side + s % side]
             if number == NO_TRIANGLE:
                 continue
-            g = begins[layer]
-            while not is_same_surface(number, number_of[g], flat, part_of):
+            while not is_same_surface(number, fragments.number_of[g], facets):
                 g += 1
-            behind = one - table[AT_OPACITY, g]
+            behind = unit - table[AT_OPACITY, g]
             red, green, blue = red * behind + colour[0, g], green * behind + colour[1, g], blue * behind + colour[2, g]
-            coverage = one - (one - coverage) * behind
+            coverage = unit - (unit - coverage) * behind
         share = passing / np.float32(side * side)
         total[0], total[1], total[2] = total[0] + red * share, total[1] + green * share, total[2] + blue * share
-        total[3] += one / np.float32(side * side) - share * (one - coverage)
+        total[3] += unit / np.float32(side * side) - share * (unit - coverage)
 
 
 @kernel
 def compose_band(
-    samples: tuple[Any, Any, Any],
-    place: tuple[int, int, int],
-    pixels: tuple[Any, int],
-    which: tuple[Any, Any, Any],
-    shading: tuple[Any, Any, Any, Any],
-    out: tuple[Any, Any],
+    band: Band, facets: Facets, fragments: Fragments, n_pixels: int, picture: Array, tables: tuple[Array, Array]
 ) -> None:
-    """Write the pixels of a band.
-
-    Parameters
-    ----------
-    samples
-        As for `mix_samples`.
-    place
-        The band's first row of samples, its number of rows, samples along a pixel's side.
-    pixels
-        Pixel table and the number of its valid rows.
-    which
-        First triangle of each fragment, and the facets of `find_fragments`.
-    shading
-        Fragment table, colours, and the passing light and the colour of strands, of size 0 without.
-    out
-        Picture with the background, written in place, and the tables between 8 bits and linear light.
-    """
-    first_row, side = place[0], place[2]
-    rows, n_pixels = pixels
-    edges = samples[2]
-    table, colour, through, strands = shading
-    picture, tables = out
-    one, zero = np.float32(1), np.float32(0)
-    n_samples = side * side
-    share = one / np.float32(n_samples)
-    total, nothing = np.zeros(4, np.float32), np.zeros(0, np.float32)
+    """Write the pixels of a band over the background in a picture; `tables` convert between 8 bits and linear light."""
+    rows, table, colour, through = fragments.pixels, fragments.table, fragments.colour, band.through
+    unit, zero = np.float32(1), np.float32(0)
+    n_samples = band.side * band.side
+    share = unit / np.float32(n_samples)
+    total = np.zeros(4, np.float32)
     for p in range(n_pixels):
-        begin, end = rows[p, PIXEL_ENDS], rows[p, PIXEL_ENDS + 3]
+        start, end = rows[p, PIXEL_ENDS], rows[p, PIXEL_ENDS + 3]
         x, y = rows[p, PIXEL_X], rows[p, PIXEL_Y]
-        r = y - first_row // side
-        red, green, blue, rest, least = zero, zero, zero, one, one
+        r = y - band.first_row // band.side
+        red, green, blue, rest, least = zero, zero, zero, unit, unit
         if through.size > 0:
             rest, least = zero, through[r, x, 0]
             for s in range(n_samples):
                 rest += through[r, x, s]
                 least = min(least, through[r, x, s])
             rest /= np.float32(n_samples)
-            if least < one:
-                red, green, blue = strands[r, x, 0], strands[r, x, 1], strands[r, x, 2]
-        is_mixed = least < one and (edges[r, x] != 0 or end > begin + 1)
-        if end == begin or (not is_mixed and end == begin + 1):  # hair only, or all samples alike
-            cover = one - rest
-            for g in range(begin, end):
-                weight = table[AT_SHARE, g] * share * rest
-                red, green, blue = (
-                    red + colour[0, g] * weight,
-                    green + colour[1, g] * weight,
-                    blue + colour[2, g] * weight,
-                )
-                cover += weight * table[AT_OPACITY, g]
-            write_pixel((red, green, blue), cover, tables, picture, (y, x))
-        elif is_mixed or rows[p, PIXEL_ENDS + 1] < end:
+            if least < unit:
+                red, green, blue = band.strand_colour[r, x, 0], band.strand_colour[r, x, 1], band.strand_colour[r, x, 2]
+        if end == start:  # hair only
+            write_pixel((red, green, blue), unit - rest, tables, picture, (y, x))
+        elif least < unit or rows[p, PIXEL_ENDS + 1] < end:
             total[0], total[1], total[2], total[3] = red, green, blue, zero
-            begins = (rows[p, PIXEL_ENDS:], through[r, x] if is_mixed else nothing)
-            mix_samples(samples, (r, x, side), which, (table, colour, begins), total)
+            mix_samples(band, p, facets, fragments, total)
             write_pixel((total[0], total[1], total[2]), total[3], tables, picture, (y, x))
         else:
             cover = zero
-            for g in range(begin, end):
+            for g in range(start, end):
                 weight = table[AT_SHARE, g] * share
                 red, green, blue = (
                     red + colour[0, g] * weight,

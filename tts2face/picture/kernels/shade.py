@@ -66,12 +66,12 @@ def light_vertices(exposure: Array, lights: Array, wrap: Array, vertex: Array) -
     vertex : (V, N_VERTEX_COLUMNS)
         Vertex table: reads normals, writes diffuse light and exposure.
     """
-    zero, one, half = np.float32(0), np.float32(1), np.float32(0.5)
+    zero, unit, half = np.float32(0), np.float32(1), np.float32(0.5)
     for v in range(len(vertex)):
         nx, ny, nz = vertex[v, NORMAL], vertex[v, NORMAL + 1], vertex[v, NORMAL + 2]
         around_edge = wrap[v]
         if around_edge < zero:
-            around_edge = -one - around_edge
+            around_edge = -unit - around_edge
             if nx * vertex[v, 0] + ny * vertex[v, 1] + nz * vertex[v, 2] > zero:
                 nx, ny, nz = -nx, -ny, -nz
         up = nx * lights[UP_ROW, 0] + ny * lights[UP_ROW, 1] + nz * lights[UP_ROW, 2]
@@ -86,8 +86,8 @@ def light_vertices(exposure: Array, lights: Array, wrap: Array, vertex: Array) -
                 continue
             for c in range(3):
                 reach = around_edge * SKIN_SCATTERING[c]
-                soaked = visible + reach * visible * (one - visible)  # scattering reddens the edge of a shadow on skin
-                vertex[v, DIFFUSE + c] += lights[k, 3 + c] * soaked * max(towards + reach, zero) / (one + reach)
+                soaked = visible + reach * visible * (unit - visible)  # scattering reddens the edge of a shadow on skin
+                vertex[v, DIFFUSE + c] += lights[k, 3 + c] * soaked * max(towards + reach, zero) / (unit + reach)
         vertex[v, EXPOSURE] = exposure[v, 0]
         vertex[v, EXPOSURE + 1], vertex[v, EXPOSURE + 2] = exposure[v, 1], exposure[v, 3]
         vertex[v, EXPOSURE + 3] = exposure[v, 4]
@@ -162,7 +162,7 @@ def shade_fragments(table: Array, n: int, lights: Array, scratch: Array, colour:
     colour : (3, H)
         Out: display light in [0, 1] of each fragment, multiplied by its opacity.
     """
-    one, zero = np.float32(1), np.float32(0)
+    unit, zero = np.float32(1), np.float32(0)
     nx, ny, nz = table[AT_NORMAL], table[AT_NORMAL + 1], table[AT_NORMAL + 2]
     gloss, view_x, view_y, view_z = scratch[0], scratch[1], scratch[2], scratch[3]
     facing, lobe, depth, around = scratch[4], scratch[5], scratch[9], table[AT_EXPOSURE]
@@ -170,19 +170,19 @@ def shade_fragments(table: Array, n: int, lights: Array, scratch: Array, colour:
     specular, dim, glow = table[AT_GLOSS], table[AT_DARK_GLOSS], table[AT_GLOW]
     red, green = table[AT_ALBEDO], table[AT_ALBEDO + 1]
     for i in range(n):
-        scale = one / np.sqrt(nx[i] * nx[i] + ny[i] * ny[i] + nz[i] * nz[i] + np.float32(1e-20))
+        scale = unit / np.sqrt(nx[i] * nx[i] + ny[i] * ny[i] + nz[i] * nz[i] + np.float32(1e-20))
         nx[i], ny[i], nz[i] = nx[i] * scale, ny[i] * scale, nz[i] * scale
-        scale = -one / np.sqrt(ray_x[i] * ray_x[i] + ray_y[i] * ray_y[i] + one)
+        scale = -unit / np.sqrt(ray_x[i] * ray_x[i] + ray_y[i] * ray_y[i] + unit)
         view_x[i], view_y[i], view_z[i] = ray_x[i] * scale, ray_y[i] * scale, scale
         facing[i] = max(nx[i] * view_x[i] + ny[i] * view_y[i] + nz[i] * view_z[i], np.float32(1e-3))
         tone = np.float32(0.5) * (red[i] + green[i])
-        light = min(max((tone - DARK_ALBEDO) / (LIGHT_ALBEDO - DARK_ALBEDO), zero), one)
-        gloss[i] = specular[i] * (one - dim[i] * (one - light))
-        edge = one - facing[i]
+        light = min(max((tone - DARK_ALBEDO) / (LIGHT_ALBEDO - DARK_ALBEDO), zero), unit)
+        gloss[i] = specular[i] * (unit - dim[i] * (unit - light))
+        edge = unit - facing[i]
         edge *= edge * edge * edge * edge
         depth[i] = np.sqrt(rough[i]) * np.float32(0.5)  # of the shadowing term
-        smooth = one - np.sqrt(np.sqrt(rough[i]))
-        grazing = (np.float32(0.25) * specular[i] + smooth * edge) * SKY_GLOSS * min(specular[i] * np.float32(8), one)
+        smooth = unit - np.sqrt(np.sqrt(rough[i]))
+        grazing = (np.float32(0.25) * specular[i] + smooth * edge) * SKY_GLOSS * min(specular[i] * np.float32(8), unit)
         up = nx[i] * lights[UP_ROW, 0] + ny[i] * lights[UP_ROW, 1] + nz[i] * lights[UP_ROW, 2]
         lobe[i] = grazing * around[i] * around[i] * (np.float32(0.7) + np.float32(0.3) * up)
     for c in range(3):
@@ -197,19 +197,19 @@ def shade_fragments(table: Array, n: int, lights: Array, scratch: Array, colour:
         for i in range(n):
             towards = max(nx[i] * lx + ny[i] * ly + nz[i] * lz, zero)
             hx, hy, hz = lx + view_x[i], ly + view_y[i], lz + view_z[i]
-            inverse = one / np.sqrt(hx * hx + hy * hy + hz * hz + np.float32(1e-9))
+            inverse = unit / np.sqrt(hx * hx + hy * hy + hz * hz + np.float32(1e-9))
             middle = max((nx[i] * hx + ny[i] * hy + nz[i] * hz) * inverse, zero)
-            edge = one - min((lx * hx + ly * hy + lz * hz) * inverse, one)
-            fresnel = one + (one / REFLECTANCE - one) * edge * edge * edge * edge * edge
+            edge = unit - min((lx * hx + ly * hy + lz * hz) * inverse, unit)
+            fresnel = unit + (unit / REFLECTANCE - unit) * edge * edge * edge * edge * edge
             squared = middle * middle
-            spread = squared * (rough[i] - one) + one
+            spread = squared * (rough[i] - unit) + unit
             first = rough[i] / spread
             tight = rough[i] * SECOND_ROUGHNESS
-            spread = squared * (tight - one) + one
+            spread = squared * (tight - unit) + unit
             other = tight / spread
-            shadow = (towards * (one - depth[i]) + depth[i]) * (facing[i] * (one - depth[i]) + depth[i])
+            shadow = (towards * (unit - depth[i]) + depth[i]) * (facing[i] * (unit - depth[i]) + depth[i])
             both = (first * first + second[i] * other * other) / shadow
-            lobe[i] = gloss[i] * fresnel * towards * both * visible[i] * min(around[i] * np.float32(1.3), one)
+            lobe[i] = gloss[i] * fresnel * towards * both * visible[i] * min(around[i] * np.float32(1.3), unit)
         for c in range(3):
             shine, strength = scratch[6 + c], lights[k, 3 + c]
             for i in range(n):
@@ -217,10 +217,10 @@ def shade_fragments(table: Array, n: int, lights: Array, scratch: Array, colour:
     for c in range(3):
         matt, shine, albedo = table[AT_DIFFUSE + c], scratch[6 + c], table[AT_ALBEDO + c]
         for i in range(n):
-            hidden = one - around[i]
-            colour[c, i] = matt[i] * albedo[i] / (one - hidden * hidden * albedo[i] * INTERREFLECTION) + shine[i]
+            hidden = unit - around[i]
+            colour[c, i] = matt[i] * albedo[i] / (unit - hidden * hidden * albedo[i] * INTERREFLECTION) + shine[i]
     opacity = table[AT_OPACITY]
     for i in range(n):
         kept, scale = kept_hue(colour[0, i], colour[1, i], colour[2, i])
         for c in range(3):
-            colour[c, i] = opacity[i] * (scale * colour[c, i] + (one - kept) * tone_curve(colour[c, i]))
+            colour[c, i] = opacity[i] * (scale * colour[c, i] + (unit - kept) * tone_curve(colour[c, i]))
