@@ -188,7 +188,7 @@ def sort_into_bands(
 
 
 @inlined_kernel
-def edge_function(ax: int, ay: int, bx: int, by: int, px: int, py: int) -> int:
+def edge_function(ax: Any, ay: Any, bx: Any, by: Any, px: Any, py: Any) -> Any:
     """Edge function of a directed edge at a point, lowered by one where the edge does not own its samples."""
     owns = (by < ay) | ((by == ay) & (bx > ax))  # left edges and top edges
     return (bx - ax) * (py - ay) - (by - ay) * (px - ax) - (0 if owns else 1)
@@ -233,7 +233,7 @@ def clear_layer(depth: Array, owner: Array, layer: int) -> None:
 
 
 @inlined_kernel
-def samples_below(value: int) -> int:
+def samples_below(value: Any) -> Any:
     """Number of samples whose centres lie below a grid coordinate."""
     return (value + HALF_GRID - 1) >> GRID_SHIFT
 
