@@ -17,11 +17,11 @@ ROW = re.compile(
     re.MULTILINE,
 )
 TOLERANCES = (0, 500, 500)  # by which they may differ, so that few commits have to renew them
-MOST_STATEMENTS = 67_498  # of all packages: as many as before the files were divided by subject
+MOST_STATEMENTS = 56_967  # of all packages: as many as before the files were divided by subject
 
 
 class Size(NamedTuple):
-    """Files, lines and statements of Python; a statement is a node `ast.stmt`, however many lines it takes."""
+    """Files, lines and statements of Python (`count_statements`)."""
 
     files: int
     lines: int
@@ -33,9 +33,27 @@ def measured_sizes(root: Path, packages: list[str]) -> dict[str, Size]:
     found = {}
     for package in packages:
         texts = [path.read_text(encoding="utf-8") for path in (root / package).rglob("*.py")]
-        statements = sum(isinstance(node, ast.stmt) for text in texts for node in ast.walk(ast.parse(text)))
+        statements = sum(count_statements(ast.parse(text)) for text in texts)
         found[package] = Size(len(texts), sum(text.count("\n") for text in texts), statements)
     return found | {ALL: Size(*map(sum, zip(*found.values(), strict=True)))}
+
+
+def count_statements(tree: ast.Module) -> int:
+    """Number of statements of a module that do something, however many lines they take.
+
+    Imports and docstrings do not count: a file that is divided by subject has more of both. An assignment of several
+    values counts once for each, so that packing them on one line is no gain.
+    """
+    counted = 0
+    for node in ast.walk(tree):
+        match node:
+            case ast.Import() | ast.ImportFrom() | ast.Expr(value=ast.Constant()):
+                pass
+            case ast.Assign(targets=[ast.Tuple(elts=names), *_], value=ast.Tuple()):
+                counted += len(names)
+            case ast.stmt():
+                counted += 1
+    return counted
 
 
 def stated_sizes(page: str) -> dict[str, Size]:
