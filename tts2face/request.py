@@ -33,7 +33,7 @@ ORDER = (
 
 @dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Request:
-    """What a clip is made from, and options of its language, lip motion and gestures.
+    """The source of a clip, and options of its language, lip motion and gestures.
 
     Options of the source may be given and read by name, too: ``Request(text="Hello.", rate=1.2)`` is
     ``Request(source=Spoken("Hello.", rate=1.2))``; beside a source they change it, as with `dataclasses.replace`.

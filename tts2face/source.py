@@ -1,4 +1,4 @@
-"""What a clip is made from: a text, a recording, idle animation, or listening, each with the options that it has.
+"""Sources of a clip: a text, a recording, idle animation, or listening, each with the options that it has.
 
 `make_source` makes one of the options by name that flags, files and clients give (`SourceOptions`).
 """
@@ -27,13 +27,7 @@ LEAD_LIMITS_S = (0.0, 1.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SourceOptions:
-    """Options of all sources by name, as flags, files and clients give them: any may be given.
-
-    Raises
-    ------
-    InputError
-        An option has a value of another type, a number lies outside its range, or two options exclude each other.
-    """
+    """Options of all sources by name, as flags, files and clients give them: any may be given."""
 
     text: str = option("", "Text to speak.")
     audio: Path | None = option(

@@ -1,8 +1,6 @@
-"""Data types shared by all packages: waveform, trajectory, speech and clip.
+"""Data types shared by all packages: waveform, trajectory, speech and clip, and the clock of frames and samples.
 
 Units: seconds, millimetres, radians. Frame i is the instant i / fps.
-
-Exact conversion between video frames and audio samples.
 """
 
 import math
@@ -23,6 +21,9 @@ from tts2face.request import FPS_LIMITS
 MAX_RATE_HZ = 1e6  # of samples or frames; the fastest converters of sound have 768 kHz
 SOUND_RATE = 48_000  # Hz, of clips and films; the usual rate of players and editors, required by Opus
 HEAD_CHANNELS = ("pitch", "yaw", "roll", "x", "y", "z")  # radians (nod down, turn to own left, tilt) and mm
+Progress = Callable[[int, int], None]  # number of finished steps, number of all steps
+YieldTurn = Callable[[], None]  # called between the steps of a computation, so that another one can run
+NTSC_NOMINAL_RATES = (24, 30, 48, 60, 120)  # nominal rates whose broadcast form is 1000/1001 of them (SMPTE 12M)
 
 
 def frame_count(duration_s: float, fps: float) -> int:
@@ -45,10 +46,6 @@ def _checked_read_only(values: ArrayLike, what: str, ndim: int) -> NDArray[np.fl
         raise InputError(f"{what} must be finite; it holds NaN or infinity")
     array.setflags(write=False)
     return array
-
-
-Progress = Callable[[int, int], None]  # number of finished steps, number of all steps
-YieldTurn = Callable[[], None]  # called between the steps of a computation, so that another one can run
 
 
 def keep_on() -> None:
@@ -292,9 +289,6 @@ def concatenate_clips(clips: Sequence[Clip]) -> Clip:
         replace(first.head, values=head),
         concatenate_speech([clip.speech for clip in clips]),
     )
-
-
-NTSC_NOMINAL_RATES = (24, 30, 48, 60, 120)  # nominal rates whose broadcast form is 1000/1001 of them (SMPTE 12M)
 
 
 def exact_rate(fps: float) -> Fraction:

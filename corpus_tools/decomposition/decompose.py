@@ -22,7 +22,7 @@ from corpus_tools.decomposition.blend_weights import Estimator, moving_average
 from corpus_tools.decomposition.capture import FaceRecording, resample_to_gesture_rate
 from lexicon.errors import DataError, InputError
 from tts2face.face.deformation import axis_ratios
-from tts2face.gestures.presentation import SILENT_PROSODY, prosody_features, speech_intensity
+from tts2face.gestures.prosody import SILENT_PROSODY, prosody_features, speech_intensity
 from tts2face.models.landmarks import EYELID_LANDMARKS, MOUTH_REGION, N_LANDMARKS, eye_aperture
 from tts2face.models.palette import (
     FEATURES,

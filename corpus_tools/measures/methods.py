@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from lexicon.sequence import PhoneSequence
 from tts2face.lips.exemplar import ExemplarModel, build_exemplar_model, speech_trajectory
 from tts2face.lips.options import METHOD_OPTIONS, SynthesisOptions
-from tts2face.lips.tokens import build_targets
+from tts2face.lips.targets import build_targets
 from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import Talker
 from tts2face.numeric.arrays import interpolate_columns

@@ -17,7 +17,7 @@ from corpus_tools.measures.scores import OwnDurationMotion, UtteranceComparison,
 from lexicon.errors import InputError
 from lexicon.normalize import normalize
 from lexicon.sequence import PhoneSequence, WordSpan
-from tts2face.lips.explanation import speech_frames
+from tts2face.lips.motion_measures import speech_frames
 from tts2face.models.talker import ShapeModel
 from tts2face.numeric.arrays import interpolate_columns
 from tts2face.sound.voice import Voice

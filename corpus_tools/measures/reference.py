@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from corpus_tools.measures.lip_measures import BILABIALS, closure_threshold, min_openings, open_vowels
 from corpus_tools.recordings.observation import Observation
 from lexicon.phones import PHONES
-from tts2face.lips import explanation
+from tts2face.lips import motion_measures
 from tts2face.models.landmarks import lip_opening, lip_width
 from tts2face.models.talker import ShapeModel
 
@@ -61,7 +61,7 @@ class ReferenceUtterance:
         n_frames = len(observation.landmarks)
         return cls(
             observation,
-            explanation.speech_frames(observation.phones, n_frames, observation.fps),
+            motion_measures.speech_frames(observation.phones, n_frames, observation.fps),
             model.parameters(observation.landmarks)[:, : model.n_speech],
             LipCurves.of(observation.landmarks),
             frame_classes(observation.phones.phones, observation.phones.edges, np.arange(n_frames) / observation.fps),

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.measures.reference import LipCurves
 from corpus_tools.recordings.observation import Observation
-from tts2face.lips.explanation import speech_frames
+from tts2face.lips.motion_measures import speech_frames
 from tts2face.models.talker import Talker
 
 Floats = NDArray[np.float64]

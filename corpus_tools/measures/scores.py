@@ -16,7 +16,7 @@ from corpus_tools.measures.intervals import (
 )
 from corpus_tools.measures.reference import OTHER_CLASS, PHONE_CLASSES, LipCurves, ReferenceUtterance, Thresholds
 from lexicon.sequence import PhoneSequence
-from tts2face.lips import explanation
+from tts2face.lips import motion_measures
 from tts2face.models.talker import ShapeModel
 
 N_DRAWS = 1000  # of utterances, with replacement (Efron 1979)
@@ -173,7 +173,7 @@ def _utterance_statistics(comparison: UtteranceComparison, limits: Thresholds) -
         curve_moments(one.curves.opening[here], curves.opening[here]),
         curve_moments(one.curves.width[here], curves.width[here]),
         lip_measures.rmse_z(real, synthesised, comparison.spread),
-        explanation.warping_cost(real, synthesised, comparison.spread, round(explanation.DTW_BAND_S * fps)),
+        motion_measures.warping_cost(real, synthesised, comparison.spread, round(motion_measures.DTW_BAND_S * fps)),
         _free_cost(comparison),
         _event_counts(comparison, limits),
         np.abs(offsets[np.isfinite(offsets)]),
@@ -186,7 +186,9 @@ def _free_cost(comparison: UtteranceComparison) -> float | None:
         return None
     n = len(comparison.spread)
     real = comparison.real.parameters[comparison.real.evaluated, :n]
-    return explanation.warping_cost(real, comparison.own.values[comparison.own.evaluated, :n], comparison.spread, None)
+    return motion_measures.warping_cost(
+        real, comparison.own.values[comparison.own.evaluated, :n], comparison.spread, None
+    )
 
 
 def _event_counts(comparison: UtteranceComparison, limits: Thresholds) -> Floats:
@@ -273,10 +275,10 @@ def _utterance_score(tally: UtteranceStatistics, comparison: UtteranceComparison
     here, recorded = one.evaluated, one.curves
     return UtteranceScore(
         one.observation.name,
-        explanation.correlation(recorded.opening[here], synthesised.opening[here]),
-        explanation.correlation(recorded.width[here], synthesised.width[here]),
+        motion_measures.correlation(recorded.opening[here], synthesised.opening[here]),
+        motion_measures.correlation(recorded.width[here], synthesised.width[here]),
         tally.rmse_z,
         tally.dtw_cost,
-        explanation.range_ratio(recorded.opening[here], synthesised.opening[here]),
+        motion_measures.range_ratio(recorded.opening[here], synthesised.opening[here]),
         int(tally.opening[0]),
     )

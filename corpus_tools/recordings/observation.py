@@ -29,7 +29,7 @@ from tts2face.lips.exemplar import ExemplarModel, build_exemplar_model, speech_t
 from tts2face.models.landmarks import lip_opening
 from tts2face.models.talker import ShapeModel
 from tts2face.models.talker_file import load_talker
-from tts2face.sound.features import intensity
+from tts2face.sound.praat import intensity
 from tts2face.video.pose import PoseFreeLandmarks, head_angles, remove_pose
 from tts2face.video.resampling import resample_to_grid, trim_and_fill
 

@@ -14,7 +14,7 @@ from corpus_tools.recordings.video import content_key
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.sound.alignment import Aligner, TextMismatch
 from tts2face.sound.pauses import Span, cut_at_pauses, cut_sound
-from tts2face.sound.transcript import assign_words
+from tts2face.sound.word_assignment import assign_words
 from tts2face.sound.word_lattice import PronouncedWords
 from tts2face.storage.array_cache import read_kept
 from tts2face.storage.tensors import write_tensors

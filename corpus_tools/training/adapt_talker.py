@@ -12,8 +12,9 @@ from corpus_tools.training.base_map import N_OFFSETS, BaseMap, FrameTerms, fit_b
 from corpus_tools.training.train_talker import build_utterances, resting_parameters
 from lexicon.phones import ARPABET
 from lexicon.sequence import SILENCE
-from tts2face.lips.cloning import UNBOUNDED_MM, face_size, facing_gaps, nearest_valid_parameters
+from tts2face.lips.cloning import face_size
 from tts2face.lips.exemplar import DEFAULT_OPTIONS, ExemplarModel, build_exemplar_model, speech_trajectory
+from tts2face.lips.lip_gaps import UNBOUNDED_MM, facing_gaps, nearest_valid_parameters
 from tts2face.lips.retargeting import inner_product_map
 from tts2face.models.audio_map import AudioMap
 from tts2face.models.landmarks import (

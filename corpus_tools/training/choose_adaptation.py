@@ -29,7 +29,7 @@ from corpus_tools.training.base_map import frame_terms
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.phones import ARPABET
 from lexicon.sequence import SILENCE
-from tts2face.lips.explanation import DTW_BAND_S, correlation, range_ratio, speech_frames, warping_cost
+from tts2face.lips.motion_measures import DTW_BAND_S, correlation, range_ratio, speech_frames, warping_cost
 from tts2face.models.talker import NOT_STATED, ShapeModel, Talker
 from tts2face.models.talker_file import load_talker
 from tts2face.types import Progress

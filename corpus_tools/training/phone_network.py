@@ -27,7 +27,7 @@ from corpus_tools.training.network_training import (
 )
 from corpus_tools.training.pooling.speech import PooledSpeech, pooled_inventory, talker_features
 from lexicon.sequence import SILENCE
-from tts2face.lips.explanation import speech_frames
+from tts2face.lips.motion_measures import speech_frames
 from tts2face.models.phone_network import PhoneNetwork, window_features
 from tts2face.models.talker import Talker
 from tts2face.types import Progress

@@ -21,7 +21,8 @@ from corpus_tools.recordings.observe import observe
 from corpus_tools.run_options import RunOptions
 from corpus_tools.training.train_talker import CLOSED_GAP, learn_shapes
 from tests.bench.bench_retarget import bilabial_frames, landmarks_of, opening
-from tts2face.lips.cloning import ParameterTransfer, append_missing_components, build_parameter_transfer, facing_gaps
+from tts2face.lips.cloning import ParameterTransfer, append_missing_components, build_parameter_transfer
+from tts2face.lips.lip_gaps import facing_gaps
 from tts2face.lips.retargeting import build_retargeter
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import MOUTH_REGION, lip_opening

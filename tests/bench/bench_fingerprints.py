@@ -36,7 +36,7 @@ from tests.bench.bench_recording_limits import (
     through_codec,
     through_mp3,
 )
-from tts2face.sound.features import intensity
+from tts2face.sound.praat import intensity
 from tts2face.types import Waveform
 from tts2face.video.media import TimedFrame, read_frames, read_sound
 from tts2face.video.networks import find_bundle

@@ -32,7 +32,7 @@ from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence
-from tts2face.lips.explanation import correlation, speech_frames
+from tts2face.lips.motion_measures import correlation, speech_frames
 from tts2face.models.landmarks import lip_opening
 from tts2face.sound.alignment import Aligner
 from tts2face.types import Waveform

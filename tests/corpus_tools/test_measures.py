@@ -4,7 +4,7 @@ import pytest
 from corpus_tools.measures import lip_measures
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.lips import explanation
+from tts2face.lips import motion_measures as measures
 from tts2face.models.landmarks import lip_opening, lip_width
 
 SPEECH = PhoneSequence([SILENCE, "p", "ɑ", "s", SILENCE], [0.0, 0.4, 0.5, 0.7, 0.8, 1.2])
@@ -25,31 +25,31 @@ def test_opening_and_width_are_measured_in_eye_distances():
 
 
 def test_scored_from_100_ms_before_speech_to_100_ms_after_it():
-    assert explanation.speech_frames(SPEECH, 60, 50.0) == slice(15, 46)  # 0.30 s to 0.90 s, both frames included
+    assert measures.speech_frames(SPEECH, 60, 50.0) == slice(15, 46)  # 0.30 s to 0.90 s, both frames included
 
 
 def test_silence_cannot_be_judged():
     with pytest.raises(InputError, match="without speech"):
-        explanation.speech_frames(PhoneSequence([SILENCE], [0.0, 1.0]), 25, 25.0)
+        measures.speech_frames(PhoneSequence([SILENCE], [0.0, 1.0]), 25, 25.0)
 
 
 def test_correlation_of_known_series():
-    assert explanation.correlation(np.array([1.0, 2.0, 3.0]), np.array([2.0, 4.0, 6.0])) == pytest.approx(1.0)
-    assert explanation.correlation(np.array([1.0, 2.0, 3.0]), np.array([3.0, 2.0, 1.0])) == pytest.approx(-1.0)
-    assert explanation.correlation(np.array([1.0, 2.0, 3.0, 4.0]), np.array([1.0, 3.0, 2.0, 4.0])) == pytest.approx(0.8)
-    assert explanation.correlation(np.array([1.0, 2.0, 3.0]), np.ones(3)) == 0.0
+    assert measures.correlation(np.array([1.0, 2.0, 3.0]), np.array([2.0, 4.0, 6.0])) == pytest.approx(1.0)
+    assert measures.correlation(np.array([1.0, 2.0, 3.0]), np.array([3.0, 2.0, 1.0])) == pytest.approx(-1.0)
+    assert measures.correlation(np.array([1.0, 2.0, 3.0, 4.0]), np.array([1.0, 3.0, 2.0, 4.0])) == pytest.approx(0.8)
+    assert measures.correlation(np.array([1.0, 2.0, 3.0]), np.ones(3)) == 0.0
 
 
 def test_pearson_of_whole_numbers_and_of_a_constant():
-    assert explanation.pearson(np.array([1, 2, 3]), np.array([2, 4, 6])) == pytest.approx(1.0)
-    assert explanation.pearson(np.array([1, 2, 3]), np.array([6, 4, 2])) == pytest.approx(-1.0)
-    assert np.isnan(explanation.pearson(np.ones(3), np.arange(3)))
+    assert measures.pearson(np.array([1, 2, 3]), np.array([2, 4, 6])) == pytest.approx(1.0)
+    assert measures.pearson(np.array([1, 2, 3]), np.array([6, 4, 2])) == pytest.approx(-1.0)
+    assert np.isnan(measures.pearson(np.ones(3), np.arange(3)))
     one, other = np.random.default_rng(0).normal(size=(2, 50))
-    assert explanation.pearson(one, other) == pytest.approx(np.corrcoef(one, other)[0, 1], rel=1e-12)
+    assert measures.pearson(one, other) == pytest.approx(np.corrcoef(one, other)[0, 1], rel=1e-12)
 
 
 def test_range_ratio_is_the_ratio_of_spreads():
-    assert explanation.range_ratio(np.array([0.0, 2.0]), np.array([5.0, 6.0])) == pytest.approx(0.5)
+    assert measures.range_ratio(np.array([0.0, 2.0]), np.array([5.0, 6.0])) == pytest.approx(0.5)
 
 
 def test_rmse_is_in_units_of_spread():
@@ -61,13 +61,13 @@ def test_warping_cost_forgives_a_small_delay_and_divides_by_the_path():
     pulse = np.zeros((10, 1))
     pulse[4] = 1.0
     late = np.roll(pulse, 2, axis=0)
-    assert explanation.warping_cost(pulse, late, np.ones(1), 3) == 0.0
+    assert measures.warping_cost(pulse, late, np.ones(1), 3) == 0.0
     # 4 frames lie beyond the band of 3: one pulse must be matched to stillness on either side.
-    assert explanation.warping_cost(pulse, np.roll(pulse, 4, axis=0), np.ones(1), 3) == pytest.approx(2 / 10)
+    assert measures.warping_cost(pulse, np.roll(pulse, 4, axis=0), np.ones(1), 3) == pytest.approx(2 / 10)
     # Without a band neither the delay nor the length matters.
-    assert explanation.warping_cost(pulse, np.concatenate([np.zeros((4, 1)), pulse]), np.ones(1), None) == 0.0
+    assert measures.warping_cost(pulse, np.concatenate([np.zeros((4, 1)), pulse]), np.ones(1), None) == 0.0
     # Two still motions one spread apart: 10 pairs of distance 2 / 2.
-    assert explanation.warping_cost(np.zeros((10, 1)), np.full((10, 1), 2.0), np.full(1, 2.0), 3) == pytest.approx(1.0)
+    assert measures.warping_cost(np.zeros((10, 1)), np.full((10, 1), 2.0), np.full(1, 2.0), 3) == pytest.approx(1.0)
 
 
 def test_the_least_opening_includes_a_margin_around_the_phone():

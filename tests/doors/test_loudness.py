@@ -14,7 +14,7 @@ from tts2face.request import Request
 from tts2face.session.session import Session
 from tts2face.session.speech_stream import Piece
 from tts2face.sound import level
-from tts2face.sound.level import integrated_loudness
+from tts2face.sound.loudness import integrated_loudness
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.types import Waveform, concatenate_clips
 

@@ -11,7 +11,7 @@ from tts2face.gestures.noise import NoiseStream, blink_closure, blinks_per_secon
 from tts2face.gestures.stream import GestureFields, GestureStream, style_median
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import EXPRESSIONS, FEATURES
-from tts2face.sound.features import intensity_track
+from tts2face.sound.praat import intensity_track
 from tts2face.types import Waveform
 
 FPS = 30.0

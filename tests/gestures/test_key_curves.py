@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from lexicon.errors import DataError, InputError
 from tts2face.gestures.elements import (
-    KINDS,
     BrowRaise,
     ChannelEdit,
     ExpressionCurve,
@@ -21,6 +20,7 @@ from tts2face.gestures.elements import (
     StyleSpan,
     interpolate_keys,
 )
+from tts2face.gestures.kinds import KINDS
 from tts2face.gestures.stream import GestureFields, GestureStream
 from tts2face.gestures.timeline import Timeline
 from tts2face.gestures.timeline_file import parse_timeline, timeline_json

@@ -9,14 +9,9 @@ import pytest
 from corpus_tools.studies.gestures.measures import find_blinks, wasserstein
 from tts2face.gestures.blinks import PAUSE_DB
 from tts2face.gestures.elements import Gains, GazeTarget, StyleSpan
-from tts2face.gestures.presentation import (
-    LowPass,
-    filtered_spread,
-    find_accents,
-    prosody_features,
-    slow_scales,
-    speech_intensity,
-)
+from tts2face.gestures.head_presentation import find_accents, slow_scales
+from tts2face.gestures.presentation import LowPass, filtered_spread
+from tts2face.gestures.prosody import prosody_features, speech_intensity
 from tts2face.gestures.stream import GestureFields, GestureStream
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import FEATURES, GESTURE_FPS, Palette, load_palette

@@ -9,7 +9,8 @@ from scipy.optimize import minimize
 
 from lexicon.errors import DataError
 from tests.lips.test_clone import gaps_of, opening_model, seeds, some
-from tts2face.lips.cloning import MIN_LIP_GAP_MM, build_parameter_transfer, nearest_valid_parameters
+from tts2face.lips.cloning import build_parameter_transfer
+from tts2face.lips.lip_gaps import MIN_LIP_GAP_MM, nearest_valid_parameters
 from tts2face.models.landmarks import INNER_LIP_LOWER
 from tts2face.numeric.least_squares import bounded_least_squares
 

@@ -4,7 +4,7 @@ import av
 import numpy as np
 from av.filter import Graph
 
-from tts2face.sound.level import SILENT_DB, oversampled_peaks
+from tts2face.sound.loudness import SILENT_DB, oversampled_peaks
 from tts2face.types import Waveform
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from lexicon.errors import InputError
 from tests.oracles.loudness_meter import measure_loudness, true_peak
-from tts2face.sound.level import ABSOLUTE_GATE_LUFS, integrated_loudness, k_weighting
+from tts2face.sound.loudness import ABSOLUTE_GATE_LUFS, integrated_loudness, k_weighting
 from tts2face.types import Waveform
 
 

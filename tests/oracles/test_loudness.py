@@ -5,7 +5,7 @@ import parselmouth
 import pytest
 
 from tts2face.sound.espeak import EspeakVoice
-from tts2face.sound.features import intensity
+from tts2face.sound.praat import intensity
 from tts2face.types import Waveform
 
 

@@ -38,7 +38,7 @@ from tts2face.session import warm_up
 from tts2face.session.named_models import Models
 from tts2face.session.warm_up import kernels_are_compiled
 from tts2face.sound import level, segments
-from tts2face.sound.level import filter_biquad
+from tts2face.sound.loudness import filter_biquad
 
 
 @pytest.fixture
@@ -147,7 +147,7 @@ def test_a_command_and_its_children_share_the_works(monkeypatch: pytest.MonkeyPa
 
     works = ["compile_motion", "compile_gestures", "compile_sound"]
     monkeypatch.setattr(warm_up, "Child", Fake)
-    monkeypatch.setattr(warm_up, "WORKS", {name: partial(made.append, name) for name in works})
+    monkeypatch.setattr(warm_up, "TASKS", {name: partial(made.append, name) for name in works})
     monkeypatch.setattr(warm_up, "compile_pictures", lambda _: made.append("compile_pictures"))
     for cores in (1, 2, 8):
         made.clear()
@@ -293,7 +293,7 @@ def test_kernels_that_allocate_are_known():
 COMPILED_ONLY = """
 import sys
 import numpy as np
-from tts2face.sound.level import filter_biquad
+from tts2face.sound.loudness import filter_biquad
 samples = np.ones(4)
 filter_biquad(np.ones(3), np.ones(3), samples)
 print(samples.tolist(), filter_biquad.n_from_cache, {"numba", "llvmlite"} & set(sys.modules))

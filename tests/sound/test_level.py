@@ -5,16 +5,8 @@ import pytest
 
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.oracles.loudness_meter import measure_loudness, true_peak
-from tts2face.sound.level import (
-    CEILING_DB,
-    LOOK_AHEAD_S,
-    LOUDNESS_LUFS,
-    integrated_loudness,
-    level_speech,
-    limit_peaks,
-    normalise_loudness,
-    oversampled_peaks,
-)
+from tts2face.sound.level import CEILING_DB, LOOK_AHEAD_S, LOUDNESS_LUFS, level_speech, limit_peaks, normalise_loudness
+from tts2face.sound.loudness import integrated_loudness, oversampled_peaks
 from tts2face.types import Speech, Waveform
 
 RATE = 24_000

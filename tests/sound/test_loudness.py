@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError
-from tts2face.sound.features import intensity, pitch
+from tts2face.sound.praat import intensity, pitch
 from tts2face.types import Waveform
 
 RATE = 16_000

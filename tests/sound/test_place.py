@@ -5,7 +5,7 @@ import pytest
 
 from lexicon.errors import InputError
 from tts2face.sound import transcript as place
-from tts2face.sound.transcript import assign_words
+from tts2face.sound.word_assignment import assign_words
 
 PHONES = "pbtdkgfvszmnlrwiuaeo"
 

@@ -23,7 +23,9 @@ MAX_PROFILES = 256
 # Seconds between blinks: a gamma distribution. In conversation 10 to 26 blinks a minute are usual, most of them at
 # pauses and ends of phrases (Bentivoglio et al. 1997, Movement Disorders 12; Nakano and Kitazawa 2010, Experimental
 # Brain Research 205).
-MEAN_INTERVAL_S, INTERVAL_SHAPE, MIN_INTERVAL_S = 4.7, 10.0, 1.5
+MEAN_INTERVAL_S = 4.7
+INTERVAL_SHAPE = 10.0
+MIN_INTERVAL_S = 1.5
 LISTENING_INTERVALS = 26 / 17  # of those of speech: 17 blinks a minute at rest, 26 in conversation (Bentivoglio)
 EARLY_SHARE = 0.6  # of the interval after which a phrase end is used
 PATIENCE_S = 1.6  # an overdue blink waits this long for a pause
@@ -48,18 +50,18 @@ def find_blinks(closure: FloatArray, lengths: NDArray[np.integer]) -> IntArray:
     closed, begins_recording = closure > OPEN, np.zeros(len(closure) + 1, bool)
     begins_recording[borders] = True
     changes = np.flatnonzero((closed[1:] != closed[:-1]) & ~begins_recording[1:-1]) + 1
-    begins, opened = changes[closed[changes]], changes[~closed[changes]]
-    ends = np.append(opened, len(closure))[np.searchsorted(opened, begins)]
-    after = borders[np.searchsorted(borders, begins, side="right")]  # the recording
-    begins, ends = begins[ends < after], ends[ends < after]
-    if not len(begins):
+    starts, opened = changes[closed[changes]], changes[~closed[changes]]
+    ends = np.append(opened, len(closure))[np.searchsorted(opened, starts)]
+    after = borders[np.searchsorted(borders, starts, side="right")]  # the recording
+    starts, ends = starts[ends < after], ends[ends < after]
+    if not len(starts):
         return np.zeros((0, 2), np.int64)
-    is_shut = np.maximum.reduceat(closure, np.stack([begins, ends], axis=1).ravel())[::2] > SHUT
-    begins, ends = begins[is_shut], ends[is_shut]
-    recording = np.searchsorted(borders, begins, side="right")
-    lowest = np.maximum(borders[recording - 1], begins - MAX_EDGE)
+    is_shut = np.maximum.reduceat(closure, np.stack([starts, ends], axis=1).ravel())[::2] > SHUT
+    starts, ends = starts[is_shut], ends[is_shut]
+    recording = np.searchsorted(borders, starts, side="right")
+    lowest = np.maximum(borders[recording - 1], starts - MAX_EDGE)
     highest = np.minimum(borders[recording] - 1, ends + MAX_EDGE)
-    first, last = begins - 1, ends.copy()
+    first, last = starts - 1, ends.copy()
     for _ in range(MAX_EDGE):
         first -= (first > lowest) & (closure[first - 1] < closure[first])
         last += (last < highest) & (closure[np.minimum(last + 1, highest)] < closure[last])
@@ -87,14 +89,14 @@ def blink_profiles(style: Style) -> tuple[FloatArray, ...]:
     return tuple(profiles[borders[number] : borders[number + 1]].copy() for number in chosen)
 
 
-def _are_usual(closure: FloatArray, begins: IntArray) -> NDArray[np.bool_]:
+def _are_usual(closure: FloatArray, starts: IntArray) -> NDArray[np.bool_]:
     """(B,) whether profiles close once, fully, and for a usual time; `begins`: first frames of `closures` (T,)."""
     is_shut = closure > SHUT
     shuts = np.concatenate([[False], is_shut[1:] & ~is_shut[:-1]])
-    shuts[begins] = False
-    n_closings, n_closed = (np.add.reduceat(found.astype(int), begins) for found in (shuts, closure > OPEN))
+    shuts[starts] = False
+    n_closings, n_closed = (np.add.reduceat(found.astype(int), starts) for found in (shuts, closure > OPEN))
     seconds = n_closed / GESTURE_FPS
-    is_full = np.maximum.reduceat(closure, begins) >= FULL
+    is_full = np.maximum.reduceat(closure, starts) >= FULL
     shortest, longest = PROFILE_LIMITS_S
     return np.asarray((n_closings == 1) & is_full & (shortest <= seconds) & (seconds <= longest))
 
@@ -125,9 +127,9 @@ def lids_without_blinks(style: Style) -> Float32Array:
     lids = style.motion["blink"].astype(np.float64)
     blinks = find_blinks(lids.mean(axis=1), style.lengths)
     span, step = _steps(blinks[:, 1] - blinks[:, 0])
-    begin, last = lids[blinks[:, 0]], lids[blinks[:, 1] - 1]
-    slope = (last - begin) / (blinks[:, 1] - blinks[:, 0] - 1)[:, None]
-    lines = begin[span] + step[:, None] * slope[span]
+    start, last = lids[blinks[:, 0]], lids[blinks[:, 1] - 1]
+    slope = (last - start) / (blinks[:, 1] - blinks[:, 0] - 1)[:, None]
+    lines = start[span] + step[:, None] * slope[span]
     opened = lids.copy()
     opened[blinks[span, 0] + step] = lines
     opened[blinks[:, 1] - 1] = last
@@ -149,7 +151,9 @@ class BlinkPresentation:
         self._profiles, self._generator = profiles, np.random.default_rng(seed)
         self._interval = self._draw_interval(self._generator.random())
         self._waited = self._interval * self._generator.random()
-        self._paused_frames, self._frame, self._time = 0, 0, 0.0
+        self._paused_frames = 0
+        self._frame = 0
+        self._time = 0.0
         self._profile = np.zeros((0, 2))
 
     def copy(self) -> "BlinkPresentation":

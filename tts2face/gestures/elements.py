@@ -1,15 +1,15 @@
-"""Elements of a timeline: their records, their kinds, and what timelines do with the elements of a kind.
+"""Elements of a timeline: styles, expressions, gaze, nods and curves.
 
 Times are seconds on the clock of the whole clip; spans are half open. Between keys a curve eases from one value to the
 next, with zero slope at each; before the first key and after the last one it is constant.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Annotated, Any, Literal
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,17 +27,8 @@ GAIN_NAMES = (*FEATURES, "jaw", "lips")
 GAZE_LIMITS_DEG = (-35.0, 35.0)  # farther, people turn the head (Stahl 1999, Experimental Brain Research 126)
 CHANNEL_OFFSET_LIMITS = (-1000.0, 1000.0)  # weights lie within 2; the head's position is in millimetres
 MAX_KEYS = 100_000  # of one curve: a key at each frame of half an hour
-MAX_OVERRUN_S = 0.05  # tolerance for spans that end after the clip: times are often rounded to tenths of a second
 FloatArray = NDArray[np.float64]
 Keys = tuple[Annotated[tuple[float, float], "[seconds, value]"], ...]
-
-
-class BeyondClipError(InputError):
-    """An element lies beyond the end of a clip of `duration` seconds."""
-
-    def __init__(self, what: str, duration: float, advice: str) -> None:
-        self.duration = duration
-        super().__init__(f"{what} lies beyond the clip, which lasts {duration:.2f} s; {advice}")
 
 
 def span_weights(times: ArrayLike, start: float, end: float, ease_s: float) -> FloatArray:
@@ -106,13 +97,7 @@ def _check_span(what: str, start: float, end: float) -> None:
 
 
 def check_keys(what: str, keys: Sequence[Sequence[float]], limits: tuple[float, float]) -> Keys:
-    """Keys as pairs of seconds and value.
-
-    Raises
-    ------
-    InputError
-        There are none or too many, a time is below 0 s or does not increase, or a value lies outside `limits`.
-    """
+    """Keys as pairs of seconds and value."""
     if not 0 < len(keys) <= MAX_KEYS:
         raise InputError(f"{what} has {len(keys)} keys; give 1 to {MAX_KEYS}")
     pairs = tuple((float(time), float(value)) for time, value in keys)
@@ -293,131 +278,3 @@ class Gains:
     def of(self, feature: str) -> float:
         """The factor of a feature, 1 where none was chosen."""
         return self.factors.get(check_feature(feature, GAIN_NAMES), 1.0)
-
-
-@dataclass(frozen=True, slots=True)
-class ElementKind:
-    """One kind of element of a timeline, and what is done with all elements of this kind.
-
-    Parameters
-    ----------
-    name
-        Field of the timeline, and key in its files.
-    record
-        Class of the elements. Spans have ``start`` and ``end``, curves ``keys``, and instants a ``time``.
-    owner
-        Field that tells lanes apart: spans of one lane may not overlap, and each lane has one curve. Empty where all
-        elements are in one lane.
-    noun
-        What messages call an element, or all of them, where lanes have no names.
-    """
-
-    name: str
-    record: type[Any]
-    shape: Literal["span", "curve", "instant"]
-    owner: str
-    noun: str = ""
-
-    def lane(self, element: Any) -> str:
-        """Lane of an element as messages name it."""
-        return str(getattr(element, self.owner)) if self.owner else self.noun
-
-    def ordered(self, elements: Iterable[Any]) -> tuple[Any, ...]:
-        """Elements in order of time; curves as they are.
-
-        Raises
-        ------
-        InputError
-            Two spans of one lane overlap, or a lane has two curves.
-        """
-        if self.shape == "instant":
-            return tuple(sorted(elements, key=lambda instant: instant.time))
-        if self.shape == "span":
-            elements = sorted(elements, key=lambda span: (span.start, span.end))
-        found, lanes = tuple(elements), dict[str, list[Any]]()
-        for one in found:
-            lanes.setdefault(self.lane(one), []).append(one)
-        for lane, members in lanes.items():
-            if self.shape == "curve" and len(members) > 1:
-                raise InputError(f"{lane} has {len(members)} curves of one kind; join their keys in one curve")
-            for before, after in pairwise(members):
-                if after.start < before.end:
-                    raise InputError(
-                        f"two spans of {lane} overlap: {_span_text(before, '-')} and {_span_text(after, '-')}; "
-                        "let one end before the other begins"
-                    )
-        return found
-
-    def merged(self, under: Sequence[Any], over: Sequence[Any]) -> tuple[Any, ...]:
-        """Elements of two timelines: spans `over` replace those `under` where they overlap, curves those of a lane."""
-        kept = list(under)
-        for top in over if self.shape != "instant" else ():
-            lane = [one for one in kept if self.lane(one) == self.lane(top)]
-            kept = [one for one in kept if self.lane(one) != self.lane(top)]
-            if self.shape == "span":
-                kept += [*self.restricted(lane, -1.0, top.start), *self.restricted(lane, top.end, math.inf)]
-        return (*kept, *over)
-
-    def shifted(self, elements: Sequence[Any], seconds: float) -> tuple[Any, ...]:
-        """The same elements, so many seconds later."""
-        if self.shape == "curve":
-            return tuple(replace(one, keys=tuple((at + seconds, to) for at, to in one.keys)) for one in elements)
-        times = ("start", "end") if self.shape == "span" else ("time",)
-        return tuple(replace(one, **{name: getattr(one, name) + seconds for name in times}) for one in elements)
-
-    def restricted(self, elements: Sequence[Any], start: float, end: float) -> tuple[Any, ...]:
-        """What of some elements lies in [start, end): parts of spans, and whole curves."""
-        if self.shape == "curve":
-            return tuple(elements)
-        if self.shape == "instant":
-            return tuple(one for one in elements if start <= one.time < end)
-        return tuple(
-            replace(one, start=max(one.start, start), end=min(one.end, end))
-            for one in elements
-            if one.start < end and one.end > start
-        )
-
-    def check_duration(self, elements: Sequence[Any], duration: float) -> None:
-        """Refuse spans and instants beyond a clip of `duration` seconds.
-
-        Raises
-        ------
-        BeyondClipError
-            One lies there.
-        """
-        for one in elements:
-            if self.latest_s(one) < duration:
-                continue
-            if self.shape == "span":
-                what = f"the span of {self.lane(one)} from {_span_text(one, ' to ')}"
-                raise BeyondClipError(what, duration, "shorten it" if one.start < duration else "let it begin earlier")
-            raise BeyondClipError(f"the {self.noun} at {one.time:g} s", duration, "move it")
-
-    def latest_s(self, element: Any) -> float:
-        """Second that a clip must go beyond to hold an element; below 0 for a curve, which any clip holds."""
-        if self.shape == "curve":
-            return -1.0
-        if self.shape == "instant":
-            return float(element.time)
-        return float(element.start if math.isinf(element.end) else max(element.start, element.end - MAX_OVERRUN_S))
-
-
-def _span_text(span: Any, between: str) -> str:
-    """Seconds of a span in a message."""
-    return f"{span.start:g} s to the end" if math.isinf(span.end) else f"{span.start:g}{between}{span.end:g} s"
-
-
-KINDS: Mapping[str, ElementKind] = MappingProxyType({
-    kind.name: kind
-    for kind in (
-        ElementKind("spans", StyleSpan, "span", "feature"),
-        ElementKind("expressions", ExpressionSpan, "span", "expression"),
-        ElementKind("gaze", GazeTarget, "span", "", "the gaze"),
-        ElementKind("listens", ListeningSpan, "span", "", "listening"),
-        ElementKind("nods", Nod, "instant", "", "nod"),
-        ElementKind("brow_raises", BrowRaise, "instant", "", "brow raise"),
-        ElementKind("strengths", StrengthCurve, "curve", "feature"),
-        ElementKind("curves", ExpressionCurve, "curve", "expression"),
-        ElementKind("edits", ChannelEdit, "curve", "channel"),
-    )
-})  # fmt: skip

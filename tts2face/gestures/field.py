@@ -64,11 +64,6 @@ class FieldOptions:
         Least number of frames between two candidates of one recording; with 1, every frame is a separate candidate.
     search_error
         Largest factor by which the distance of the candidates found exceeds the best ones; 1 for an exact search.
-
-    Raises
-    ------
-    InputError
-        A value has another type, or a number lies outside its range.
     """
 
     history: int = 10
@@ -177,15 +172,7 @@ class FieldSample:
 def build_field(
     values: Float32Array, prosody: Float32Array, lengths: NDArray[np.int32], options: FieldOptions
 ) -> Field:
-    """Index recorded motion (T, D) and its sound features (T, E); `lengths` (R,) are the frames of each recording.
-
-    Raises
-    ------
-    InputError
-        There are fewer weights `alpha` than sound features.
-    DataError
-        No recording is long enough.
-    """
+    """Index recorded motion (T, D) and its sound features (T, E); `lengths` (R,) are the frames of each recording."""
     if len(options.alpha) < prosody.shape[1]:
         raise InputError(f"{prosody.shape[1]} sound features need as many weights, not {len(options.alpha)}")
     starts = np.repeat(np.cumsum(lengths) - lengths, lengths).astype(np.int32)
@@ -360,7 +347,9 @@ def sample_field_moments(
     options, history = field.options, field.options.history
     motion = np.concatenate([state.motion, np.zeros((len(chances), state.offset.shape[1]), np.float32)])
     sound = np.concatenate([state.prosody, (prosody * field.weights).astype(np.float32)])
-    moments, offset, recent = np.zeros(len(chances), np.int64), state.offset.copy(), state.recent_jumps.copy()
+    moments = np.zeros(len(chances), np.int64)
+    offset = state.offset.copy()
+    recent = state.recent_jumps.copy()
     stiffness, fade = _spring(options.settle_s)
     generate_frames(
         _field_arrays(field),

@@ -115,14 +115,14 @@ class GazeProcess:
 
     def at(self, times: FloatArray) -> Floats:
         """Gaze (T, 2) in radians down and left at increasing times (T,); earlier fixations are forgotten."""
-        places, begins = (
-            np.array([one.place for one in self._fixations]),
-            np.array([one.time for one in self._fixations]),
+        places, starts = (
+            np.array([fixation.place for fixation in self._fixations]),
+            np.array([fixation.time for fixation in self._fixations]),
         )
         jumps = np.diff(places, axis=0, prepend=places[:1])
         lasts = np.minimum(SACCADE_S + SACCADE_S_PER_DEG * np.linalg.norm(jumps, axis=1), SHORTEST_S)
-        now = np.maximum(np.searchsorted(begins, times, side="right") - 1, 0)
-        share = smoothstep((times - begins[now]) / lasts[now])
+        now = np.maximum(np.searchsorted(starts, times, side="right") - 1, 0)
+        share = smoothstep((times - starts[now]) / lasts[now])
         self._fixations = self._fixations[max(0, *now[-1:] - 1) :]  # the last may still be approached
         return np.radians(places[now] + (share - 1.0)[:, None] * jumps[now]).astype(np.float32)
 
@@ -241,9 +241,9 @@ def microsaccades(times: FloatArray, seed: int) -> FloatArray:
         if cell < 0:
             continue
         draws = np.random.default_rng((seed, cell))
-        jumps, begin = draws.uniform() < JUMP_SHARE, CELL_S * (cell + draws.uniform(MARGIN, 1 - MARGIN))
+        jumps, start = draws.uniform() < JUMP_SHARE, CELL_S * (cell + draws.uniform(MARGIN, 1 - MARGIN))
         place = draws.normal(size=2) * SPREAD_RAD
         if jumps:
-            later = times >= begin
-            found[later] = place * np.exp(-(times[later, None] - begin) / DRIFT_S)
+            later = times >= start
+            found[later] = place * np.exp(-(times[later, None] - start) / DRIFT_S)
     return found

@@ -1,4 +1,4 @@
-"""What a listener does: nods and raised brows at the other's cues, or at intervals where nothing of the other is heard.
+"""Responses of a listener: nods and raised brows at the other's cues, or at intervals where nothing is heard.
 
 Cues are those of Ward and Tsukahara 2000 (Journal of Pragmatics 32) for English: a region of low pitch, after enough
 speech; and pauses, at which listeners respond as well (Dittmann and Llewellyn 1968).
@@ -11,13 +11,16 @@ from numpy.typing import NDArray
 
 from tts2face.gestures.blinks import PAUSE_DB
 from tts2face.gestures.elements import BrowRaise, ListeningSpan, Nod
-from tts2face.gestures.presentation import prosody_features, speech_intensity
+from tts2face.gestures.prosody import prosody_features, speech_intensity
 from tts2face.gestures.timeline import Timeline
 from tts2face.types import Waveform
 
 # Ward and Tsukahara 2000, section 4: pitch below its 26th percentile for 110 ms, after 700 ms of speech; the response
 # follows 700 ms later.
-LOW_PITCH_SHARE, LOW_PITCH_S, SPOKEN_S, WAIT_S = 0.26, 0.11, 0.7, 0.7
+LOW_PITCH_SHARE = 0.26
+LOW_PITCH_S = 0.11
+SPOKEN_S = 0.7
+WAIT_S = 0.7
 PAUSE_S = 0.3  # of silence that is a cue; shorter ones are closures of plosives
 # Between responses: their rule has .8 s, and responds far more often than their listeners did. Six to twelve a minute
 # look natural (Poppe, Truong and Heylen 2011, IVA).
@@ -27,7 +30,10 @@ STEP_S, CUE_RATE = 0.01, 16_000  # s, and Hz of the sound in which cues are look
 CELL_S, MARGIN = 9.0, 0.15
 NOD_SHARE, RAISE_SHARE = 0.75, 0.4  # of responses; one without a nod raises the brows
 NOD_SIZES, RAISE_SIZES = (0.35, 0.8), (0.4, 0.9)
-SECOND_NOD, SECOND_S, SECOND_SIZE = 0.5, 0.42, 0.6  # share of nods that a smaller one follows, and after how long
+# share of nods that a smaller one follows, and after how long
+SECOND_NOD = 0.5
+SECOND_S = 0.42
+SECOND_SIZE = 0.6
 LASTS_S = 1.0  # a response
 KEPT_S, LOOK_S = 5.0, 0.4  # of arriving sound in which cues are looked for (20 ms), and between two looks
 
@@ -50,12 +56,12 @@ def responses(times: Sequence[float], seed: int) -> Timeline:
     return Timeline(nods=tuple(nods), brow_raises=tuple(raises))
 
 
-def with_responses(timeline: Timeline, begin: float, end: float, seed: int) -> Timeline:
-    """A timeline with the responses that its listening spans have at intervals and that show in [begin, end)."""
+def with_responses(timeline: Timeline, start: float, end: float, seed: int) -> Timeline:
+    """A timeline with the responses that its listening spans have at intervals and that show in [start, end)."""
     spans = [span for span in timeline.listens if span.reacts]
     if not spans:
         return timeline
-    due = [time for time in drawn_times(begin - LASTS_S, end, seed) if any(_holds(span, time) for span in spans)]
+    due = [time for time in drawn_times(start - LASTS_S, end, seed) if any(_holds(span, time) for span in spans)]
     return responses(due, seed).merge(timeline)
 
 
@@ -63,12 +69,12 @@ def _holds(span: ListeningSpan, time: float) -> bool:
     return span.start <= time < span.end
 
 
-def drawn_times(begin: float, end: float, seed: int) -> list[float]:
-    """Times of responses at intervals in [begin, end), the same whatever the pieces of a clip."""
+def drawn_times(start: float, end: float, seed: int) -> list[float]:
+    """Times of responses at intervals in [start, end), the same whatever the pieces of a clip."""
     found = []
-    for cell in range(max(int(begin // CELL_S), 0), int(end // CELL_S) + 1):
+    for cell in range(max(int(start // CELL_S), 0), int(end // CELL_S) + 1):
         time = CELL_S * (cell + np.random.default_rng((seed, cell, 1)).uniform(MARGIN, 1.0 - MARGIN))
-        if begin <= time < end:
+        if start <= time < end:
             found.append(float(time))
     return found
 
@@ -87,7 +93,9 @@ def cue_times(sound: Waveform, *, last: float = -LEAST_GAP_S, earliest: float = 
     if not voiced.any():
         return []
     is_low = voiced & (pitch <= np.quantile(pitch[voiced], LOW_PITCH_SHARE))
-    spoken, low, silent = 0.0, 0.0, 0.0
+    spoken = 0.0
+    low = 0.0
+    silent = 0.0
     found: list[float] = []
     for time, talks, deep in zip(times.tolist(), speaks.tolist(), is_low.tolist(), strict=True):
         low = low + STEP_S if deep else 0.0
@@ -112,7 +120,10 @@ class PartnerSound:
     """
 
     def __init__(self, rate: int) -> None:
-        self._rate, self._n_samples, self._n_seen = rate, 0, 0  # numbers of samples at `CUE_RATE`
+        # numbers of samples at `CUE_RATE`
+        self._rate = rate
+        self._n_samples = 0
+        self._n_seen = 0
         self._kept = np.zeros(0, np.float32)
         self._last = -LEAST_GAP_S
 
@@ -123,12 +134,12 @@ class PartnerSound:
         self._kept = np.concatenate([self._kept, heard])[-round(KEPT_S * CUE_RATE) :]
 
     def new_cues(self) -> list[float]:
-        """Seconds from the end of the sound, 0 or more, of responses that have not been told yet."""
+        """Seconds from the end of the sound, 0 or more, of responses that are not returned yet."""
         seen, end = self._n_seen / CUE_RATE, self._n_samples / CUE_RATE
         if end - seen < LOOK_S:
             return []
-        begin, self._n_seen = end - len(self._kept) / CUE_RATE, self._n_samples
+        start, self._n_seen = end - len(self._kept) / CUE_RATE, self._n_samples
         sound = Waveform(self._kept, CUE_RATE)
-        found = [begin + time for time in cue_times(sound, last=self._last - begin, earliest=seen - begin)]
+        found = [start + time for time in cue_times(sound, last=self._last - start, earliest=seen - start)]
         self._last = found[-1] if found else self._last
         return [max(time - end, 0.0) for time in found]

@@ -28,7 +28,9 @@ class NoiseStream:
     def __init__(
         self, fields: GestureFields, *, style: str, seed: int, fps: float, seeds: Mapping[str, int] = NO_SEEDS
     ) -> None:
-        self._fields, self._style, self._fps = fields, fields.palette.require(style), fps
+        self._fields = fields
+        self._style = fields.palette.require(style)
+        self._fps = fps
         self._seeds = {name: seeds.get(name, seed) for name in fields.features}
         self._n_frames = 0
 
@@ -76,11 +78,11 @@ def blink_closure(times: NDArray[np.float64], rate: float, key: int) -> NDArray[
     cell = BLINK_DURATION_S / 2
     first = int(np.floor(times[0] / cell)) - 2
     numbers = np.arange(first, int(np.floor(times[-1] / cell)) + 1)
-    begins = numbers[(_hash_noise(numbers, key, 0) + 1) / 2 < rate * cell] * cell
+    starts = numbers[(_hash_noise(numbers, key, 0) + 1) / 2 < rate * cell] * cell
     shut = np.zeros(len(times))
-    nearby = np.searchsorted(times, np.add.outer(begins, (-cell, BLINK_DURATION_S + cell))).tolist()
-    for begin, (first, last) in zip(begins, nearby, strict=True):
-        distance = np.abs(times[first:last] - begin - BLINK_DURATION_S / 2) / (BLINK_DURATION_S / 2)
+    nearby = np.searchsorted(times, np.add.outer(starts, (-cell, BLINK_DURATION_S + cell))).tolist()
+    for start, (first, last) in zip(starts, nearby, strict=True):
+        distance = np.abs(times[first:last] - start - BLINK_DURATION_S / 2) / (BLINK_DURATION_S / 2)
         closure = np.where(distance < 1, 0.5 + 0.5 * np.cos(np.pi * distance), 0.0)
         shut[first:last] = np.maximum(shut[first:last], closure)
     return shut

@@ -26,21 +26,14 @@ from tts2face.gestures.field import (
     transfer_state,
 )
 from tts2face.gestures.gaze import GazeProcess, HeadFollower
-from tts2face.gestures.presentation import (
-    Emphasis,
-    FrameContext,
-    HeadPresentation,
-    Presentation,
-    find_accents,
-    prosody_features,
-    slow_scales,
-    speech_intensity,
-)
+from tts2face.gestures.head_presentation import HeadPresentation, find_accents, slow_scales
+from tts2face.gestures.presentation import Emphasis, FrameContext, Presentation
+from tts2face.gestures.prosody import prosody_features, speech_intensity
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.gaze import load_gaze
 from tts2face.models.palette import FEATURES, GESTURE_FPS, FeatureChange, Palette, Style
 from tts2face.numeric.arrays import interpolate_cubic
-from tts2face.sound.features import IntensityTrack
+from tts2face.sound.praat import IntensityTrack
 from tts2face.types import Waveform
 
 N_LOOKAHEAD_FRAMES = 2  # frames after a time that cubic interpolation needs
@@ -65,6 +58,26 @@ OPTIONS: Mapping[str, FieldOptions] = MappingProxyType(
 )
 Float32Array = NDArray[np.float32]
 GestureValues = Mapping[str, Float32Array]  # (T, k) values of each feature
+# A draw at every frame from the four nearest of all recorded frames, h = 10 preceding frames at 30 frames a second, no
+# bonus for the following frame, no memory of earlier draws, and recorded values shown as they are. The paper names
+# alpha and sigma but prints no values; both were chosen within the training recordings (decision 066). Its distance
+# is the sum over the h frames, that of a field their mean: the draw is the same with sigma h times as large.
+JU_2008 = FieldOptions(
+    history=10,
+    candidates=4,
+    alpha=(1.0, 1.0),
+    sigma=0.1,
+    stride=1,
+    continuity=1.0,
+    future=0,
+    settle_s=0.0,
+    memory=0,
+    apart=1,
+    search_error=1.0,
+)
+FIELD_OPTIONS: Mapping[str, Mapping[str, FieldOptions]] = MappingProxyType(
+    {"fields": OPTIONS, "ju2008": MappingProxyType(dict.fromkeys(FEATURES, JU_2008))}
+)
 
 
 @dataclass(slots=True, eq=False)
@@ -185,7 +198,9 @@ class GestureStream:
         fields.palette.require(style)
         self._fields, self._fps = fields, fps
         self._tracks = {name: _FeatureTrack(fields, name, style, seeds.get(name, seed)) for name in fields.features}
-        self._n_frames, self._style, self._follower = 0, style, HeadFollower()
+        self._n_frames = 0
+        self._style = style
+        self._follower = HeadFollower()
 
     def copy(self) -> "GestureStream":
         """A stream that continues as this one, independently of it."""
@@ -204,10 +219,10 @@ class GestureStream:
         timeline
             Styles, expressions, nods and gains, in seconds of the whole clip; all of them are applied.
         """
-        begin = self._n_frames / self._fps
+        start = self._n_frames / self._fps
         times = (self._n_frames + np.arange(n_frames)) / self._fps
         self._n_frames += n_frames
-        values, prosody = {}, _SoundFeatures(sound, begin, with_pitch=self._fields.with_pitch)
+        values, prosody = {}, _SoundFeatures(sound, start, with_pitch=self._fields.with_pitch)
         for name, track in self._tracks.items():
             track.extend(prosody, float(times[-1]), timeline)
             values[name] = self._fields.apply_timeline(name, track.at(times, timeline), times, timeline)
@@ -222,8 +237,10 @@ class GestureStream:
 class _SoundFeatures:
     """Prosodic features of a sound that starts at `begin` seconds, cached by the times of the request."""
 
-    def __init__(self, sound: Waveform, begin: float, *, with_pitch: bool) -> None:
-        self._sound, self._begin, self._with_pitch = sound, begin, with_pitch
+    def __init__(self, sound: Waveform, start: float, *, with_pitch: bool) -> None:
+        self._sound = sound
+        self._start = start
+        self._with_pitch = with_pitch
         self._found: dict[bytes, Float32Array] = {}
 
     @cached_property
@@ -233,14 +250,14 @@ class _SoundFeatures:
     @cached_property
     def accents(self) -> NDArray[np.float64]:
         """Seconds of the whole clip and strength of the accents (m, 2)."""
-        return np.add(find_accents(self._sound, self._intensity), [self._begin, 0.0])
+        return np.add(find_accents(self._sound, self._intensity), [self._start, 0.0])
 
     def at(self, times: NDArray[np.float64]) -> Float32Array:
         """(T, 1 or 2) as `prosody_features`."""
         key = times.tobytes()
         if key not in self._found:
             self._found[key] = prosody_features(
-                self._sound, times - self._begin, self._intensity, with_pitch=self._with_pitch
+                self._sound, times - self._start, self._intensity, with_pitch=self._with_pitch
             )
         return self._found[key]
 
@@ -249,7 +266,9 @@ class _FeatureTrack:
     """One feature of a clip: frames of its fields at times that follow the style's tempo."""
 
     def __init__(self, fields: GestureFields, feature: str, style: str, seed: int) -> None:
-        self._fields, self._feature, self._style = fields, feature, style
+        self._fields = fields
+        self._feature = feature
+        self._style = style
         self._generator = np.random.default_rng([seed, crc32(feature.encode())])
         self._source, self._first_chance = self._source_of(style), self._generator.random()
         self._state: FieldState | None = None  # before the first frame of a field
@@ -337,25 +356,3 @@ class _FeatureTrack:
 def style_median(style: Style, feature: str) -> Float32Array:
     """(k,) median of the recordings of a style's feature."""
     return np.asarray(np.median(style.motion[feature], axis=0), np.float32)
-
-
-# A draw at every frame from the four nearest of all recorded frames, h = 10 preceding frames at 30 frames a second, no
-# bonus for the following frame, no memory of earlier draws, and recorded values shown as they are. The paper names
-# alpha and sigma but prints no values; both were chosen within the training recordings (decision 066). Its distance
-# is the sum over the h frames, that of a field their mean: the draw is the same with sigma h times as large.
-JU_2008 = FieldOptions(
-    history=10,
-    candidates=4,
-    alpha=(1.0, 1.0),
-    sigma=0.1,
-    stride=1,
-    continuity=1.0,
-    future=0,
-    settle_s=0.0,
-    memory=0,
-    apart=1,
-    search_error=1.0,
-)
-FIELD_OPTIONS: Mapping[str, Mapping[str, FieldOptions]] = MappingProxyType(
-    {"fields": OPTIONS, "ju2008": MappingProxyType(dict.fromkeys(FEATURES, JU_2008))}
-)

@@ -1,8 +1,7 @@
 """The timeline of a clip: styles of each feature over time, expressions, nods and gains.
 
-Times are seconds on the clock of the whole clip; spans are half open.
-
-Parsers of styles, gains and expressions: ``brows=annoyed,head=delighted``, ``happy=0.6@1.2-3.4``.
+Times are seconds on the clock of the whole clip; spans are half open. Styles, gains and expressions are written as
+``brows=annoyed,head=delighted``, ``happy=0.6@1.2-3.4``.
 """
 
 import math
@@ -19,10 +18,8 @@ from lexicon.errors import InputError
 from lexicon.values.fields import check_fields
 from tts2face.gestures.elements import (
     GAIN_NAMES,
-    KINDS,
     BrowRaise,
     ChannelEdit,
-    ElementKind,
     ExpressionCurve,
     ExpressionSpan,
     FloatArray,
@@ -37,6 +34,7 @@ from tts2face.gestures.elements import (
     interpolate_keys,
     span_weights,
 )
+from tts2face.gestures.kinds import KINDS, ElementKind
 from tts2face.models.palette import EXPRESSIONS, FEATURES, Palette
 
 BLEND_S = 0.3  # transition between two styles; as long as a blink
@@ -198,8 +196,8 @@ class Timeline:
         """Millimetres (T,) by which raises lift the brows at T times; of overlapping ones the higher one applies."""
         seconds = np.atleast_1d(np.asarray(times, np.float64))
         height = np.zeros(len(seconds))
-        for one in self.brow_raises:
-            curve = one.size * BROW_RAISE_MM * interpolate_keys(seconds - one.time, BROW_RAISE_KEYS)
+        for raised in self.brow_raises:
+            curve = raised.size * BROW_RAISE_MM * interpolate_keys(seconds - raised.time, BROW_RAISE_KEYS)
             height = np.maximum(height, curve)
         return height
 
@@ -239,7 +237,7 @@ class Timeline:
     @property
     def latest_s(self) -> float:
         """Second that a clip must go beyond to hold all elements; below 0 where any clip does."""
-        seconds = [kind.latest_s(one) for name, kind in KINDS.items() for one in getattr(self, name)]
+        seconds = [kind.latest_s(element) for name, kind in KINDS.items() for element in getattr(self, name)]
         return max(seconds, default=-1.0)
 
     def check_duration(self, duration: float) -> None:

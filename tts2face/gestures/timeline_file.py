@@ -13,11 +13,12 @@ from lexicon.values.checks import format_value
 from lexicon.values.files import read_text
 from lexicon.values.json_text import LARGEST_JSON_BYTES, parse_json
 from lexicon.values.records import checked, errors_at
-from tts2face.gestures.elements import KINDS, Gains, StyleSpan, check_feature
+from tts2face.gestures.elements import Gains, StyleSpan, check_feature
+from tts2face.gestures.kinds import KINDS
 from tts2face.gestures.timeline import ALL_FEATURES, Timeline, expand_feature, parse_style
 from tts2face.models.palette import FEATURES
 
-PARTS = tuple(one.name for one in fields(Timeline))
+PARTS = tuple(part.name for part in fields(Timeline))
 _Written: Any = make_dataclass("_Written", [(part, Any, None) for part in PARTS])
 _Span = make_dataclass("_Span", [("feature", str), ("style", str), ("start", float), ("end", float, math.inf)])
 _SPANS: Any = GenericAlias(tuple, (_Span, ...))
@@ -62,7 +63,7 @@ def timeline_json(timeline: Timeline) -> dict[str, Any]:
 
 def _element_json(element: Any) -> dict[str, Any]:
     """Fields of an element; JSON has no infinite end."""
-    parts = {one.name: getattr(element, one.name) for one in fields(element)}
+    parts = {field.name: getattr(element, field.name) for field in fields(element)}
     if "keys" in parts:
         parts["keys"] = [list(pair) for pair in parts["keys"]]
     return {name: part for name, part in parts.items() if part != math.inf}
@@ -73,7 +74,7 @@ def _parse_part(part: str, content: Any, place: str) -> Any:
         return checked(dict[str, int], content, place)
     if part == "spans":
         return tuple(
-            chain(*(_spans_of(one, f"{place}[{at}]") for at, one in enumerate(checked(_SPANS, content, place))))
+            chain(*(_spans_of(written, f"{place}[{at}]") for at, written in enumerate(checked(_SPANS, content, place))))
         )
     if part in KINDS:
         elements: Any = GenericAlias(tuple, (KINDS[part].record, ...))

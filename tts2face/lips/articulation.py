@@ -2,22 +2,18 @@
 
 The steps follow retargeting and change the shape weights where the phones of the clip demand it. They use the face's
 own geometry, so that they are the same for every talker and language.
-
-Tracks of visible articulation: targets of phones in time, with transitions between them.
-
-Last steps of articulation: limited speed of the mouth, and lips that meet in bilabials and pauses.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lexicon.articulation import TARGET_NAMES, VisibleTarget, visible_targets
-from lexicon.sequence import SILENCE, PhoneSequence
+from lexicon.sequence import PhoneSequence
 from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.face.mouth import MIDDLE_PAIR, LipConstraints, build_lip_constraints
+from tts2face.lips.articulation_tracks import FloatArray, articulation_tracks, pause_closure, seconds_from_closure
+from tts2face.lips.mouth_limits import close_lips, largest_gaps, limit_speed
 from tts2face.lips.teeth_and_tongue import IncisorContact, Tongue, build_incisor_contact, build_tongue, incisor_edge
 from tts2face.models.face import Face
 from tts2face.models.face_schema import WIDE_OPEN
@@ -28,184 +24,9 @@ from tts2face.models.landmarks import (
     OUTER_LIP_UPPER,
     inner_lip_gaps,
 )
-from tts2face.numeric.arrays import ordered_product, smooth_gaussian, smoothstep
+from tts2face.numeric.arrays import ordered_product, smoothstep
 from tts2face.source import CLEAR, NATURAL
 from tts2face.types import Trajectory
-
-FloatArray = NDArray[np.float64]
-
-CLOCK_HZ = 200.0  # rate at which tracks are computed; they are interpolated at the frames
-HOLD_SHARE = 0.5  # share of a phone, or of the half of a diphthong, in which its target is held
-MAX_TRANSITION_S = 0.16  # lips round at most this long before a rounded phone is held (Perkell and Matthies 1992)
-SMOOTHING_S = 0.012  # standard deviation of a Gaussian; short phones of fast speech fall short of their targets
-SMOOTHING_REACH = int(4 * SMOOTHING_S * CLOCK_HZ)
-# Transition to and from a contact of the lip, which may begin while a neighbouring phone is held, and of the tongue.
-CONTACT_EASE_S, TONGUE_EASE_S = 0.1, 0.07
-LIP_CONTACTS = ("lip_contact", "incisor_contact")
-EASES_S = {"tongue_out": TONGUE_EASE_S, "tongue_up": TONGUE_EASE_S}
-MIN_CLOSURE_S = 0.04  # bilabials are closed at least this long: a frame lies within at 25 frames/s
-# Lips stay as they are in shorter pauses, and meet in longer ones: those of which most recorded ones have a frame with
-# closed lips (.17 to .4 s: 45 %, longer: 72 %; docs/decisions/190-pauses.md).
-SHORT_PAUSE_S, LONG_PAUSE_S = 0.3, 0.4
-CLOSING_S, PARTING_S = 0.12, 0.40  # longest closing after speech, and parting before it, in which speakers breathe in
-PARTING_SHARE = 0.4  # of a short pause
-
-
-def articulation_tracks(phones: PhoneSequence, times: FloatArray) -> Mapping[str, FloatArray]:
-    """Tracks (T,) of each field of `lexicon.articulation.VisibleTarget` at T times in seconds, from 0 to 1.
-
-    Notes
-    -----
-    The target of a phone is held in its middle; phones without a target of their own belong to the transition between
-    their neighbours (look-ahead model of coarticulation, Henke 1966), which is limited to `MAX_TRANSITION_S`.
-    """
-    halves = _halves(phones)
-    clock = np.arange(int(np.ceil(max(phones.end, times[-1], 0.0) * CLOCK_HZ)) + 2) / CLOCK_HZ
-    tracks = {}
-    for name in TARGET_NAMES:
-        keys = [(start, end, getattr(target, name)) for start, end, target in halves]
-        if name in LIP_CONTACTS:
-            tracks[name] = _contact_track([(start, end) for start, end, value in keys if value], times)
-            continue
-        raw = _keyframe_track([key for key in keys if key[2] is not None], clock, EASES_S.get(name, MAX_TRANSITION_S))
-        tracks[name] = np.interp(times, clock, smooth_gaussian(raw, SMOOTHING_S * CLOCK_HZ, SMOOTHING_REACH))
-    return tracks
-
-
-def seconds_from_closure(phones: PhoneSequence, times: FloatArray) -> FloatArray:
-    """Time (T,) in seconds to the nearest closed span of a bilabial, 0 within it; infinite without bilabials.
-
-    Each is closed in its middle, for at least `MIN_CLOSURE_S` and one frame.
-    """
-    frame_s = float(times[1] - times[0]) if len(times) > 1 else 0.0
-    nearest = np.full(len(times), np.inf)
-    for label, start, end in zip(phones.phones, phones.edges[:-1], phones.edges[1:], strict=True):
-        if visible_targets(label)[0].lip_contact > 0:
-            held_s = max(HOLD_SHARE * (end - start), MIN_CLOSURE_S, frame_s)
-            nearest = np.minimum(nearest, np.maximum(np.abs(times - (start + end) / 2) - held_s / 2, 0.0))
-    return nearest
-
-
-def pause_closure(phones: PhoneSequence, times: FloatArray) -> FloatArray:
-    """Closure (T,) of the lips in pauses: 1 where they meet, 0 in speech and in pauses below `SHORT_PAUSE_S`.
-
-    Silence before the first phone and after the last counts as long.
-    """
-    closure = np.zeros(len(times))
-    labels, edges = phones.phones, phones.edges
-    first = 0
-    while first < len(labels):
-        last = first
-        while last + 1 < len(labels) and labels[last + 1] == labels[first] == SILENCE:
-            last += 1
-        if labels[first] == SILENCE:
-            start = -np.inf if first == 0 else float(edges[first])
-            end = np.inf if last + 1 == len(labels) else float(edges[last + 1])
-            size = smoothstep(np.array([end - start]), SHORT_PAUSE_S, LONG_PAUSE_S)[0]
-            parting = min(PARTING_S, PARTING_SHARE * (end - start))
-            closed = smoothstep((times - start) / CLOSING_S) * smoothstep((end - times) / parting)
-            closure = np.maximum(closure, size * closed)
-        first = last + 1
-    return closure
-
-
-def _halves(phones: PhoneSequence) -> list[tuple[float, float, VisibleTarget]]:
-    """Held span and target of each phone, two for a phone with two halves, one for a pause."""
-    found = []
-    for label, start, end in zip(phones.phones, phones.edges[:-1], phones.edges[1:], strict=True):
-        first, last = visible_targets(label)
-        parts = [(first, start, end)] if first == last else [(first, start, (start + end) / 2)]
-        if first != last:
-            parts.append((last, (start + end) / 2, end))
-        for target, begin, finish in parts:
-            margin = 0.0 if label == SILENCE else (1.0 - HOLD_SHARE) / 2 * (finish - begin)
-            found.append((float(begin + margin), float(finish - margin), target))
-    return found
-
-
-def _contact_track(held: list[tuple[float, float]], times: FloatArray) -> FloatArray:
-    """Contact (T,): 1 in held spans, with transitions of `CONTACT_EASE_S` on both sides."""
-    track = np.zeros(len(times))
-    for start, end in held:
-        beyond = np.maximum(np.maximum(start - times, times - end), 0.0)
-        track = np.maximum(track, smoothstep(beyond, CONTACT_EASE_S, 0.0))
-    return track
-
-
-def _keyframe_track(keys: list[tuple[float, float, float]], clock: FloatArray, longest: float) -> FloatArray:
-    """Values at the clock: each held within its span, with cosine-like transitions of at most `longest` seconds.
-
-    A longer transition rests at the smaller of its two values.
-    """
-    track = np.zeros(len(clock))
-    for number, (start, end, value) in enumerate(keys):
-        track[(clock >= start) & (clock <= end)] = value
-        if number == 0:
-            continue
-        _, before, previous = keys[number - 1]
-        between = (clock > before) & (clock < start)
-        low = min(previous, value)
-        falling = previous + (low - previous) * smoothstep(clock[between] - before, 0.0, min(longest, start - before))
-        rising = low + (value - low) * smoothstep(clock[between] - start, -min(longest, start - before), 0.0)
-        track[between] = np.maximum(falling, rising)
-    return track
-
-
-# Largest change of a shape's weight per second, .3 per 1/60 s; closing the lips afterwards adds a little. The fastest
-# score of the mouth in 14 recordings of GRID s1 (mouthPucker) changes by .34 per 1/60 s (99.9th percentile), that of
-# the Live Link capture (mouthFunnel) by .25.
-LARGEST_SPEED_PER_S = 18.0
-# Speed at which the lips of a mouth of 50 mm open or close (99.9th percentile of GRID s1: 265 and 310 mm/s), and the
-# time in which they reach half of it.
-LIP_SPEED_MM_PER_S, LIP_ONSET_S = 300.0, 0.01
-FIRM_POWER = 6  # of the smooth minimum of a gap and its bound: a bound of twice the gap lowers it by .3 %
-LEAST_CHANGE_MM = 1e-4  # of a gap; frames that would change less are unchanged
-
-
-def limit_speed(values: FloatArray, fps: float) -> FloatArray:
-    """Values (T, K) whose changes from frame to frame are limited; values that change slowly enough are unchanged.
-
-    Notes
-    -----
-    The mean of the least function above the values, and of the greatest below them, whose slopes are within the limit.
-    """
-    largest = LARGEST_SPEED_PER_S / fps
-    above, below = values.copy(), values.copy()
-    for order in (range(1, len(values)), range(len(values) - 2, -1, -1)):
-        back = -1 if order.step > 0 else 1
-        for t in order:
-            above[t] = np.maximum(above[t], above[t + back] - largest)
-            below[t] = np.minimum(below[t], below[t + back] + largest)
-    return (above + below) / 2
-
-
-def largest_gaps(seconds: FloatArray, mouth_share: float) -> FloatArray:
-    """Largest gaps (T,), mm, of lips that touch in `seconds` (T,), on a mouth of a share of the default head's."""
-    far = np.minimum(seconds, 1e3)
-    return mouth_share * LIP_SPEED_MM_PER_S * far * far / (far + LIP_ONSET_S)
-
-
-def close_lips(
-    mouth: LipConstraints, speech: FloatArray, rest_gaps: FloatArray, bounds: FloatArray, closure: FloatArray
-) -> FloatArray:
-    """Speech (T, K) whose lip gaps are within bounds (T,), mm, and smaller by shares `closure` (T,).
-
-    All gaps of a frame shrink by the same share. Overlapping lips, whose gap is negative, stay as they are.
-
-    Parameters
-    ----------
-    rest_gaps : (P,)
-        Gaps of the face at rest that are to be closed, mm.
-    """
-    displaced = ordered_product(speech, mouth.gaps.T)
-    gaps = np.maximum(displaced + rest_gaps, 0.0)
-    widest = gaps.max(axis=1)
-    ratio = np.divide(widest, bounds, out=np.full(len(widest), np.inf), where=bounds > 0)
-    kept = (1.0 - closure) * (1.0 + ratio**FIRM_POWER) ** (-1.0 / FIRM_POWER)
-    changed = (1.0 - kept) * widest > LEAST_CHANGE_MM
-    targets = displaced - (1.0 - kept)[:, None] * gaps
-    return mouth.solve(speech, np.zeros_like(speech), targets, changed)
-
 
 DEFAULT_ARTICULATION = CLEAR  # of a mesh: rounding is not seen otherwise (docs/decisions/102-articulation.md)
 # Targets of clear articulation on a mouth of `HEAD_MOUTH_MM`; sizes on other faces are in proportion to the mouth.
@@ -224,7 +45,9 @@ FLARED_SHAPES = {"mouthPucker": 0.85, "mouthFunnel": 0.3}
 SPREAD_SHAPES = {"mouthStretchLeft": 0.5, "mouthStretchRight": 0.5, "mouthSmileLeft": 0.5, "mouthSmileRight": 0.5}
 LOWERED_SHAPES = {"mouthLowerDownLeft": 1.0, "mouthLowerDownRight": 1.0}
 # Drop of the jaw and gap of the lips at which the tip of the tongue is seen between the teeth; largest weight for it.
-DENTAL_DROP_MM, DENTAL_GAP_MM, LARGEST_LOWERED = 5.5, 8.0, 0.8
+DENTAL_DROP_MM = 5.5
+DENTAL_GAP_MM = 8.0
+LARGEST_LOWERED = 0.8
 OUTER_UPPER_MID, OUTER_LOWER_MID = OUTER_LIP_UPPER[5], OUTER_LIP_LOWER[5]
 
 
@@ -314,7 +137,9 @@ class Articulator:
 
     def _parting(self, speech: FloatArray, share: FloatArray) -> FloatArray:
         """Weights (T, K) that part teeth and lips for the tip of the tongue, times shares (T,)."""
-        size, jaw, lip = self.rest_width / HEAD_MOUTH_MM, self.directions["open"], self.directions["lowered"]
+        size = self.rest_width / HEAD_MOUTH_MM
+        jaw = self.directions["open"]
+        lip = self.directions["lowered"]
         dropped = ordered_product(speech, jaw) * self._gap_by_jaw()
         drop = np.clip(DENTAL_DROP_MM * size - dropped, 0.0, DENTAL_DROP_MM * size)
         gap = ordered_product(speech, self.mouth.gaps[MIDDLE_PAIR]) + drop

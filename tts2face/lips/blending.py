@@ -11,12 +11,17 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from tts2face.lips.options import SynthesisOptions
-from tts2face.lips.tokens import Targets, Tokens, read_motion
+from tts2face.lips.targets import Targets
+from tts2face.lips.tokens import Tokens, read_motion
 from tts2face.numeric.filters import gaussian
 from tts2face.numeric.kernels import inlined_kernel, kernel
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+CLOCK_HZ = 100.0  # rate at which motion is computed; lip motion is below 15 Hz
+N_KNOTS = 8  # samples per phone; 10 are no better (docs/decisions/007-exemplar-method.md)
+ALIGN_BAND = 1  # maximum warp in knots relative to the best exemplar; 2 lose .002 of r opening
+MIN_DEVIATION = 0.15  # lower limit of the deviation between exemplars, relative to a parameter's spread
 
 
 def warp_path(cost: NDArray[np.floating], *, band: int | None = None) -> IntArray:
@@ -33,11 +38,6 @@ def warp_path(cost: NDArray[np.floating], *, band: int | None = None) -> IntArra
     -------
     (L, 2)
         Frame pairs from (0, 0) to (N - 1, M - 1), neither index falling.
-
-    Raises
-    ------
-    InputError
-        `cost` is empty, negative or not finite, or the band does not reach the last pair.
 
     Notes
     -----
@@ -106,7 +106,9 @@ def _cheapest_path(cost, band, space):  # type: ignore[no-untyped-def]
                 best, step = total[i, j - 1], 2
             total[i, j] = best + cost[i, j]
             came[i, j] = step
-    i, j, at = n - 1, m - 1, n + m - 2
+    i = n - 1
+    j = m - 1
+    at = n + m - 2
     path[at, 0], path[at, 1] = i, j
     while i > 0 or j > 0:
         step = came[i, j]
@@ -143,12 +145,6 @@ def warp_to_reference(source, reference, scale, band, out, space):  # type: igno
         part = time - low
         for k in range(n_dims):
             out[j, k] = (1.0 - part) * source[low, k] + part * source[low + 1, k]
-
-
-CLOCK_HZ = 100.0  # rate at which motion is computed; lip motion is below 15 Hz
-N_KNOTS = 8  # samples per phone; 10 are no better (docs/decisions/007-exemplar-method.md)
-ALIGN_BAND = 1  # maximum warp in knots relative to the best exemplar; 2 lose .002 of r opening
-MIN_DEVIATION = 0.15  # lower limit of the deviation between exemplars, relative to a parameter's spread
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -206,7 +202,9 @@ def _accumulate_average(corpus, plan, sums, space):  # type: ignore[no-untyped-d
     chosen, weights, knots, scale, band = plan
     mean, square = sums
     pieces, warp = space
-    best, piece, laid = pieces[0], pieces[1], pieces[2]
+    best = pieces[0]
+    piece = pieces[1]
+    laid = pieces[2]
     for n in range(len(chosen)):
         for e in range(chosen.shape[1]):
             if chosen[n, e] < 0 or weights[n, e] == 0.0:

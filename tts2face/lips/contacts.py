@@ -112,7 +112,9 @@ def find_contacts(
     other exemplars are excluded because a tenth of the recorded contacts falls between two frames or is missed by the
     alignment.
     """
-    tokens, chosen, weights = exemplars.tokens, exemplars.chosen, exemplars.weights
+    tokens = exemplars.tokens
+    chosen = exemplars.chosen
+    weights = exemplars.weights
     rows, squared = np.zeros(chosen.shape, np.int64), np.full(chosen.shape, np.inf)
     corpus = (tokens.frames, tokens.first_frame, tokens.utterance, tokens.spans, tokens.fps)
     _closest_rows(corpus, chosen, (gap.rest, gap.basis), rows, squared)

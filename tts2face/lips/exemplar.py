@@ -1,8 +1,7 @@
 """Lip synthesis from phones: selection and blending of recorded exemplars, with rest in silence.
 
-Appearance parameters from phones, blended from the same exemplars as the lip motion.
-
-Exclusion of single recorded tokens from synthesis, such as those that were tracked wrongly.
+Appearance parameters are blended from the same exemplars as the lip motion; recorded tokens that were tracked wrongly
+can be excluded.
 """
 
 from collections.abc import Sequence
@@ -17,6 +16,7 @@ from tts2face.lips import blending
 from tts2face.lips.contacts import ChosenExemplars, LipGap, enforce_contacts, find_contacts, shown_contact
 from tts2face.lips.options import ExcludedToken, SynthesisOptions
 from tts2face.lips.similarity import PhoneSimilarity, phone_similarity, token_samples
+from tts2face.lips.targets import Targets, build_targets, target_phones
 from tts2face.lips.token_search import (
     ContextIndex,
     TokenQuery,
@@ -26,7 +26,7 @@ from tts2face.lips.token_search import (
     context_weights,
     log_durations,
 )
-from tts2face.lips.tokens import Targets, Tokens, build_targets, collect_tokens, phone_contexts, target_phones
+from tts2face.lips.tokens import Tokens, collect_tokens, phone_contexts
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import Talker, require_appearance, speech_channels
@@ -44,6 +44,8 @@ NETWORK_HZ = 50.0  # rate at which the networks are evaluated; their input chang
 NEAR_CONTEXT, FAR_CONTEXT = 0.2, 1.1
 MIN_EASE_S = 0.06  # transition from and to rest if a clip begins or ends within speech
 DEFAULT_OPTIONS = SynthesisOptions()
+N_BLENDED_APPEARANCES = 3  # exemplars; more of them blur teeth and tongue (docs/decisions/032-own-face.md)
+MAX_START_CHANGE_S = 0.001  # times of tokens are written with four decimals
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -99,8 +101,8 @@ def mean_speaking_pose(talker: Talker) -> NDArray[np.float32]:
         sounding = [at for at, label in enumerate(utterance.phones.phones) if label != SILENCE]
         if sounding:
             edges = utterance.phones.edges
-            begin, end = (int(edges[at] * talker.fps) for at in (sounding[0], sounding[-1] + 1))
-            parts.append(utterance.shape[begin : end + 1, :n_speech])
+            start, end = (int(edges[at] * talker.fps) for at in (sounding[0], sounding[-1] + 1))
+            parts.append(utterance.shape[start : end + 1, :n_speech])
     frames = np.concatenate(parts) if parts else np.zeros((1, n_speech))
     return np.asarray(frames.mean(axis=0, dtype=np.float64), np.float32)
 
@@ -199,7 +201,9 @@ def _blend_motion(
     selection: TokenSelection, exemplars: ExemplarModel, n_instants: int, yield_turn: YieldTurn
 ) -> NDArray[np.float32]:
     """(n, D) motion at the instants of the clock."""
-    targets, found, options = selection.targets, selection.found, selection.options
+    targets = selection.targets
+    found = selection.found
+    options = selection.options
     weights = blending.exemplar_weights(found.scores, options.sharpness)
     pieces = blending.average_tokens(exemplars.tokens, found.tokens, weights, exemplars.spread, options)
     joined, is_covered = blending.join_averages(pieces, targets, n_instants, options)
@@ -284,8 +288,8 @@ def rest_weights(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[n
 def is_pause(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(T,) whether T times in seconds lie in silence between phones that is shorter than `BREAK_S`."""
     starts, ends, next_start = _speech_around(phones, times)
-    begins, ended = np.append(starts, np.inf)[next_start], np.concatenate([[-np.inf], ends])[next_start]
-    return np.asarray((ended <= times) & (begins - ended < BREAK_S))
+    onsets, ended = np.append(starts, np.inf)[next_start], np.concatenate([[-np.inf], ends])[next_start]
+    return np.asarray((ended <= times) & (onsets - ended < BREAK_S))
 
 
 def _speech_around(
@@ -295,9 +299,6 @@ def _speech_around(
     sounding = np.array([label != SILENCE for label in phones.phones])
     starts = phones.edges[:-1][sounding]
     return starts, phones.edges[1:][sounding], np.searchsorted(starts, times, side="right")
-
-
-N_BLENDED_APPEARANCES = 3  # exemplars; more of them blur teeth and tongue (docs/decisions/032-own-face.md)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -373,9 +374,6 @@ def _silent_frames(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[
     return np.asarray(labels[np.clip(at, 0, len(labels) - 1)])
 
 
-MAX_START_CHANGE_S = 0.001  # times of tokens are written with four decimals
-
-
 def exclude_tokens(exemplars: ExemplarModel, excluded: Sequence[ExcludedToken]) -> ExemplarModel:
     """The exemplars without some tokens; their motion still serves the overlap of their neighbours.
 
@@ -386,13 +384,13 @@ def exclude_tokens(exemplars: ExemplarModel, excluded: Sequence[ExcludedToken]) 
     """
     tokens = exemplars.tokens
     is_kept = np.ones(len(tokens), np.bool_)
-    for one in excluded:
-        if one.utterance not in exemplars.names:
-            raise InputError(f"the talker has no recording {one.utterance!r} of which a phone could be excluded")
-        is_here = tokens.utterance == exemplars.names.index(one.utterance)
-        at = np.flatnonzero(is_here & (np.abs(tokens.spans[:, 1] - one.start) <= MAX_START_CHANGE_S))
+    for token in excluded:
+        if token.utterance not in exemplars.names:
+            raise InputError(f"the talker has no recording {token.utterance!r} of which a phone could be excluded")
+        is_here = tokens.utterance == exemplars.names.index(token.utterance)
+        at = np.flatnonzero(is_here & (np.abs(tokens.spans[:, 1] - token.start) <= MAX_START_CHANGE_S))
         if not len(at):
-            raise InputError(f"no phone of the recording {one.utterance} begins at {one.start:g} s; check the time")
+            raise InputError(f"no phone of the recording {token.utterance} begins at {token.start:g} s; check the time")
         is_kept[at] = False
     for number in np.unique(tokens.phone[~is_kept]):
         if not is_kept[tokens.phone == number].any():

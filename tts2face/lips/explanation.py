@@ -1,23 +1,13 @@
-"""Explanation of synthesised lip motion: the recorded tokens used for each phone.
-
-Outlines of lips, recorded or made, for drawing.
-
-Measures of the similarity of two motions of the lips, as functions of arrays.
-"""
+"""Explanation of synthesised lip motion: the recorded tokens used for each phone."""
 
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lexicon.errors import InputError
-from lexicon.sequence import DOUBTFUL, SILENCE, PhoneSequence
-from tts2face.lips.blending import exemplar_weights, frame_distances, path_cost, warp_path
+from lexicon.sequence import DOUBTFUL, SILENCE
+from tts2face.lips.blending import exemplar_weights
 from tts2face.lips.exemplar import ExemplarModel, TokenSelection
-from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, OUTER_LIP_LOWER, OUTER_LIP_UPPER
-from tts2face.models.talker import Talker
-from tts2face.numeric.arrays import interpolate_columns
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +47,10 @@ class PhoneExplanation:
 
 def explain_selection(selection: TokenSelection, exemplars: ExemplarModel) -> tuple[PhoneExplanation, ...]:
     """Recorded tokens used for each phone of a selection."""
-    phones, targets, found, options = selection.phones, selection.targets, selection.found, selection.options
+    phones = selection.phones
+    targets = selection.targets
+    found = selection.found
+    options = selection.options
     weights = exemplar_weights(found.scores, options.sharpness)
     padded = (SILENCE,) * options.context + targets.labels + (SILENCE,) * options.context
     shown = []
@@ -101,95 +94,3 @@ def explanation_text(shown: tuple[PhoneExplanation, ...], *, n_tokens: int = 5) 
             for used in phone.tokens[:n_tokens]
         ]
     return "\n".join(lines) + "\n"
-
-
-OUTER = (*OUTER_LIP_UPPER, *reversed(OUTER_LIP_LOWER[1:-1]))  # from the person's right corner over the upper lip
-INNER = (*INNER_LIP_UPPER, *reversed(INNER_LIP_LOWER[1:-1]))
-N_INSTANTS = 5  # of a phone that are drawn
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LipOutline:
-    """Closed outlines (20, 2) of the lips at one instant, seen from the front: mm to the right and down."""
-
-    outer: NDArray[np.float32]
-    inner: NDArray[np.float32]
-
-
-def lip_outlines(landmarks: NDArray[np.floating], rest: NDArray[np.floating]) -> tuple[LipOutline, ...]:
-    """Outlines of landmarks (T, 478, 3) of one face, mm.
-
-    The middle is that of the mouth's corners in `rest` (478, 3), so that outlines of several instants can be compared.
-    """
-    flip = np.array([1.0, -1.0])  # y is up in landmarks
-    points, still = landmarks[..., :2] * flip, rest[:, :2] * flip
-    middle = (still[OUTER[0]] + still[OUTER[len(OUTER_LIP_UPPER) - 1]]) / 2
-    return tuple(
-        LipOutline((face[list(OUTER)] - middle).astype(np.float32), (face[list(INNER)] - middle).astype(np.float32))
-        for face in points
-    )
-
-
-def token_outlines(talker: Talker, token: UsedToken, n_instants: int = N_INSTANTS) -> tuple[LipOutline, ...]:
-    """Outlines at equally spaced instants of a recorded token, from its beginning to its end, around its mean mouth.
-
-    Raises
-    ------
-    InputError
-        The talker has no such utterance.
-    """
-    utterance = next((one for one in talker.utterances if one.name == token.utterance), None)
-    if utterance is None:
-        raise InputError(f"the talker has no recording {token.utterance!r}; build the explanation with the same talker")
-    times = np.linspace(token.start, token.end, n_instants)
-    frames = np.arange(len(utterance.shape)) / talker.fps
-    shape = interpolate_columns(utterance.shape, frames, np.clip(times, 0.0, frames[-1]))
-    return lip_outlines(talker.model.shapes(shape), talker.model.mean)
-
-
-SPEECH_MARGIN_S = 0.1  # compared from this long before the first phone to this long after the last
-DTW_BAND_S = 0.12  # half width of the warping band: lead or lag of synthesis without cost
-TIME_TOLERANCE_S = 1e-6  # a frame on an edge counts, in spite of rounding
-
-Values = NDArray[np.floating]
-
-
-def speech_frames(phones: PhoneSequence, n_frames: int, fps: float) -> slice:
-    """Frames from `SPEECH_MARGIN_S` before the first sounding phone to as much behind the last.
-
-    Raises
-    ------
-    InputError
-        All phones are silence.
-    """
-    sounding = [at for at, label in enumerate(phones.phones) if label != SILENCE]
-    if not sounding:
-        raise InputError("an utterance without speech cannot be evaluated; remove it")
-    start = phones.edges[sounding[0]] - SPEECH_MARGIN_S - TIME_TOLERANCE_S
-    end = phones.edges[sounding[-1] + 1] + SPEECH_MARGIN_S + TIME_TOLERANCE_S
-    times = np.arange(n_frames) / fps
-    return slice(int(np.searchsorted(times, start)), int(np.searchsorted(times, end, side="right")))
-
-
-def pearson(one: Values, other: Values) -> float:
-    """Pearson's r of two series (T,); NaN where one of them is constant."""
-    a, b = one - one.mean(dtype=np.float64), other - other.mean(dtype=np.float64)
-    norm = float(np.sqrt((a @ a) * (b @ b)))
-    return float(a @ b) / norm if norm > 1e-9 * len(a) else float("nan")
-
-
-def correlation(real: Values, synthesised: Values) -> float:
-    """Pearson's r of two series (T,); 0 where one of them is constant."""
-    return float(np.nan_to_num(pearson(real, synthesised)))
-
-
-def range_ratio(real: Values, synthesised: Values) -> float:
-    """Standard deviation of the synthesised series over that of the real one; 1 is equal articulation."""
-    return float(synthesised.std(dtype=np.float64) / real.std(dtype=np.float64))
-
-
-def warping_cost(real: Values, synthesised: Values, spread: Values, band: int | None) -> float:
-    """Mean distance of motions (T, D) and (U, D) in units of `spread` (D,), along the cheapest warp within a band."""
-    cost = frame_distances(real / spread, synthesised / spread)
-    path = warp_path(cost, band=band)
-    return path_cost(cost, path) / len(path)

@@ -40,7 +40,7 @@ JAW_GAP_MM = 3.0  # lip gap from which the jaw follows its score in full; on clo
 # Scores between which the weight of a logit grows with its precision, s (1 - s): where a score hardly responds to the
 # shapes, as that of the jaw behind nearly closed lips, a logit of it would move them without limit.
 PRECISION_LIMITS = (0.01, 0.5)
-LOW_SCORE = 0.02  # scores below it are not told apart
+LOW_SCORE = 0.02  # scores below it count as equal
 SCORE_LIMITS = (0.01, 0.97)  # of target scores, so that their logits are finite
 REST_TOLERANCE = 0.08  # difference of the scores at rest that vanishes during speech; more is a person's build
 REST_REACH = 0.5  # distance from rest, in standard deviations of speech, at which it has fallen to 1 / e

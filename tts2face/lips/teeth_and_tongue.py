@@ -35,6 +35,15 @@ EDGE_BELOW_LIP, EDGE_BEHIND_LIP = 0.055, 0.085
 PLAUSIBLE_BELOW, PLAUSIBLE_BEHIND = (-0.02, 0.14), (-0.02, 0.3)
 SHOWN_SHARE = 0.03  # of the mouth's width: least distance of the upper lip, which shows the teeth
 COVER_SHARE, AHEAD_SHARE = 0.03, 0.012  # of the mouth's width, by which the lip covers the edge and lies before it
+TONGUE_OUT, TONGUE_UP = "tongueOut", "tongueUp"
+TIP_SHARE = 0.9  # of the largest displacement by a shape: vertices that move more are the tip
+# Relative to the mouth's width: the tip ends before the edge of the upper incisors, or is seen below it.
+OUT_BEFORE_EDGE, UP_BELOW_EDGE = 0.005, 0.065
+LARGEST_OUT, LARGEST_UP = 0.5, 0.9
+OUT_GAPS = (
+    0.01,
+    0.06,
+)  # gap of the lips over the mouth's width, below which the tip stays in, and from which it is out
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,17 +164,6 @@ def upper_teeth(face: Face) -> FloatArray:
         jaw = np.linalg.norm(face.shapes[face.shape_names.index(WIDE_OPEN)], axis=1)
         numbers = numbers[jaw[numbers] < STILL_SHARE * jaw.max()]
     return np.asarray(face.vertices[numbers], np.float64)
-
-
-TONGUE_OUT, TONGUE_UP = "tongueOut", "tongueUp"
-TIP_SHARE = 0.9  # of the largest displacement by a shape: vertices that move more are the tip
-# Relative to the mouth's width: the tip ends before the edge of the upper incisors, or is seen below it.
-OUT_BEFORE_EDGE, UP_BELOW_EDGE = 0.005, 0.065
-LARGEST_OUT, LARGEST_UP = 0.5, 0.9
-OUT_GAPS = (
-    0.01,
-    0.06,
-)  # gap of the lips over the mouth's width, below which the tip stays in, and from which it is out
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,7 @@ NO_LIKENESS = np.zeros((0, 0, 0))
 _ROUNDING = 1e-9  # a bound may fall below the score it bounds by rounding; scores are of order 1
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TokenQuery:
+class TokenQuery(NamedTuple):
     """N query phones: labels (N,), contexts (N, 2 `MAX_CONTEXT`) and log durations (N, 3).
 
     Columns of `log_durations`: the previous phone, the phone itself, the next phone; neighbours up to their reach.
@@ -29,8 +29,7 @@ class TokenQuery:
     log_durations: NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class ContextIndex:
+class GroupedTokens(NamedTuple):
     """Tokens sorted into groups with the same phone and the same `N_GROUP_CONTEXT` neighbours either side.
 
     The tokens ``order[group_first[g]:group_first[g + 1]]`` form group g, the shortest first; the groups
@@ -42,6 +41,29 @@ class ContextIndex:
     phone_first: NDArray[np.int32]
     context: NDArray[np.int32]
     log_durations: NDArray[np.float64]
+
+
+class Scoring(NamedTuple):
+    """Similarity of phones (P, P), weights of their distances, and weight of durations."""
+
+    similarity: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    duration: float
+
+
+class Target(NamedTuple):
+    """One query phone, and the score that no token of a group exceeds."""
+
+    context: NDArray[np.int32]
+    log_durations: NDArray[np.float64]
+    bound: float
+
+
+@dataclass(frozen=True, eq=False)
+class ContextIndex:
+    """A talker's tokens in groups, with the similarity of their phones."""
+
+    tokens: GroupedTokens
     similarity: NDArray[np.float64]
 
     @cached_property
@@ -51,13 +73,12 @@ class ContextIndex:
         Together with the neighbours that a group shares and the difference of durations it bounds the scores of a group
         from above.
         """
-        columns = self.context[self.order, 2 * N_GROUP_CONTEXT :].T
-        firsts = self.group_first[:-1]
+        columns = self.tokens.context[self.tokens.order, 2 * N_GROUP_CONTEXT :].T
+        firsts = self.tokens.group_first[:-1]
         return np.stack([np.maximum.reduceat(self.similarity[column], firsts, axis=0) for column in columns], axis=1)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TokenRanking:
+class TokenRanking(NamedTuple):
     """Best tokens of N phones: `tokens` and `scores` (N, k), best first; -1 and -inf where there are fewer."""
 
     tokens: NDArray[np.int32]
@@ -80,14 +101,14 @@ def context_index(
         order = order[is_kept[order]]
     keys = np.column_stack([tokens.phone, near])[order]
     firsts = np.flatnonzero(np.concatenate([[True], (keys[1:] != keys[:-1]).any(1)]))
-    return ContextIndex(
+    grouped = GroupedTokens(
         order,
         np.concatenate([firsts, [len(order)]]).astype(np.int32),
         np.searchsorted(keys[firsts, 0], np.arange(len(tokens.inventory) + 1)).astype(np.int32),
         tokens.context,
         durations,
-        similarity,
     )
+    return ContextIndex(grouped, similarity)
 
 
 def context_weights(n_context: int) -> NDArray[np.float64]:
@@ -101,11 +122,6 @@ def best_tokens(query: TokenQuery, index: ContextIndex, *, context: int, k: int,
     Score = sum over d = 1..context of [S(left_d, its left_d) + S(right_d, its right_d)] / (d + 1), less, where
     `duration` is above 0, ``duration`` x (|log ratio of durations| + half of the neighbours' ones). Equal scores go to
     the token that comes first in the corpus.
-
-    Raises
-    ------
-    InputError
-        `context` is not 1 to `MAX_CONTEXT`, `k` is not 1 to `MAX_EXEMPLARS`, or `duration` below 0.
 
     Notes
     -----
@@ -121,28 +137,32 @@ def best_tokens(query: TokenQuery, index: ContextIndex, *, context: int, k: int,
         raise InputError(f"the weight of durations must be 0 or more, not {duration}")
     tokens = np.full((len(query.phone), k), -1, np.int32)
     scores = np.full((len(query.phone), k), -np.inf)
+    found = TokenRanking(tokens, scores)
     _search_groups(
-        (query.phone, query.context, query.log_durations),
-        (index.order, index.group_first, index.phone_first, index.context, index.log_durations),
+        query,
+        index.tokens,
         index.far_likeness if context > N_GROUP_CONTEXT else NO_LIKENESS,
-        (index.similarity, context_weights(context), duration),
-        (tokens, scores),
-        np.zeros(int(np.diff(index.phone_first).max(initial=0))),
+        Scoring(index.similarity, context_weights(context), duration),
+        found,
+        np.zeros(int(np.diff(index.tokens.phone_first).max(initial=0))),
     )
-    return TokenRanking(tokens, scores)
+    return found
 
 
 @kernel
-def _score(target, target_durations, token, token_durations, rule):  # type: ignore[no-untyped-def]
-    similarity, weights, duration = rule
+def _score(target, context, durations, scoring):  # type: ignore[no-untyped-def]
+    """Score of a token, by its context and log durations, for a query phone."""
+    similarity, weights = scoring.similarity, scoring.weights
     total = 0.0
     for d in range(len(weights)):
         left, right = 2 * d, 2 * d + 1
-        total += weights[d] * (similarity[target[left], token[left]] + similarity[target[right], token[right]])
-    if duration > 0.0:
-        before, own, behind = target_durations[0], target_durations[1], target_durations[2]
-        neighbours = abs(before - token_durations[0]) + abs(behind - token_durations[2])
-        total -= duration * (abs(own - token_durations[1]) + 0.5 * neighbours)
+        total += weights[d] * (
+            similarity[target.context[left], context[left]] + similarity[target.context[right], context[right]]
+        )
+    if scoring.duration > 0.0:
+        wanted = target.log_durations
+        neighbours = abs(wanted[0] - durations[0]) + abs(wanted[2] - durations[2])
+        total -= scoring.duration * (abs(wanted[1] - durations[1]) + 0.5 * neighbours)
     return total
 
 
@@ -160,10 +180,12 @@ def _insert_token(tokens, scores, token, score):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _score_bound(target, token, group, rule):  # type: ignore[no-untyped-def]
-    """Score that no token of a group exceeds; `token`: context of one of its tokens, all of whose neighbours agree."""
-    similarity, weights, _ = rule
-    far_likeness, g = group
+def _score_bound(target, token, far_likeness, g, scoring):  # type: ignore[no-untyped-def]
+    """Score that no token of a group exceeds; `token`: context of one of its tokens, all of whose neighbours agree.
+
+    `far_likeness` is that of all groups, of which this is the g-th.
+    """
+    similarity, weights = scoring.similarity, scoring.weights
     total = _ROUNDING
     for d in range(min(len(weights), N_GROUP_CONTEXT)):
         left, right = 2 * d, 2 * d + 1
@@ -176,38 +198,36 @@ def _score_bound(target, token, group, rule):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _search_groups(query, index, far_likeness, rule, found, space):  # type: ignore[no-untyped-def]
+def _search_groups(query, tokens, far_likeness, scoring, found, space):  # type: ignore[no-untyped-def]
     """Write the rankings; `space` has a place for each group of a phone."""
-    phone, contexts, durations = query
-    order, group_first, phone_first, token_contexts, token_durations = index
-    tokens, scores = found
-    for n in range(len(phone)):
-        first, last = phone_first[phone[n]], phone_first[phone[n] + 1]
+    order, group_first = tokens.order, tokens.group_first
+    for n in range(len(query.phone)):
+        first, last = tokens.phone_first[query.phone[n]], tokens.phone_first[query.phone[n] + 1]
         bounds = space[: last - first]
         for g in range(first, last):
-            shared = token_contexts[order[group_first[g]]]
-            bounds[g - first] = _score_bound(contexts[n], shared, (far_likeness, g), rule)
+            shared = tokens.context[order[group_first[g]]]
+            bounds[g - first] = _score_bound(query.context[n], shared, far_likeness, g, scoring)
         for _ in range(last - first):
             g = _argmax(bounds)
             bound = bounds[g]
-            if bound < scores[n, -1]:
+            if bound < found.scores[n, -1]:
                 break
             bounds[g] = -np.inf
             low, high = group_first[first + g], group_first[first + g + 1]
-            target = (contexts[n], durations[n], bound)
-            _search_group(target, order[low:high], (token_contexts, token_durations), rule, (tokens[n], scores[n]))
+            target = Target(query.context[n], query.log_durations[n], bound)
+            ranking = TokenRanking(found.tokens[n], found.scores[n])
+            _search_group(target, order[low:high], tokens, scoring, ranking)
 
 
 @kernel
-def _search_group(target, group, corpus, rule, found):  # type: ignore[no-untyped-def]
+def _search_group(target, group, tokens, scoring, found):  # type: ignore[no-untyped-def]
     """Score the tokens of a group outwards from the query's duration while they can enter the ranking."""
-    context, durations, bound = target
-    token_contexts, token_durations = corpus
-    tokens, scores = found
+    context, durations = tokens.context, tokens.log_durations
+    own = target.log_durations[1]
     low, high = 0, len(group)
     while low < high:  # the first token that is not shorter than the query
         middle = (low + high) // 2
-        if token_durations[group[middle], 1] < durations[1]:
+        if durations[group[middle], 1] < own:
             low = middle + 1
         else:
             high = middle
@@ -215,10 +235,10 @@ def _search_group(target, group, corpus, rule, found):  # type: ignore[no-untype
         at = low - 1 if step < 0 else low
         while 0 <= at < len(group):
             token = group[at]
-            if bound - rule[2] * abs(token_durations[token, 1] - durations[1]) < scores[-1]:
+            if target.bound - scoring.duration * abs(durations[token, 1] - own) < found.scores[-1]:
                 break
-            score = _score(context, durations, token_contexts[token], token_durations[token], rule)
-            _insert_token(tokens, scores, token, score)
+            score = _score(target, context[token], durations[token], scoring)
+            _insert_token(found.tokens, found.scores, token, score)
             at += step
 
 

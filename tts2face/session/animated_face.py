@@ -51,6 +51,7 @@ if TYPE_CHECKING:
 NO_PALETTE = "this face was prepared without a palette and has no gestures; prepare it with a palette"
 
 Gestures = Mapping[str, NDArray[np.float32]]
+FIXED_FEATURES = ("gaze", "head", *SPEECH_GAINS)  # features that a talker's own video fixes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,13 +94,7 @@ class AnimatedFace(Protocol):
         """Speech motion (T, K) from the talker's speech parameters (T, S)."""
 
     def motion_of_take(self, take: "Take", *, gain: float = 1.0) -> Trajectory:
-        """Motion (T, K) of a performer tracked in a video; `gain` multiplies it.
-
-        Raises
-        ------
-        DataError
-            The take is too short, or the face lacks landmarks or shapes.
-        """
+        """Motion (T, K) of a performer tracked in a video; `gain` multiplies it."""
 
     def motion_of_capture(self, capture: "FaceCapture", *, gain: float = 1.0) -> Trajectory:
         """Motion (T, K) of an ARKit capture: shapes of the same name take its weights, clipped to their limits.
@@ -111,13 +106,7 @@ class AnimatedFace(Protocol):
         """
 
     def with_motion_of(self, take: "Take") -> "AnimatedFace":
-        """Extend the face by the lip motion of a take that the talker's recordings lack (T07, section 3.1).
-
-        Raises
-        ------
-        InputError
-            The face cannot be extended.
-        """
+        """Extend the face by the lip motion of a take that the talker's recordings lack (T07, section 3.1)."""
 
     def landmarks(self, motion: Trajectory) -> NDArray[np.float32]:
         """Landmarks (T, 478, 3) of the face, mm, moved by the first or all of its channels.
@@ -129,22 +118,10 @@ class AnimatedFace(Protocol):
         """
 
     def check_articulation(self, factor: float | None) -> None:
-        """Reject a factor of articulation that this face cannot show; None is its own.
-
-        Raises
-        ------
-        InputError
-            The face has no other articulation than the recorded one.
-        """
+        """Reject a factor of articulation that this face cannot show; None is its own."""
 
     def check_gains(self, gains: Mapping[str, float]) -> None:
-        """Reject gains of features that this face cannot move.
-
-        Raises
-        ------
-        InputError
-            The face cannot move a feature of `gains`.
-        """
+        """Reject gains of features that this face cannot move."""
 
     def with_gestures_of(self, palette: Palette) -> "AnimatedFace":
         """The face with the channels that the gestures of a palette need."""
@@ -160,11 +137,6 @@ class AnimatedFace(Protocol):
             (T, k) values of each feature of the palette, in the palette's units.
         gains
             Factors of the speech motion by feature (jaw, lips).
-
-        Raises
-        ------
-        InputError
-            The speech is not in the channels of this face, or a feature has another number of frames.
         """
 
     def renderer(self, picture: Picture) -> FrameRenderer:
@@ -261,17 +233,8 @@ class MeshFace:
 
 @shared
 def mesh_face(talker: Talker, exemplars: ExemplarModel, face: Face) -> MeshFace:
-    """Prepare a mesh for a talker, without gestures.
-
-    Raises
-    ------
-    DataError
-        The face lacks landmarks of the lips or eyes, or shapes that speech can move.
-    """
+    """Prepare a mesh for a talker, without gestures."""
     return MeshFace(face, exemplars, build_retargeter(talker, face), build_articulator(face), None)
-
-
-FIXED_FEATURES = ("gaze", "head", *SPEECH_GAINS)  # features that a talker's own video fixes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -374,12 +337,6 @@ class OwnAppearanceFace:
 
 
 def own_appearance_face(talker: Talker, exemplars: ExemplarModel) -> OwnAppearanceFace:
-    """Prepare a talker's own face, without gestures.
-
-    Raises
-    ------
-    InputError
-        The talker has no appearance model.
-    """
+    """Prepare a talker's own face, without gestures."""
     appearance = build_appearance_exemplars(talker, exemplars)
     return OwnAppearanceFace(talker, exemplars, appearance, fit_appearance_regression(talker), None)

@@ -111,7 +111,7 @@ def formats() -> tuple[FormatEntry, ...]:
     """The formats of `tts2face.export`."""
     from tts2face.interchange.exports.table import all_formats
 
-    return tuple(FormatEntry(one.name, one.suffixes, one.is_installed, one.summary) for one in all_formats())
+    return tuple(FormatEntry(info.name, info.suffixes, info.is_installed, info.summary) for info in all_formats())
 
 
 def voices() -> tuple[VoiceEntry, ...]:
@@ -212,12 +212,12 @@ def haircuts() -> tuple[HaircutEntry, ...]:
         summary = str(_read(path, HAIR_KIND)["metadata"].get("summary", ""))
         found.append(HaircutEntry(name, face or REALISTIC_FACE, summary))
     order = [REALISTIC_FACE, *(path.stem for path in _shipped_files("face"))]
-    return tuple(sorted(found, key=lambda one: order.index(one.face)))
+    return tuple(sorted(found, key=lambda entry: order.index(entry.face)))
 
 
 def haircuts_of(face: str) -> tuple[HaircutEntry, ...]:
     """The haircuts of a face; of one that is not shipped, those of the head."""
-    own = tuple(one for one in haircuts() if one.face == face)
+    own = tuple(haircut for haircut in haircuts() if haircut.face == face)
     return own or haircuts_of(REALISTIC_FACE)
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.lips.explanation import DTW_BAND_S, pearson, speech_frames, warping_cost
+from tts2face.lips.motion_measures import DTW_BAND_S, pearson, speech_frames, warping_cost
 from tts2face.models.landmarks import lip_opening, lip_width
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.types import Trajectory
@@ -85,15 +85,15 @@ def compare_motion(parts: Sequence[MotionPart], face: AnimatedFace, channels: Se
     DataError
         The face lacks landmarks of the lips or eyes.
     """
-    if not parts or len({one.is_same_time for one in parts}) > 1:
+    if not parts or len({part.is_same_time for part in parts}) > 1:
         raise InputError("two motions are compared at the same instants or by their sentences, at least by one")
     names = tuple(channels[:n_face])
-    seen = [(_lips(face, names, one.reference, fps), _lips(face, names, one.motion, fps)) for one in parts]
-    speech = [_speech(one, fps) for one in parts]
+    seen = [(_lips(face, names, part.reference, fps), _lips(face, names, part.motion, fps)) for part in parts]
+    speech = [_speech(part, fps) for part in parts]
     is_same_time = parts[0].is_same_time
     pairs = [(a[here] if is_same_time else a, b[here]) for (a, b), here in zip(seen, speech, strict=True)]
     lips = (np.concatenate([a for a, _ in pairs]), np.concatenate([b for _, b in pairs]))
-    whole = (np.concatenate([one.reference for one in parts]), np.concatenate([one.motion for one in parts]))
+    whole = (np.concatenate([part.reference for part in parts]), np.concatenate([part.motion for part in parts]))
     return MotionComparison(
         tuple(_series(name, lips[0][:, k], lips[1][:, k], LIP_SPREAD, is_same_time) for k, name in enumerate(LIPS)),
         _dtw_cost(pairs, lips[0].std(axis=0), round(DTW_BAND_S * fps) if is_same_time else None),
@@ -133,10 +133,10 @@ def _speech(part: MotionPart, fps: float) -> slice:
     return speech_frames(part.phones, len(part.motion), fps)
 
 
-def _series(name: str, one: Values, other: Values, least: float, is_same_time: bool) -> SeriesMeasure:
-    moves = one.std() > least and other.std() > least
-    r = pearson(one.astype(np.float64), other.astype(np.float64)) if moves and is_same_time else None
-    return SeriesMeasure(name, r, float(other.std() / one.std()) if one.std() > least else None)
+def _series(name: str, reference: Values, other: Values, least: float, is_same_time: bool) -> SeriesMeasure:
+    moves = reference.std() > least and other.std() > least
+    r = pearson(reference.astype(np.float64), other.astype(np.float64)) if moves and is_same_time else None
+    return SeriesMeasure(name, r, float(other.std() / reference.std()) if reference.std() > least else None)
 
 
 def _moving(whole: tuple[Values, Values], channels: Sequence[str], is_same_time: bool) -> tuple[SeriesMeasure, ...]:

@@ -80,16 +80,10 @@ class SentenceEdges:
 def correct_phones(
     phones: PhoneSequence, text: str, occurrence: int, corrections: Sequence[SentenceEdges]
 ) -> PhoneSequence:
-    """Phones of a sentence at their corrected edges, or as they are without a correction.
-
-    Raises
-    ------
-    StaleEdgesError
-        The correction belongs to other phones or to a sound of another length.
-    """
-    for one in corrections:
-        if (one.text, one.occurrence) == (text, occurrence):
-            corrected = one.applied(phones)
+    """Phones of a sentence at their corrected edges, or as they are without a correction."""
+    for correction in corrections:
+        if (correction.text, correction.occurrence) == (text, occurrence):
+            corrected = correction.applied(phones)
             if corrected is None:
                 raise StaleEdgesError(text, occurrence)
             return corrected

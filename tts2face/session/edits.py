@@ -21,13 +21,7 @@ class ChannelEdits:
     face: AnimatedFace
 
     def __post_init__(self) -> None:
-        """Refuse channels that the face does not have.
-
-        Raises
-        ------
-        InputError
-            There is no such channel.
-        """
+        """Refuse channels that the face does not have."""
         known = (*self.face.channels, *HEAD_CHANNELS)
         for edit in self.edits:
             if edit.channel not in known:

@@ -32,7 +32,7 @@ BLOCK_BYTES = 1 << 18  # of a file that is read when it is complete
 @cache
 def line_formats() -> Mapping[str, FormatInfo]:
     """Formats of lines by name, of other packages, too."""
-    return MappingProxyType({one.name: one for one in all_formats() if one.has_lines})
+    return MappingProxyType({info.name: info for info in all_formats() if info.has_lines})
 
 
 @cache
@@ -57,11 +57,6 @@ class StreamFormat:
         As for `tts2face.picture.movie.ClipFrames`.
     is_complete
         Bytes come when all is made: a file whose header has its length, in place of one that plays while it is sent.
-
-    Raises
-    ------
-    InputError
-        There is no such format, or it cannot be transparent.
     """
 
     name: str
@@ -170,11 +165,6 @@ def encode_lines(pieces: Iterable[Piece], format: str, face: Face | None) -> Ite
         One of `line_formats`.
     face
         Mesh whose shapes the clips' channels are, for formats of ARKit shapes.
-
-    Raises
-    ------
-    InputError
-        As `ExportWriter`.
     """
     info = line_formats()[format]
     file, buffer = ExportFile(Path(f"clip{info.suffixes[0]}"), info), LineBuffer()

@@ -117,7 +117,7 @@ def _eased(clips: Iterator[Clip], n_frames: int, first_channel: int, opening_s: 
         clip = first_frames(whole, n_frames - at)
         if weights is None:
             weights = ease_weights(n_frames, clip.fps, opening_s), ease_weights(n_frames, clip.fps)
-        face, head = (one[at : at + len(clip.motion), None] for one in weights)
+        face, head = (curve[at : at + len(clip.motion), None] for curve in weights)
         at += len(clip.motion)
         values = clip.motion.values.copy()
         values[:, first_channel:] *= face

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from tts2face.face.body import Body, phrase_starts
 from tts2face.face.gestures import SPEECH_GAINS
-from tts2face.gestures.elements import KINDS, interpolate_keys
+from tts2face.gestures.elements import interpolate_keys
 from tts2face.gestures.gaze import microsaccades
+from tts2face.gestures.kinds import KINDS
 from tts2face.gestures.listening import with_responses
 from tts2face.gestures.noise import NoiseStream
 from tts2face.gestures.stream import GestureFields, GestureStream, GestureValues
@@ -62,11 +63,6 @@ class GestureLayer:
         Called while gestures are waited for.
     memory
         Keeps the motion of pieces, so that a changed timeline repeats only the pieces from the change on.
-
-    Raises
-    ------
-    InputError, DataError
-        The palette lacks a style of the request, or the face cannot move a feature for which a gain is given.
     """
 
     def __init__(
@@ -78,7 +74,9 @@ class GestureLayer:
         memory: SentenceMemory = NO_MEMORY,
     ) -> None:
         self._requested = Timeline(style=face.default_styles).merge(prepared.timeline)
-        self._face, self._yield_turn, self._memory = face, yield_turn, memory
+        self._face = face
+        self._yield_turn = yield_turn
+        self._memory = memory
         palette, request = fields.palette, prepared.request
         self._requested.check_styles(palette)
         for style in marked_styles(prepared.text):
@@ -142,9 +140,9 @@ class GestureLayer:
         """Digest of everything on which the gestures of a piece, after those before it, depend."""
         here = replace(timeline.restrict(times[0] - REACH_S, times[-1] + REACH_S), edits=())  # a later step
         elements = [
-            (name, kind.lane(one), interpolate_keys(times, one.keys).tobytes()) if kind.shape == "curve" else one
+            (name, kind.lane(part), interpolate_keys(times, part.keys).tobytes()) if kind.shape == "curve" else part
             for name, kind in KINDS.items()
-            for one in getattr(here, name)
+            for part in getattr(here, name)
         ]
         maps = (dict(here.style), dict(here.gains.factors), sorted(here.seeds.items()))
         found = blake2b(repr((self._now.history, self._options, elements, maps)).encode())

@@ -41,7 +41,7 @@ def join_utterances(speeches: Sequence[Speech], gaps: Sequence[float]) -> tuple[
         N offsets in seconds from times of the utterances to times of the whole.
     """
     parts: list[Speech] = []
-    begins: list[float] = []
+    starts: list[float] = []
     at = 0.0
     for number, speech in enumerate(speeches):
         before = gaps[number - 1] if number > 0 else math.inf
@@ -53,9 +53,9 @@ def join_utterances(speeches: Sequence[Speech], gaps: Sequence[float]) -> tuple[
                 parts.append(silent_speech(missing, speech.waveform.rate))
                 at += parts[-1].waveform.duration
         parts.append(short)
-        begins.append(at - cut)
+        starts.append(at - cut)
         at += short.waveform.duration
-    return (concatenate_speech(parts) if len(parts) > 1 else parts[0]), begins
+    return (concatenate_speech(parts) if len(parts) > 1 else parts[0]), starts
 
 
 def trim_silence(speech: Speech, *, before: float, behind: float) -> tuple[Speech, float]:
@@ -70,9 +70,9 @@ def trim_silence(speech: Speech, *, before: float, behind: float) -> tuple[Speec
     """
     sound = speech.waveform
     lead, trail = _silence_at_ends(speech)
-    begin = round(max(lead - before, 0.0) * sound.rate)
+    start = round(max(lead - before, 0.0) * sound.rate)
     end = len(sound.samples) - round(max(trail - behind, 0.0) * sound.rate)
-    return _part(speech, begin, end), begin / sound.rate
+    return _part(speech, start, end), start / sound.rate
 
 
 def lead_in(speech: Speech, lead: float) -> Speech:
@@ -100,26 +100,26 @@ class Excerpt:
     silence: float = 0.0
 
 
-def excerpt_of_speech(speech: Speech, begin: float, end: float) -> Speech:
+def excerpt_of_speech(speech: Speech, start: float, end: float) -> Speech:
     """Speech from `begin` to `end` seconds, faded there, with the phones and whole words within; see `word_bounds`."""
     sound, edges = speech.waveform, speech.phones.edges
-    first, last = round(begin * sound.rate), max(round(end * sound.rate), round(begin * sound.rate) + 1)
+    first, last = round(start * sound.rate), max(round(end * sound.rate), round(start * sound.rate) + 1)
     gains = _fade_gains(last - first, sound.rate, first > 0, last < len(sound.samples))
     cut = Waveform(sound.samples[first:last] * gains[: len(sound.samples) - first], sound.rate)
-    at = int(np.searchsorted(edges[1:], begin + SAME_EDGE_S))
+    at = int(np.searchsorted(edges[1:], start + SAME_EDGE_S))
     until = max(int(np.searchsorted(edges[:-1], end - SAME_EDGE_S)), at + 1)
-    inner = np.clip(edges[at : until + 1] - begin, 0.0, cut.duration)
+    inner = np.clip(edges[at : until + 1] - start, 0.0, cut.duration)
     inner[0], inner[-1] = 0.0, cut.duration
     words = tuple(word.shift(-at) for word in speech.words if at <= word.first and word.last <= until)
     return Speech(cut, PhoneSequence(speech.phones.phones[at:until], enforce_increasing(inner)), words)
 
 
-def word_bounds(speech: Speech, begin: float, end: float) -> tuple[float, float]:
+def word_bounds(speech: Speech, start: float, end: float) -> tuple[float, float]:
     """Seconds at which the words between two onsets of words are cut out: little silence stays around them."""
     labels, edges = speech.phones.phones, speech.phones.edges
-    voiced = [at for at, label in enumerate(labels) if label != SILENCE and begin - SAME_EDGE_S <= edges[at] < end]
+    voiced = [at for at, label in enumerate(labels) if label != SILENCE and start - SAME_EDGE_S <= edges[at] < end]
     if not voiced:
-        return begin, end
+        return start, end
     before = CUT_SILENCE_S if voiced[0] > 0 and labels[voiced[0] - 1] == SILENCE else 0.0
     first = float(edges[voiced[0]])
     return max(first - before, 0.0), min(float(edges[voiced[-1] + 1]) + CUT_SILENCE_S, end)
@@ -134,14 +134,14 @@ def trim_end(speech: Speech) -> Speech:
     return _part(speech, 0, min(end, len(level)))
 
 
-def _part(speech: Speech, begin: int, end: int) -> Speech:
-    """Samples [begin, end) of speech, faded at the cuts, with all its phones and words: none is shorter than 5 ms."""
+def _part(speech: Speech, start: int, end: int) -> Speech:
+    """Samples [start, end) of speech, faded at the cuts, with all its phones and words: none is shorter than 5 ms."""
     sound, phones = speech.waveform, speech.phones
-    if (begin, end) == (0, len(sound.samples)):
+    if (start, end) == (0, len(sound.samples)):
         return speech
-    gains = _fade_gains(end - begin, sound.rate, begin > 0, end < len(sound.samples))
-    short = Waveform(sound.samples[begin:end] * gains, sound.rate)
-    edges = enforce_increasing(np.clip(phones.edges - begin / sound.rate, 0.0, short.duration))
+    gains = _fade_gains(end - start, sound.rate, start > 0, end < len(sound.samples))
+    short = Waveform(sound.samples[start:end] * gains, sound.rate)
+    edges = enforce_increasing(np.clip(phones.edges - start / sound.rate, 0.0, short.duration))
     return Speech(short, PhoneSequence(phones.phones, edges), speech.words)
 
 
@@ -175,13 +175,13 @@ def _silence_at_ends(speech: Speech) -> tuple[float, float]:
 
 def fade_out(n_samples: int, rate: int) -> NDArray[np.float32]:
     """(n_samples,) gains with a fade at their end."""
-    return _fade_gains(n_samples, rate, begins=False, ends=True)
+    return _fade_gains(n_samples, rate, starts=False, ends=True)
 
 
-def _fade_gains(n_samples: int, rate: int, begins: bool, ends: bool) -> NDArray[np.float32]:
+def _fade_gains(n_samples: int, rate: int, starts: bool, ends: bool) -> NDArray[np.float32]:
     ramp = np.linspace(0.0, 1.0, min(round(FADE_S * rate), n_samples // 2), endpoint=False, dtype=np.float32)
     gain = np.ones(n_samples, np.float32)
-    if begins:
+    if starts:
         gain[: len(ramp)] = ramp
     if ends:
         gain[n_samples - len(ramp) :] = ramp[::-1]
@@ -209,7 +209,9 @@ class WordTimes:
     def __init__(
         self, written: str, phones: PhoneSequence, words: Sequence[WordSpan], *, language: str, first: int = 0
     ) -> None:
-        self._written, self._language, self._first = written, language, first
+        self._written = written
+        self._language = language
+        self._first = first
         self._n_letters = max(n_letters(written), 1)
         self._onsets = [float(phones.edges[word.first]) for word in words] or [phones.start]
         self._ends = [float(phones.edges[word.last]) for word in words] or [phones.end]

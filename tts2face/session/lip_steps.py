@@ -64,12 +64,12 @@ class Lips:
         fps = float(self.prepared.fps)
         return selection, models.face.motion_of_tokens(selection, fps=fps, n_frames=n_frames, yield_turn=yield_turn)
 
-    def explanation(self, selection: TokenSelection, begin: float) -> Explain:
+    def explanation(self, selection: TokenSelection, start: float) -> Explain:
         """Function that explains a selection in seconds of the whole clip; it is evaluated only when called."""
 
         def explain() -> tuple[PhoneExplanation, ...]:
             phones = explain_selection(selection, self.models.exemplars)
-            return tuple(replace(phone, start=phone.start + begin, end=phone.end + begin) for phone in phones)
+            return tuple(replace(phone, start=phone.start + start, end=phone.end + start) for phone in phones)
 
         return explain
 
@@ -78,7 +78,9 @@ class RecordedLips:
     """Step: lip motion of a recording, which is made as a whole with its first piece."""
 
     def __init__(self, lips: Lips, source: Recorded, heard: TimedTranscript) -> None:
-        self._lips, self._source, self._heard = lips, source, heard
+        self._lips = lips
+        self._source = source
+        self._heard = heard
         self._whole: Trajectory | None = None
 
     def __call__(self, piece: Piece) -> Piece:
@@ -90,7 +92,9 @@ class RecordedLips:
         return replace(piece, clip=replace(piece.clip, motion=self._whole.part(first, first + len(piece.clip.motion))))
 
     def _make(self) -> tuple[Trajectory, Explain]:
-        models, fps, heard = self._lips.models, float(self._lips.prepared.fps), self._heard
+        models = self._lips.models
+        fps = float(self._lips.prepared.fps)
+        heard = self._heard
         if isinstance(self._source.lips, FromSound):
             audio_map = select_audio_map(self._source.lips.audio_map, models.talker)
             parameters = mapped_motion(self._source.audio, audio_map, models.talker, fps, heard)

@@ -40,6 +40,8 @@ from tts2face.video.tracking import FaceTracker
 CALIBRATION_S = 5.0  # long enough for the lips to close and open and the eyes to blink
 MIN_CALIBRATION_FRAMES = 40  # frames with a face
 SCALE_WINDOW_S = 2.0  # window over which the size of the face is averaged
+RATE_LIMITS = (8_000, 192_000)  # Hz
+UNUSED_IDLE_S = 1.0  # of the request from which the gestures of the whole are made
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,9 +172,6 @@ def _queue_frames(pictures: Iterable[TimedFrame], waiting: "deque[TimedFrame]") 
         yield picture.pixels
 
 
-RATE_LIMITS = (8_000, 192_000)  # Hz
-
-
 class LiveLips:
     """Lip motion of a sound that arrives in blocks; independent of the blocks at 16 kHz. Not thread-safe.
 
@@ -182,11 +181,6 @@ class LiveLips:
         Sample rate of the sound in Hz; rates other than 16 kHz are resampled.
     audio_map
         Name of an audio map of the talker; None for the default.
-
-    Raises
-    ------
-    InputError
-        The rate is out of range, or the talker has no such audio map.
     """
 
     def __init__(self, models: "SessionModels", rate: int = FEATURE_RATE, audio_map: str | None = None) -> None:
@@ -196,7 +190,9 @@ class LiveLips:
         talker = models.talker
         chosen = select_audio_map(audio_map, talker)
         self._stream = StreamingAudioMap(chosen)
-        self._face, self._channels, self.fps = models.speech_face, speech_channels(talker.model), chosen.fps
+        self._face = models.speech_face
+        self._channels = speech_channels(talker.model)
+        self.fps = chosen.fps
         self._resampler: Any = None
         if rate != FEATURE_RATE:
             import soxr
@@ -235,9 +231,6 @@ class LiveLips:
         return self._face.motion_of_parameters(Trajectory(self._channels, parameters, self.fps))
 
 
-UNUSED_IDLE_S = 1.0  # of the request from which the gestures of the whole are made
-
-
 class LiveSpeech:
     """A clip without an end: `say` appends speech, `idle` and `listen` silence with a living face.
 
@@ -261,7 +254,9 @@ class LiveSpeech:
         self._spoken = request.source
         self._silent = replace(request, source=Idle(UNUSED_IDLE_S), dictionary=None)
         self._layer = models.gesture_layer(prepare(self._silent))
-        self._n_frames, self._is_speaking, self._has_listened = 0, False, False
+        self._n_frames = 0
+        self._is_speaking = False
+        self._has_listened = False
         self._rate = exact_rate(request.fps)
         self._cues: list[float] = []  # seconds of the clip at which the face responds
 
@@ -303,15 +298,15 @@ class LiveSpeech:
             intervals.
         """
         self.rest()
-        begin = self.seconds
-        self._cues = [cue for cue in self._cues if cue > begin - LASTS_S] + [begin + cue for cue in cues or ()]
-        responding = responses(self._cues, self._request.seed).restrict(begin, begin + seconds).shift(-begin)
+        start = self.seconds
+        self._cues = [cue for cue in self._cues if cue > start - LASTS_S] + [start + cue for cue in cues or ()]
+        responding = responses(self._cues, self._request.seed).restrict(start, start + seconds).shift(-start)
         listened = Timeline(listens=(ListeningSpan(0.0, seconds, reacts=cues is None),))
         yield from self._append(replace(self._silent, source=Listening(seconds)), responding.merge(listened))
         self._has_listened = True
 
     def rest(self) -> None:
-        """What is said next begins with the ``lead`` of the request, without a pause after the sentence before it."""
+        """The next text begins with the ``lead`` of the request, without a pause after the sentence before it."""
         self._is_speaking = False
 
     def _append(self, request: Request, listening: Timeline | None = None) -> Iterator[Piece]:

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from tts2face.session.animated_face import AnimatedFace
     from tts2face.sound.alignment import TextMismatch
 
+N_PIECES_AHEAD = 2  # pieces synthesised before they are drawn
+
 
 @dataclass(frozen=True, slots=True)
 class OutputFiles:
@@ -130,9 +132,6 @@ def plan_outputs(out: str | Path | None, exports: Sequence[str | Path], inputs: 
     names: dict[str, AnyPath] = {f"export {number}": file.path for number, file in enumerate(files, start=1)}
     refuse_overwriting(names | {"out": out}, inputs)
     return OutputFiles(None if out is None else Path(out), files)
-
-
-N_PIECES_AHEAD = 2  # pieces synthesised before they are drawn
 
 
 @dataclass(frozen=True, slots=True)

@@ -142,15 +142,15 @@ def resample_take(motion: FaceMotion, fps: float) -> FaceMotion:
     at = np.minimum(np.arange(n_frames) / fps * old, len(motion.face) - 1)
 
     return FaceMotion(
-        *(replace(one, values=interpolate_rows(one.values, at), fps=fps) for one in (motion.face, motion.head))
+        *(replace(motion, values=interpolate_rows(motion.values, at), fps=fps) for motion in (motion.face, motion.head))
     )
 
 
 def take_clips(motion: FaceMotion, sound: Waveform) -> Iterator[Clip]:
     """Divide motion and sound into clips of at most `MAX_CLIP_FRAMES` frames; short sound is padded with silence."""
     body = Body(motion.face.channels, 0)
-    for first, last, begin, end in clip_bounds(len(motion.face), exact_rate(motion.face.fps), sound.rate):
-        speech = Speech.without_phones(sound.part(begin, end).padded(end - begin))
+    for first, last, start, end in clip_bounds(len(motion.face), exact_rate(motion.face.fps), sound.rate):
+        speech = Speech.without_phones(sound.part(start, end).padded(end - start))
         face, head = motion.face.part(first, last), motion.head.part(first, last)
         yield Clip(body.move(face, head, speech.phones), head, speech)
 

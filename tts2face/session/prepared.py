@@ -145,13 +145,7 @@ def recordings(source: Source) -> dict[str, Path]:
 
 
 def prepare_request(text: str | Request | PreparedRequest, options: dict[str, Any]) -> PreparedRequest:
-    """Prepare a text with options by name, or a complete request, once.
-
-    Raises
-    ------
-    InputError
-        An option does not exist, or options are given together with a complete request; errors as `prepare`.
-    """
+    """Prepare a text with options by name, or a complete request, once."""
     known = _option_names(Request)
     for name in options:
         if name not in known:
@@ -166,13 +160,7 @@ def prepare_request(text: str | Request | PreparedRequest, options: dict[str, An
 
 
 def split_picture(picture: Picture | None, options: dict[str, Any]) -> tuple[Picture, dict[str, Any]]:
-    """A picture, from its fields among the options if it is None, and the options of the request.
-
-    Raises
-    ------
-    InputError
-        A field of the picture is invalid.
-    """
+    """A picture, from its fields among the options if it is None, and the options of the request."""
     if picture is not None:
         return picture, options
     names = _option_names(Picture)

@@ -1,8 +1,7 @@
-"""The project of one clip: what is said, who says it, gestures over time, and corrections by hand.
+"""The project of one clip: its request and models, gestures over time, and corrections by hand.
 
-Projects whose text, voice or recording has changed: corrections that no longer belong to it are removed.
-
-The styles that a project names, and their change when a palette changes.
+Corrections that no longer belong to a changed text, voice or recording are removed; styles that a palette renames are
+renamed.
 """
 
 from collections.abc import Callable, Collection, Mapping
@@ -121,7 +120,7 @@ class Project:
 def without_edges(project: Project, sentences: Collection[tuple[str, int]]) -> Project:
     """The project without the corrected edges of some sentences, each a text and its occurrence."""
     return replace(
-        project, edges=tuple(one for one in project.edges if (one.text, one.occurrence) not in set(sentences))
+        project, edges=tuple(edges for edges in project.edges if (edges.text, edges.occurrence) not in set(sentences))
     )
 
 

@@ -24,11 +24,9 @@ FORMAT, VERSION = "tts2face project", 2
 FIRST_FACE = "head"  # that files of version 1 mean where they name none
 PROJECT_SUFFIX = ".json"
 # Options that name files; their paths are relative to the folder of the project.
-REQUEST_FILES, MODEL_FILES, PICTURE_FILES = (
-    ("audio", "partner", "dictionary", "voice"),
-    ("talker", "face", "palette"),
-    ("background",),
-)
+REQUEST_FILES = ("audio", "partner", "dictionary", "voice")
+MODEL_FILES = ("talker", "face", "palette")
+PICTURE_FILES = ("background",)
 Options = TypeVar("Options", Request, Models, Picture)
 
 
@@ -91,7 +89,7 @@ def parse_project(content: Any, name: str, folder: Path) -> Project:
     with errors_at(f"{name}, picture"):
         picture = _options(Picture, written.picture, folder, PICTURE_FILES)
     with errors_at(f"{name}, edges"):
-        edges = tuple(SentenceEdges(one.text, one.occurrence, one.phones, one.edges) for one in written.edges)
+        edges = tuple(SentenceEdges(part.text, part.occurrence, part.phones, part.edges) for part in written.edges)
     timeline = parse_timeline_object(written.timeline, f"{name}, timeline")
     parts = (written.pronunciations, edges, written.excluded, written.muted, written.solo)
     with errors_at(name):
@@ -107,10 +105,10 @@ def project_json(project: Project, folder: Path) -> dict[str, Any]:
         "timeline": timeline_json(project.timeline),
         "pronunciations": dict(project.pronunciations),
         "edges": [
-            {"text": one.text, "occurrence": one.occurrence, "phones": list(one.phones), "edges": list(one.edges)}
-            for one in project.edges
+            {"text": part.text, "occurrence": part.occurrence, "phones": list(part.phones), "edges": list(part.edges)}
+            for part in project.edges
         ],
-        "excluded": [{"utterance": one.utterance, "start": one.start} for one in project.excluded],
+        "excluded": [{"utterance": token.utterance, "start": token.start} for token in project.excluded],
         "muted": sorted(project.muted),
         "solo": sorted(project.solo),
     }

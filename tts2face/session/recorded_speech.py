@@ -61,15 +61,15 @@ def recorded_pieces(prepared: PreparedRequest, source: Recorded, heard: TimedTra
     before = 0
     for clip in recording_clips(source.audio, heard, n_frames, prepared.fps, volume=source.volume):
         after = before + len(clip.motion)
-        begin, end = before / fps, after / fps
+        start, end = before / fps, after / fps
         n_steps = RECORDING_STEPS * after // n_frames - RECORDING_STEPS * before // n_frames
         yield Piece(
             clip,
-            begin,
+            start,
             n_steps + (HEARING_STEPS if before == 0 else 0),
-            timeline.restrict(begin, end),
-            tuple(mark for mark in marks if begin <= mark.seconds < end),
-            mismatches=tuple(mismatch for mismatch in heard.mismatches if begin <= mismatch.begin < end),
+            timeline.restrict(start, end),
+            tuple(mark for mark in marks if start <= mark.seconds < end),
+            mismatches=tuple(mismatch for mismatch in heard.mismatches if start <= mismatch.begin < end),
             transcript=heard.phones if before == 0 else None,
         )
         before = after

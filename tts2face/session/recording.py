@@ -69,14 +69,8 @@ class TimedTranscript:
 
 
 def select_audio_map(name: str | None, talker: Talker) -> AudioMap:
-    """Audio map of a talker by its name; None: the first of `DEFAULT_AUDIO_MAPS` that it has.
-
-    Raises
-    ------
-    InputError
-        The talker has no such audio map.
-    """
-    name = name or next((one for one in DEFAULT_AUDIO_MAPS if one in talker.audio_maps), DEFAULT_AUDIO_MAPS[-1])
+    """Audio map of a talker by its name; None: the first of `DEFAULT_AUDIO_MAPS` that it has."""
+    name = name or next((known for known in DEFAULT_AUDIO_MAPS if known in talker.audio_maps), DEFAULT_AUDIO_MAPS[-1])
     if name == RECOGNISED:
         raise InputError(
             "phones are recognised in whole recordings; for live sound choose the audio map voices, network or linear"
@@ -96,29 +90,13 @@ def align_transcript(
     dictionary: Mapping[str, tuple[IpaPhone, ...]],
     on_progress: Progress | None = None,
 ) -> TimedTranscript:
-    """Align a text with a recording of it; `dictionary` holds the user's pronunciations by `word_key`.
-
-    Raises
-    ------
-    InputError, DataError
-        The recording cannot be read, is silent or too short, or does not contain the words.
-    BackendError
-        The phone recogniser does not run on this machine.
-    """
+    """Align a text with a recording of it; `dictionary` holds the user's pronunciations by `word_key`."""
     words = pronounce_transcript(text, language, Dictionary(dictionary) if dictionary else None)
     return TimedTranscript(*align_recording(_sound_of(path), words, on_progress))
 
 
 def recognise_transcript(path: Path, on_progress: Progress | None = None) -> TimedTranscript:
-    """Phones that are heard in a recording; its words are not known.
-
-    Raises
-    ------
-    InputError, DataError
-        The recording cannot be read, is silent or too short.
-    BackendError
-        The phone recogniser does not run on this machine.
-    """
+    """Phones that are heard in a recording; its words are not known."""
     return TimedTranscript(recognise_phones(_sound_of(path), on_progress), ())
 
 
@@ -178,18 +156,18 @@ def recording_clips(
 ) -> Iterator[Clip]:
     """Divide a recording into clips of at most `MAX_CLIP_FRAMES` frames, each with its phones and the face at rest."""
     sound = _SampleReader(sound_blocks(path, SOUND_RATE))
-    for first, last, begin, end in clip_bounds(n_frames, fps, SOUND_RATE):
-        samples = np.clip(volume * sound.next(end - begin), -1.0, 1.0)
+    for first, last, start, end in clip_bounds(n_frames, fps, SOUND_RATE):
+        samples = np.clip(volume * sound.next(end - start), -1.0, 1.0)
         seconds = (float(Fraction(first) / fps), len(samples) / SOUND_RATE)
         phones, words = _phones_within(transcript, *seconds)
         yield Clip.at_rest(last - first, float(fps), Speech(Waveform(samples, SOUND_RATE), phones, words))
 
 
 def _phones_within(
-    transcript: TimedTranscript, begin: float, duration: float
+    transcript: TimedTranscript, start: float, duration: float
 ) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
     """Phones of a time span, relative to its start, and the words whose first phone lies in the span."""
-    edges = transcript.phones.edges - begin
+    edges = transcript.phones.edges - start
     inside = [at for at in range(len(transcript.phones)) if edges[at] < duration - 1e-6 and edges[at + 1] > 1e-6]
     if not inside:  # after the end of the sound
         return PhoneSequence([SILENCE], [0.0, duration]), ()

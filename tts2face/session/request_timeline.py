@@ -15,15 +15,7 @@ SMILE_S = 10.0  # of its beginning are read: as `held_smile`, its score is the w
 
 
 def build_request_timeline(request: Request) -> Timeline:
-    """Timeline of a request's ``timeline`` file, overridden by its ``style``, ``gain`` and ``expression``.
-
-    Raises
-    ------
-    InputError, DataError
-        An option cannot be parsed, or the file is invalid; or the recording shows no face, as `read_take`.
-    BackendError
-        The tracker of faces is not installed, for the expression of a video.
-    """
+    """Timeline of a request's ``timeline`` file, overridden by its ``style``, ``gain`` and ``expression``."""
     flags = Timeline(
         style=parse_style(request.style) if request.style is not None else {},
         expressions=_expressions(request),
@@ -60,7 +52,7 @@ def _gains(request: Request) -> Gains:
 
 
 def listening_timeline(request: Request) -> Timeline:
-    """What the face does while it listens; what is heard of a partner gives the responses."""
+    """Motion of the face while it listens; what is heard of a partner gives the responses."""
     source = request.source
     if not isinstance(source, Listening):
         return Timeline()

@@ -38,7 +38,9 @@ class SessionCache:
         max_bytes: int | None = None,
         memory_mb: float = 0.0,
     ) -> None:
-        self._n_sessions, self._voices, self._max_bytes = n_sessions, voices, max_bytes
+        self._n_sessions = n_sessions
+        self._voices = voices
+        self._max_bytes = max_bytes
         self._memory_mb = memory_mb
         self._sessions: OrderedDict[tuple[Models, str, tuple[int, ...]], Session] = OrderedDict()
 

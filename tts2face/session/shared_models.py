@@ -80,11 +80,6 @@ class SessionModels:
         Face to show; None for the talker's own face.
     memory
         Speech and lip motion of finished sentences.
-
-    Raises
-    ------
-    InputError, DataError
-        As for `tts2face.Session`.
     """
 
     def __init__(
@@ -169,11 +164,6 @@ class SessionModels:
         ----------
         keeps_utterances
             As for `VoicePool.voice`.
-
-        Raises
-        ------
-        InputError
-            The face does not have the articulation of the request, or an excluded token does not exist.
         """
         request = prepared.request
 

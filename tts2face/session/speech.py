@@ -40,6 +40,13 @@ from tts2face.types import Speech, Waveform, YieldTurn, concatenate_speech, fram
 
 Deliveries = Mapping[str, Delivery]  # of a palette's styles, by name
 NO_DELIVERIES: Deliveries = MappingProxyType({})
+MIN_UTTERANCE_GAP_S = 0.02  # between utterances of a sentence; less would cut into speech (edges are exact to 16 ms)
+SPEED_CHANGE_PAUSE_S = 0.06  # between utterances that differ in speed only
+IDLE_PART_S = 10.0  # length of the parts of idle animation, similar to a long sentence
+IDLE_RATE = 48_000  # Hz, sample rate of idle animation
+LOUDNESS_RAMP_S = 0.03  # transition between two loudness levels
+Floats = NDArray[np.float64]
+Voices = Callable[[str | None, str], Voice]  # a voice by name (None: the best one) and language
 
 
 def text_of(request: Request) -> Spoken:
@@ -78,16 +85,6 @@ def _whole_style(base: str | None, nested: tuple[str, ...]) -> str:
         chosen |= parse_style(written)
     names = {chosen.get(feature, "") for feature in FEATURES}
     return names.pop() if len(names) == 1 else ""
-
-
-MIN_UTTERANCE_GAP_S = 0.02  # between utterances of a sentence; less would cut into speech (edges are exact to 16 ms)
-SPEED_CHANGE_PAUSE_S = 0.06  # between utterances that differ in speed only
-IDLE_PART_S = 10.0  # length of the parts of idle animation, similar to a long sentence
-IDLE_RATE = 48_000  # Hz, sample rate of idle animation
-LOUDNESS_RAMP_S = 0.03  # transition between two loudness levels
-
-Floats = NDArray[np.float64]
-Voices = Callable[[str | None, str], Voice]  # a voice by name (None: the best one) and language
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,11 +143,6 @@ def speak_sentence(
         the sample rate of `voice`.
     deliveries
         Of the styles of the palette.
-
-    Raises
-    ------
-    InputError
-        A voice cannot speak any part of the text, or `voices` is None and the sentence needs other voices.
     """
     text = text_of(request)
     parts: list[Phrase] = []
@@ -178,11 +170,11 @@ def speak_sentence(
         volumes.append(text.volume * delivery.volume)
     sentence = replace(sentence, utterances=tuple(parts))
     scaled = [_scale_speech(speech, text.volume, gain) for speech, gain in zip(spoken, gains, strict=True)]
-    speech, begins = _join_sentence(scaled, sentence, voice.sample_rate)
+    speech, starts = _join_sentence(scaled, sentence, voice.sample_rate)
     yield_turn()
     levelled = level_speech(spoken, [volume * gain for volume, gain in zip(volumes, gains, strict=True)], yield_turn)
     sound = _join_sentence(levelled, sentence, voice.sample_rate)[0].waveform
-    times = SentenceTimes(tuple(part.first for part in sentence.utterances), tuple(word_times), tuple(begins))
+    times = SentenceTimes(tuple(part.first for part in sentence.utterances), tuple(word_times), tuple(starts))
     return SpokenSentence(
         speech, *resolve_marks(sentence.runs, sentence.marks, times, (sentence.first, sentence.last)), sound
     )
@@ -226,13 +218,7 @@ def phrase_content(part: Phrase) -> SpeechInput:
 
 
 def speaker_of(part: Phrase, voice: Voice, request: Request, voices: Voices | None) -> Voice:
-    """Voice of a phrase: the request's, or for a span with a voice or language of its own, the matching one.
-
-    Raises
-    ------
-    InputError
-        `voices` is None and the phrase needs another voice, or no voice has this name or language.
-    """
+    """Voice of a phrase: the request's, or for a span with a voice or language of its own, the matching one."""
     if part.voice is None and part.language is None:
         return voice
     if voices is None:
@@ -249,13 +235,13 @@ def voice_in(name: str | None, language: str | None) -> str | None:
 
 def _join_sentence(speeches: Sequence[Speech], sentence: Sentence, rate: int) -> tuple[Speech, list[float]]:
     """Utterances of a sentence with its pauses, and the start of each in seconds."""
-    speech, begins = join_utterances(speeches, [_pause_after(part) for part in sentence.utterances[:-1]])
+    speech, starts = join_utterances(speeches, [_pause_after(part) for part in sentence.utterances[:-1]])
     if sentence.leading_pause > 0:
         before = silent_speech(sentence.leading_pause, rate)
-        speech, begins = concatenate_speech([before, speech]), [second + before.waveform.duration for second in begins]
+        speech, starts = concatenate_speech([before, speech]), [second + before.waveform.duration for second in starts]
     if pause := sentence.utterances[-1].pause:
         speech = concatenate_speech([speech, silent_speech(pause, rate)])
-    return speech, begins
+    return speech, starts
 
 
 def silent_sentences(
@@ -269,8 +255,10 @@ def silent_sentences(
     bounds = [*range(0, n_frames, max(round(IDLE_PART_S * fps), 1)), n_frames]
     for first, last in pairwise(bounds):
         steps = n_steps * last // n_frames - n_steps * first // n_frames
-        silence, begin, end = silent_frames(first, last, rate, fps), float(first / fps), float(last / fps)
-        yield SpokenSentence(silence, timeline.restrict(begin, end).shift(-begin), (), silence.waveform), steps, ""
+        silence = silent_frames(first, last, rate, fps)
+        start = float(first / fps)
+        end = float(last / fps)
+        yield SpokenSentence(silence, timeline.restrict(start, end).shift(-start), (), silence.waveform), steps, ""
 
 
 def without_long_silence(sentence: Sentence) -> tuple[Sentence, float, float]:
@@ -295,7 +283,7 @@ def long_silence(
 
     The styles without an end in the `timeline` of the sentence before it go on.
     """
-    timeline = Timeline(spans=tuple(replace(one, start=0.0) for one in timeline.spans if one.end == math.inf))
+    timeline = Timeline(spans=tuple(replace(span, start=0.0) for span in timeline.spans if span.end == math.inf))
     for spoken, n_steps, text in silent_sentences(seconds, fps, 0, timeline, rate) if seconds > 0.0 else ():
         sound = spoken.sound.part(0, len(spoken.sound.samples) - 1)  # padded: its frames may have one sample less here
         yield replace(spoken, speech=Speech.without_phones(sound), sound=sound), n_steps, text

@@ -59,6 +59,7 @@ NOT_SPOKEN: Mapping[str, Any] = MappingProxyType(
     {"expression": None, "gain": None, "timeline": None, "pitch": False, "context": None, "exemplars": None}
     | {"gaze": CONVERSATION}
 )
+_FIRST, _LAST = "excerpt-begin", "excerpt-end"  # names of the marks at the onsets of an excerpt and of what follows it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,7 +113,7 @@ class Piece:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpeechModels:
-    """What speaks: ``voice`` returns the voice of a name and a language.
+    """Voices and what they share: ``voice`` returns the voice of a name and a language.
 
     ``yield_turn`` is called between the steps of a piece; ``memory`` keeps the speech and the lip motion of sentences;
     ``deliveries`` are those of the styles of a palette.
@@ -135,16 +136,20 @@ class SpeechSpan:
 
 def measure_speech(prepared: PreparedRequest, models: SpeechModels) -> SpeechSpan:
     """Span of the speech of a text in its clip, without synthesis of motion."""
-    fps, first_frame, begin, end, total = float(prepared.fps), 0, 0.0, 0.0, 0.0
+    fps = float(prepared.fps)
+    first_frame = 0
+    start = 0.0
+    end = 0.0
+    total = 0.0
     for spoken, _, _ in speak_sentences(prepared, models):
         at, phones = first_frame / fps, spoken.speech.phones
         voiced = [number for number, phone in enumerate(phones.phones) if phone != SILENCE]
         if voiced:
-            begin = begin if end else at + float(phones.edges[voiced[0]])
+            start = start if end else at + float(phones.edges[voiced[0]])
             end = at + float(phones.edges[voiced[-1] + 1])
         total = at + spoken.speech.waveform.duration
         first_frame += frame_count(spoken.speech.waveform.duration, fps)
-    return SpeechSpan(begin, end, total)
+    return SpeechSpan(start, end, total)
 
 
 def spoken_pieces(
@@ -163,15 +168,15 @@ def spoken_pieces(
     """
     fps = prepared.fps
     for spoken, n_steps, text in speak_sentences(prepared, models, has_phones=has_phones):
-        speech, begin = pad_to_frame(spoken.speech, first_frame, fps), float(first_frame / fps)
+        speech, start = pad_to_frame(spoken.speech, first_frame, fps), float(first_frame / fps)
         n_frames = frame_count(speech.waveform.duration, float(fps))
         sound = spoken.sound.padded(len(speech.waveform.samples))
         yield Piece(
             Clip.at_rest(n_frames, float(fps), replace(speech, waveform=sound)),
-            begin,
+            start,
             n_steps,
-            spoken.timeline.restrict(0.0, speech.waveform.duration).shift(begin),
-            tuple(replace(mark, seconds=mark.seconds + begin) for mark in spoken.marks),
+            spoken.timeline.restrict(0.0, speech.waveform.duration).shift(start),
+            tuple(replace(mark, seconds=mark.seconds + start) for mark in spoken.marks),
             text=text,
             voice_sound=speech.waveform,
         )
@@ -282,9 +287,6 @@ def _require_voices(prepared: PreparedRequest) -> None:
         require_installed(name)
 
 
-_FIRST, _LAST = "excerpt-begin", "excerpt-end"  # names of the marks at the onsets of an excerpt and of what follows it
-
-
 def _speak_excerpt(
     prepared: PreparedRequest, excerpt: Excerpt, models: SpeechModels
 ) -> tuple[SpokenSentence, int, str]:
@@ -297,19 +299,21 @@ def _speak_excerpt(
     ]
     whole = replace(text, marks=tuple(sorted((*text.marks, *marks), key=lambda mark: mark.at)))
     request = replace(prepared, text=whole, excerpt=None)
-    spoken = [one for one, _, _ in speak_sentences(request, models)]
-    begins = np.cumsum([0.0, *(one.speech.waveform.duration for one in spoken)])
-    times = {mark.name: mark.seconds + begin for one, begin in zip(spoken, begins, strict=False) for mark in one.marks}
-    voice = concatenate_speech([one.speech for one in spoken])
+    spoken = [sentence for sentence, _, _ in speak_sentences(request, models)]
+    starts = np.cumsum([0.0, *(sentence.speech.waveform.duration for sentence in spoken)])
+    times = {
+        mark.name: mark.seconds + start for said, start in zip(spoken, starts, strict=False) for mark in said.marks
+    }
+    voice = concatenate_speech([sentence.speech for sentence in spoken])
     bounds = word_bounds(voice, times.get(_FIRST, 0.0), times.get(_LAST, voice.waveform.duration))
     kept = excerpt_of_speech(voice, *bounds)
-    sound = excerpt_of_speech(concatenate_speech([_with_sound(one) for one in spoken]), *bounds)
+    sound = excerpt_of_speech(concatenate_speech([_with_sound(sentence) for sentence in spoken]), *bounds)
     cut = 0
     lead = text_of(prepared.request).lead
     if lead is not None:
         cut = round((speech_onset(kept.waveform) - lead) * kept.waveform.rate)
     silence = [silent_speech(excerpt.silence, kept.waveform.rate)] if excerpt.silence > 0.0 else []
-    kept, sound = (concatenate_speech([shift_start(one, cut), *silence]) for one in (kept, sound))
+    kept, sound = (concatenate_speech([shift_start(part, cut), *silence]) for part in (kept, sound))
     written = text.text[places[0] : places[1]].strip()
     return SpokenSentence(kept, Timeline(), (), sound.waveform), len(written), written
 

@@ -26,7 +26,7 @@ def pieces(
     """Synthesise the clip of a request piece by piece.
 
     Each piece ends on a frame boundary, so that sound and picture stay synchronous at any length, in bounded memory.
-    The pieces of a text begin and end with the face at rest.
+    The face is at rest at both ends of the pieces of a text.
 
     Parameters
     ----------

@@ -28,14 +28,7 @@ def marked_styles(text: MarkedText) -> tuple[str, ...]:
 
 
 def check_marks(text: MarkedText, request: Request) -> None:
-    """Reject marks that are invalid or cannot be combined with the request, in time linear in the length of the text.
-
-    Raises
-    ------
-    InputError
-        A style cannot be parsed, the product of a speed or loudness with the request's is out of range, the text names
-        another language, or the text of a recording has marks that change pauses or the voice.
-    """
+    """Reject marks that are invalid or do not go with the request, in time linear in the length of the text."""
     if isinstance(request.source, Recorded) and text.has_voice_changes:
         raise InputError(
             "[pause], <break>, <prosody>, <emphasis>, <voice> and <lang> have no effect on a recording; remove them or "

@@ -65,9 +65,9 @@ def compile_kernels(drawn: Face | None) -> None:
     from tts2face.picture.surface import STRANDS
 
     has_strands = drawn is not None and isinstance(drawn.light, Lamps)
-    works = deque(name for name, work in WORKS.items() if has_strands or work is not compile_strands)
-    children = [Child(Program(f"{__name__}:HANDLERS")) for _ in range(min(available_cores() - 1, len(works)))]
-    threads = [threading.Thread(target=_compile, args=(child, works), daemon=True) for child in children]
+    names = deque(name for name, work in TASKS.items() if has_strands or work is not compile_strands)
+    children = [Child(Program(f"{__name__}:HANDLERS")) for _ in range(min(available_cores() - 1, len(names)))]
+    threads = [threading.Thread(target=_compile, args=(child, names), daemon=True) for child in children]
     for thread in threads:
         thread.start()
     try:
@@ -75,19 +75,19 @@ def compile_kernels(drawn: Face | None) -> None:
             compile_pictures(keep_parts(drawn, lambda part: part.kind != STRANDS) if has_strands else drawn)
         with suppress(IndexError):  # the children have taken the rest
             while True:
-                WORKS[works.popleft()]()
+                TASKS[names.popleft()]()
         for thread in threads:
             thread.join()
     finally:
-        works.clear()
+        names.clear()
         for child in children:
             child.close()
 
 
-def _compile(child: Child, works: deque[str]) -> None:
+def _compile(child: Child, names: deque[str]) -> None:
     with suppress(BackendError, IndexError):  # its kernels are compiled at their first use; no work is left
         while True:
-            child.call(works.popleft(), {}, timeout_s=COMPILE_TIMEOUT_S)
+            child.call(names.popleft(), {}, timeout_s=COMPILE_TIMEOUT_S)
 
 
 def compile_pictures(face: Face) -> None:
@@ -142,7 +142,7 @@ def compile_gestures() -> None:
 def compile_sound() -> None:
     """Compile the kernels of the level of sound and of edges."""
     from tts2face.models.phone_classifier import load_phone_classifier
-    from tts2face.sound.level import block_powers
+    from tts2face.sound.loudness import block_powers
     from tts2face.sound.segments import StatedPhone, find_edges
     from tts2face.types import Waveform
 
@@ -183,10 +183,10 @@ def _handler(work: Callable[[], None]) -> Handler:
     return handle
 
 
-WORKS: Mapping[str, Callable[[], None]] = MappingProxyType({
+TASKS: Mapping[str, Callable[[], None]] = MappingProxyType({
     "compile_motion": _motion, "compile_strands": compile_strands, "compile_gestures": _gestures,
     "compile_sound": _sound,
 })  # fmt: skip
 HANDLERS: Mapping[str, Handler] = MappingProxyType(
-    {name: _handler(work) for name, work in WORKS.items()} | {"compile_pictures": _pictures}
+    {name: _handler(work) for name, work in TASKS.items()} | {"compile_pictures": _pictures}
 )

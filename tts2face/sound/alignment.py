@@ -1,6 +1,6 @@
 """Forced alignment of the phones of a known text with a recording of it.
 
-A phone recogniser tells when each phone is heard (`tts2face.sound.spikes`), and a classifier to which phone each frame
+A phone recogniser finds when each phone is heard (`tts2face.sound.spikes`), and a classifier to which phone each frame
 of 5 ms belongs. A search over all divisions of the sound (`tts2face.sound.segments`) adds to both how long phones last.
 Words that are not said are left out, and sounds that are not written are stepped over.
 """
@@ -34,7 +34,10 @@ SONORANTS = frozenset({"nasal", "lateral", "approximant", "tap", "trill"})
 PADDING_S, PADDING_LEVEL = 0.1, 3e-4
 USUAL_DELAY_S = 0.035  # of spikes behind the middles of phones
 LEAST_FIT = 0.6  # of a right text; docs/decisions/193-alignment.md
-LEFT_OUT, LEAST_SAID, N_LEFT_OUT = 0.1, 0.8, 6  # confidence of words and of all others, phones of those together
+# confidence of words and of all others, phones of those together
+LEFT_OUT = 0.1
+LEAST_SAID = 0.8
+N_LEFT_OUT = 6
 N_UNWRITTEN = 5  # phones heard in a silence
 WORDS_SHOWN = 8
 Floats = NDArray[np.float64]
@@ -110,13 +113,16 @@ class Alignment:
             )
 
 
+Align = Callable[[Waveform, PronouncedWords], Alignment]
+
+
 def join_alignments(parts: Sequence[Alignment]) -> Alignment:
     """Alignment of a sound from those of its parts, one after another."""
     phones, words = concatenate_phones([part.phones for part in parts], [part.words for part in parts])
-    begins = np.cumsum([0.0, *(part.phones.end for part in parts)])
+    starts = np.cumsum([0.0, *(part.phones.end for part in parts)])
     fit = Fit(*(sum(getattr(part.fit, field.name) for part in parts) for field in fields(Fit)))
     mismatches = [
-        one.shift(float(begin)) for part, begin in zip(parts, begins, strict=False) for one in part.mismatches
+        mismatch.shift(float(start)) for part, start in zip(parts, starts, strict=False) for mismatch in part.mismatches
     ]
     return Alignment(phones, words, fit, tuple(mismatches))
 
@@ -137,9 +143,6 @@ class HeardSound:
     def words(self) -> tuple[tuple[str, ...], ...]:
         """The most probable phones of each word."""
         return self.heard.words()
-
-
-Align = Callable[[Waveform, PronouncedWords], Alignment]
 
 
 class Aligner:
@@ -168,7 +171,7 @@ class Aligner:
         return self._given or load_phone_classifier("recordings")
 
     def hear(self, sound: Waveform) -> HeardSound:
-        """What is heard in a sound, which is aligned without being heard again."""
+        """Phones that are heard in a sound, which is aligned without being heard again."""
         return HeardSound(sound, self.recogniser.hear(_padded(sound)))
 
     def align(
@@ -213,7 +216,7 @@ class Aligner:
         confidence = _confidence(find_spikes(heard, columns, UNSAID), words)
         kept = _is_kept(confidence, words) if may_lack else np.ones(len(words), bool)
         said = [word for word, is_said in zip(words, kept, strict=True) if is_said]
-        spikes = find_spikes(heard, [one for one, is_said in zip(columns, kept, strict=True) if is_said], NEVER)
+        spikes = find_spikes(heard, [column for column, is_said in zip(columns, kept, strict=True) if is_said], NEVER)
         chosen = self._choose(frames, [alternatives for _, alternatives in said], spikes, times)
         if not chosen:
             raise DataError(f"the sound of {duration:.2f} s is too short for {len(words)} words; check the words")
@@ -222,29 +225,29 @@ class Aligner:
         lengths = np.array([len(alternatives[0]) for _, alternatives in words])
         fit = Fit(float(lengths.sum()), float(lengths @ confidence), float(len(places)))
         found = (*_unheard(words, confidence, kept, phones, spans), *_unwritten(phones, places))
-        return Alignment(phones, spans, fit, tuple(sorted(found, key=lambda one: one.begin)))
+        return Alignment(phones, spans, fit, tuple(sorted(found, key=lambda mismatch: mismatch.begin)))
 
     def _choose(
         self, frames: Floats, words: Sequence[Pronunciations], spikes: Floats, times: Sequence[Span] | None
     ) -> list[tuple[PlacedPhone | None, float, float]]:
-        """Phones of the best division of a sound, None for silences, each with its begin and end in seconds."""
+        """Phones of the best division of a sound, None for silences, each with its start and end in seconds."""
         silence = self._classifier.inventory.index(SILENCE)
         frames = np.maximum(_lenient(frames, self._classifier.inventory), LEAST_FRAME)
         frames[:, silence] = np.maximum(frames[:, silence], PASSED_OVER)
         placed, padding = place_phones(self._classifier, words, spikes), PADDING_S
-        known = times and [(begin + padding, end + padding) for begin, end in times]
+        known = times and [(start + padding, end + padding) for start, end in times]
         segments, phones = word_segments(self._classifier, placed, len(frames), known)
         found = divide(FRAME_WEIGHT * frames, segments)
         end = len(frames) * STEP_S - 2 * padding
-        seconds = [(phones[at], _seconds(begin), _seconds(last)) for at, begin, last in found]
-        return [one for one in seconds if one[0] is not None or (one[2] > STEP_S and one[1] < end - STEP_S)]
+        seconds = [(phones[at], _seconds(start), _seconds(last)) for at, start, last in found]
+        return [span for span in seconds if span[0] is not None or (span[2] > STEP_S and span[1] < end - STEP_S)]
 
 
 def _lenient(frames: Floats, inventory: Sequence[str]) -> Floats:
     """Log probabilities (T, P) of frames, in which a phone may also be heard as another vowel, sonorant or obstruent.
 
     The end of a diphthong is a vowel of its own, and a voice that the classifier has not learnt is often misheard;
-    then only that there is a sound tells a phone from a pause.
+    then a phone differs from a pause only in that there is a sound.
     """
     classes = np.array([_class_of(label) for label in inventory])
     sounds = classes != SILENCE
@@ -268,7 +271,7 @@ def _phones_in(words: PronouncedWords) -> set[str]:
 
 
 def _padded(sound: Waveform) -> Waveform:
-    """The sound at its level, with quiet noise before and after it: an abrupt begin is heard as a stop."""
+    """The sound at its level, with quiet noise before and after it: an abrupt start is heard as a stop."""
     sound = levelled(sound)
     quiet = np.random.default_rng(0).normal(0.0, PADDING_LEVEL, round(PADDING_S * sound.rate)).astype(np.float32)
     return Waveform(np.concatenate([quiet, sound.samples, quiet]), sound.rate)
@@ -328,7 +331,7 @@ def _sequence(
 ) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
     """Phones from 0 s to the end, and the words of them."""
     labels = [SILENCE if phone is None else phone.label for phone, *_ in chosen]
-    edges = np.array([*(max(begin, 0.0) for _, begin, _ in chosen), duration])
+    edges = np.array([*(max(start, 0.0) for _, start, _ in chosen), duration])
     of_word: list[list[int]] = [[] for _ in texts]
     for at, (phone, *_) in enumerate(chosen):
         if phone is not None:
@@ -353,11 +356,11 @@ def _unheard(
     for first, last in _runs(confidence < DOUBTFUL, words, N_LEFT_OUT):
         before, behind = int(places[first]), int(places[last])
         if before < behind:  # some of them have been placed
-            begin, end = phones.edges[spans[before].first], phones.edges[spans[behind - 1].last]
+            start, end = phones.edges[spans[before].first], phones.edges[spans[behind - 1].last]
         else:
-            begin = phones.edges[spans[before - 1].last] if before else phones.start
+            start = phones.edges[spans[before - 1].last] if before else phones.start
             end = phones.edges[spans[behind].first] if behind < len(spans) else phones.end
-        found.append(TextMismatch(float(begin), float(end), tuple(text for text, _ in words[first:last])))
+        found.append(TextMismatch(float(start), float(end), tuple(text for text, _ in words[first:last])))
     return found
 
 

@@ -38,6 +38,29 @@ from tts2face.sound.voice import (
 )
 from tts2face.types import Speech, Waveform
 
+CHILD = Path(__file__).with_name("espeak_child.py")
+WORD_EVENT, PHONEME_EVENT = 1, 7
+ANY_GENDER, FEMALE = 0, 2  # espeak_VOICE.gender; ANY_GENDER selects the male voice if a language has both
+_WORDS = re.compile(r"\w+(?:[ '’-]\w+)*")
+LANGUAGE_SWITCH = re.compile(r"\([a-z0-9-]+\)")  # espeak-ng marks where a foreign word begins and ends: (en)...(fr)
+DEFAULT_WORDS_PER_MINUTE = 175  # espeak-ng's default; the times of its events are wrong above 400
+CHILD_TIMEOUT_S = 60.0  # a sentence takes about 50 ms
+MAX_CLOSURE_S = 0.06  # the event of a stop marks its burst; the closure before it lasts 38-46 ms
+CLOSED_LEVEL = 0.006  # relative to full scale; closures are digital silence after the decay of the previous phone
+QUIET_LEVEL = 0.03  # relative to full scale; residual level of the previous phone in a pause
+LEVEL_WINDOW_S = 0.001
+MIN_EVENT_PAUSE_S = 0.03
+MAX_WORD_PHONES = 80  # espeak-ng crashes on words of 300
+EDGE_SILENCE_S = 0.25  # silence added at both ends, because lips start to move before the sound does
+# espeak-ng's phoneme mnemonics for [[...]] input (docs/phonemes.md of espeak-ng).
+MNEMONICS = MappingProxyType({
+    "ɑ": "A:", "æ": "a", "ʌ": "V", "ɔ": "O:", "aʊ": "aU", "aɪ": "aI", "ɛ": "E", "ɝ": "3:", "eɪ": "eI", "ɪ": "I",
+    "i": "i:", "oʊ": "oU", "ɔɪ": "OI", "ʊ": "U", "u": "u:", "ə": "@", "ɚ": "3", "b": "b", "tʃ": "tS", "d": "d",
+    "ð": "D", "f": "f", "ɡ": "g", "h": "h", "dʒ": "dZ", "k": "k", "l": "l", "m": "m", "n": "n", "ŋ": "N", "p": "p",
+    "ɹ": "r", "s": "s", "ʃ": "S", "t": "t", "θ": "T", "v": "v", "w": "w", "j": "j", "z": "z", "ʒ": "Z",
+})  # fmt: skip
+STRESS_MARKS = MappingProxyType({1: "'", 2: ","})
+
 
 def match_phones(given: Sequence[str], reported: Sequence[str]) -> tuple[tuple[int, int], ...]:
     """Cheapest monotone matching of given phones with reported ones, each with at least one.
@@ -92,30 +115,6 @@ def given_starts(given: Sequence[str], reported: Sequence[str], starts: Sequence
         if found[number] >= following:  # reported without duration (the l of bottle): half of the phone before it
             found[number] = (found[number - 1] + following) / 2
     return found
-
-
-CHILD = Path(__file__).with_name("espeak_child.py")
-WORD_EVENT, PHONEME_EVENT = 1, 7
-ANY_GENDER, FEMALE = 0, 2  # espeak_VOICE.gender; ANY_GENDER selects the male voice if a language has both
-_WORDS = re.compile(r"\w+(?:[ '’-]\w+)*")
-LANGUAGE_SWITCH = re.compile(r"\([a-z0-9-]+\)")  # espeak-ng marks where a foreign word begins and ends: (en)...(fr)
-DEFAULT_WORDS_PER_MINUTE = 175  # espeak-ng's default; the times of its events are wrong above 400
-CHILD_TIMEOUT_S = 60.0  # a sentence takes about 50 ms
-MAX_CLOSURE_S = 0.06  # the event of a stop marks its burst; the closure before it lasts 38-46 ms
-CLOSED_LEVEL = 0.006  # relative to full scale; closures are digital silence after the decay of the previous phone
-QUIET_LEVEL = 0.03  # relative to full scale; residual level of the previous phone in a pause
-LEVEL_WINDOW_S = 0.001
-MIN_EVENT_PAUSE_S = 0.03
-MAX_WORD_PHONES = 80  # espeak-ng crashes on words of 300
-EDGE_SILENCE_S = 0.25  # silence added at both ends, because lips start to move before the sound does
-# espeak-ng's phoneme mnemonics for [[...]] input (docs/phonemes.md of espeak-ng).
-MNEMONICS = MappingProxyType({
-    "ɑ": "A:", "æ": "a", "ʌ": "V", "ɔ": "O:", "aʊ": "aU", "aɪ": "aI", "ɛ": "E", "ɝ": "3:", "eɪ": "eI", "ɪ": "I",
-    "i": "i:", "oʊ": "oU", "ɔɪ": "OI", "ʊ": "U", "u": "u:", "ə": "@", "ɚ": "3", "b": "b", "tʃ": "tS", "d": "d",
-    "ð": "D", "f": "f", "ɡ": "g", "h": "h", "dʒ": "dZ", "k": "k", "l": "l", "m": "m", "n": "n", "ŋ": "N", "p": "p",
-    "ɹ": "r", "s": "s", "ʃ": "S", "t": "t", "θ": "T", "v": "v", "w": "w", "j": "j", "z": "z", "ʒ": "Z",
-})  # fmt: skip
-STRESS_MARKS = MappingProxyType({1: "'", 2: ","})
 
 
 @dataclass(frozen=True, slots=True)
@@ -330,7 +329,9 @@ def _phone_sequence(
     starts: list[float] = []
     owners: list[int] = []
     if events[0].start > MIN_EVENT_PAUSE_S and events[0].phones != (SILENCE,):
-        labels, starts, owners = [SILENCE], [0.0], [-1]
+        labels = [SILENCE]
+        starts = [0.0]
+        owners = [-1]
     for event, end in zip(events, ends, strict=True):
         if end <= event.start or (event.phones == (SILENCE,) and labels[-1:] == [SILENCE]):
             continue

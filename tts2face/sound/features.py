@@ -2,12 +2,9 @@
 
 Each frame is analysed in its own window of samples, so that block-wise analysis gives the same bytes as analysis of the
 whole sound.
-
-Intensity and pitch of a voice over time, as Praat defines them.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
 from typing import Any
@@ -15,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import DataError, InputError
+from lexicon.errors import InputError
 from tts2face.numeric.arrays import ordered_product
 from tts2face.sound.pauses import NOISE_QUANTILE, SPEECH_QUANTILE
 from tts2face.types import Trajectory, Waveform
@@ -37,9 +34,15 @@ Measure = Callable[[AnalysisWindows], NDArray[np.float64]]
 FEATURE_KINDS = ("formants", "mfcc", "lpc", "lsf", "level", "mel")
 # Log powers of bands, three times a frame of 25 Hz; relative to the mean of the speech so far, which is that of a voice
 # and a microphone. It is found at once, and follows slowly.
-N_BANDS, BAND_LIMITS_HZ, BAND_WINDOW, BAND_TRANSFORM = 24, (80.0, 7600.0), 400, 512
+N_BANDS = 24
+BAND_LIMITS_HZ = (80.0, 7600.0)
+BAND_WINDOW = 400
+BAND_TRANSFORM = 512
 BAND_OFFSETS = (-213, 0, 213)  # samples from the frame
-LEAST_BAND_POWER, FIRST_MEAN, FIRST_LEVEL = 1e-8, -9.0, -20.0  # natural logarithms
+# natural logarithms
+LEAST_BAND_POWER = 1e-8
+FIRST_MEAN = -9.0
+FIRST_LEVEL = -20.0
 MEAN_FRAMES, LEAST_FOLLOWED = 4, 0.03  # weight of the first mean, in frames; least share of a frame
 LEVEL_FALL, SPEECH_RANGE = 0.02, 3.5  # of the level a frame; speech is not farther below it
 
@@ -76,13 +79,7 @@ def speech_features(sound: Waveform, kind: str, *, fps: float, n_frames: int, st
 
 
 def feature_measures(kind: str) -> tuple[Measure, ...]:
-    """Functions that compute a kind of feature, or several kinds joined by ``+``.
-
-    Raises
-    ------
-    InputError
-        A kind does not exist.
-    """
+    """Functions that compute a kind of feature, or several kinds joined by ``+``."""
     names = kind.split("+")
     for name in names:
         if name not in MEASURES:
@@ -139,11 +136,6 @@ def line_spectral_frequencies(coefficients: NDArray[np.floating]) -> NDArray[np.
     ----------
     coefficients : (T, M)
         ``a_1 ... a_M`` of ``A(z) = 1 + sum_k a_k z^-k``; M is even, and A has its roots inside the unit circle.
-
-    Raises
-    ------
-    InputError
-        M is odd or 0.
 
     Notes
     -----
@@ -208,8 +200,8 @@ def level(windows: AnalysisWindows) -> NDArray[np.float64]:
 def mel(windows: AnalysisWindows) -> NDArray[np.float64]:
     """(T, 72) log powers of `N_BANDS` bands at `BAND_OFFSETS` around the middles of T windows."""
     taper = np.hanning(BAND_WINDOW)
-    begins = [HALF_WINDOW_SAMPLES + offset - BAND_WINDOW // 2 for offset in BAND_OFFSETS]
-    parts = np.stack([windows[:, begin : begin + BAND_WINDOW] for begin in begins], axis=1) * taper
+    starts = [HALF_WINDOW_SAMPLES + offset - BAND_WINDOW // 2 for offset in BAND_OFFSETS]
+    parts = np.stack([windows[:, start : start + BAND_WINDOW] for start in starts], axis=1) * taper
     powers = np.square(np.abs(np.fft.rfft(parts, BAND_TRANSFORM))) / np.square(taper).sum()
     bands = np.log(ordered_product(powers, mel_bands(N_BANDS, BAND_LIMITS_HZ, BAND_TRANSFORM)) + LEAST_BAND_POWER)
     return bands.reshape(len(windows), -1)
@@ -221,7 +213,9 @@ def mel_bands(n_bands: int, limits: tuple[float, float], transform: int) -> NDAr
     lowest, highest = (2595.0 * np.log10(1.0 + hertz / 700.0) for hertz in limits)
     edges = 700.0 * (10.0 ** (np.linspace(lowest, highest, n_bands + 2) / 2595.0) - 1.0)
     frequencies = np.linspace(0.0, FEATURE_RATE / 2, transform // 2 + 1)[:, None]
-    low, middle, high = edges[:-2], edges[1:-1], edges[2:]
+    low = edges[:-2]
+    middle = edges[1:-1]
+    high = edges[2:]
     weights: NDArray[np.float64] = np.clip(
         np.minimum((frequencies - low) / (middle - low), (high - frequencies) / (high - middle)), 0.0, None
     )
@@ -249,7 +243,7 @@ class ChannelMean:
 
 
 def channel_adaptation(kind: str) -> Callable[[NDArray[np.float32]], NDArray[np.float32]]:
-    """What makes features of a kind independent of voice and microphone, for one sound."""
+    """Normalisation that makes features of a kind independent of voice and microphone, for one sound."""
     return ChannelMean() if kind == "mel" else np.asarray
 
 
@@ -272,107 +266,3 @@ def _concatenate_windows(windows: AnalysisWindows) -> Any:
     import parselmouth
 
     return parselmouth.Sound(windows.ravel(), sampling_frequency=FEATURE_RATE)
-
-
-LOUDNESS_WINDOW_S, STEP_S = 0.064, 0.008  # analysis window and interval of Praat for a pitch of 100 Hz or more
-THRESHOLD_POWER = 4e-10  # square of 20 micropascals
-MIN_INTENSITY_DB = 0.0  # threshold of hearing, for digital silence, which has no level
-BESSEL_BORDER = 3.75
-BESSEL_SMALL = (1.0, 3.5156229, 3.0899424, 1.2067492, 0.2659732, 0.0360768, 0.0045813)
-BESSEL_LARGE = (
-    0.39894228, 0.01328592, 0.00225319, -0.00157565, 0.00916281, -0.02057706, 0.02635537, -0.01647633, 0.00392377,
-)  # fmt: skip
-PITCH_RANGE_HZ = (75.0, 600.0)  # Praat's default
-SEMITONES_PER_OCTAVE = 12.0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class IntensityTrack:
-    """Intensity of a sound in dB relative to 20 micropascals: `levels` (n,) at `centres` (n,) in seconds."""
-
-    centres: NDArray[np.float64]
-    levels: NDArray[np.float64]
-
-    def at(self, times: NDArray[np.float64]) -> NDArray[np.float32]:
-        """(T,) intensity at times (T,) in seconds."""
-        return np.interp(times, self.centres, self.levels).astype(np.float32)
-
-
-def intensity(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32]:
-    """(T,) `intensity_track` of a sound at times (T,) in seconds."""
-    return intensity_track(sound).at(times)
-
-
-def intensity_track(sound: Waveform) -> IntensityTrack:
-    """Intensity of a sound.
-
-    Raises
-    ------
-    DataError
-        The sound is shorter than the analysis window.
-
-    Notes
-    -----
-    Mean square in a Kaiser-20 window, less the mean, as Praat's *Sound: To Intensity*. Own code, since the library
-    takes 62 MB of memory at run time (decision 073).
-    """
-    period = 1.0 / sound.rate
-    half = int(np.floor(LOUDNESS_WINDOW_S / 2 / period))
-    duration = period * len(sound.samples)
-    n_frames = int(np.floor((duration - LOUDNESS_WINDOW_S) / STEP_S)) + 1
-    if n_frames < 1:
-        raise DataError(f"a sound of {sound.duration:.3f} s is too short to measure; give a longer recording")
-    place = np.arange(-half, half + 1) * period / (LOUDNESS_WINDOW_S / 2)
-    window = _bessel_i0((2 * np.pi**2 + 0.5) * np.sqrt(np.maximum(1.0 - place**2, 0.0)))
-    first = 0.5 * duration - 0.5 * (n_frames * STEP_S) + 0.5 * STEP_S
-    centres = np.asarray(first + np.arange(n_frames) * STEP_S, np.float64)
-    nearest = np.floor((centres - 0.5 * period) / period + 1.5) - 1.0  # rounds ties as Praat does
-    samples = sound.samples.astype(np.float64)
-    powers, whole = np.zeros(n_frames), window.sum()
-    for frame, centre in enumerate(nearest.astype(int).tolist()):
-        begin, end = max(centre - half, 0), min(centre + half + 1, len(samples))
-        part, weights = samples[begin:end], window[begin - centre + half : end - centre + half]
-        rest = part - np.add.reduce(part) / len(part)
-        powers[frame] = np.dot(rest * rest, weights) / (whole if len(weights) == len(window) else weights.sum())
-    levels = 10.0 * np.log10(np.maximum(powers / THRESHOLD_POWER, 10 ** (MIN_INTENSITY_DB / 10)))
-    levels = 10.0 * np.log10(np.maximum(powers / THRESHOLD_POWER, 10 ** (MIN_INTENSITY_DB / 10)))
-    return IntensityTrack(centres, levels)
-
-
-def pitch(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32]:
-    """(T,) pitch in semitones relative to the sound's median, at times (T,) in seconds; 0 for unvoiced frames.
-
-    Raises
-    ------
-    DataError
-        The sound is shorter than the analysis window.
-    """
-    import parselmouth
-
-    low, high = PITCH_RANGE_HZ
-    try:
-        praat_sound = parselmouth.Sound(sound.samples.astype(np.float64), sampling_frequency=sound.rate)
-        found = praat_sound.to_pitch_ac(pitch_floor=low, pitch_ceiling=high)
-    except parselmouth.PraatError as refused:
-        raise DataError(
-            f"a sound of {sound.duration:.3f} s is too short to have a pitch; give a longer one"
-        ) from refused
-    hertz = np.interp(times, found.xs(), found.selected_array["frequency"])
-    nearest = np.clip(np.rint((times - found.xs()[0]) / found.dx).astype(int), 0, found.n_frames - 1)
-    voiced = found.selected_array["frequency"][nearest] > low
-    if not voiced.any():
-        return np.zeros(len(times), np.float32)
-    median = float(np.median(hertz[voiced]))
-    semitones = SEMITONES_PER_OCTAVE * np.log2(np.maximum(hertz, low) / median)
-    return np.where(voiced, semitones, 0.0).astype(np.float32)
-
-
-def _bessel_i0(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Modified Bessel function of order 0 by the approximation that Praat uses, so that its levels are the same.
-
-    Source: Abramowitz and Stegun (1964), 9.8.1 and 9.8.2.
-    """
-    small = np.polynomial.polynomial.polyval((values / BESSEL_BORDER) ** 2, BESSEL_SMALL)
-    above = np.maximum(values, BESSEL_BORDER)
-    large = np.polynomial.polynomial.polyval(BESSEL_BORDER / above, BESSEL_LARGE) * np.exp(above) / np.sqrt(above)
-    return np.where(values < BESSEL_BORDER, small, large)

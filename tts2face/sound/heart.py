@@ -58,6 +58,19 @@ _ENDINGS = MappingProxyType(
 )  # -ed after a stop of the tongue, -es after a sibilant
 _BEFORE_FLAP = frozenset(phone for phone in LETTERS_OF_PHONE if PHONES[phone].is_vowel) | {"ɹ"}
 _ARTICLES = frozenset({("ə",), ("ə", "n"), ("ə", "m")})  # a, an, am
+LANGUAGE = "en-us"
+CLAUSE_MARKS = frozenset({",", ";", ":"})
+MARKS = "".join(PAUSES_S)  # punctuation among the letters
+MAX_LETTERS = 400  # the model accepts at most this many letters in one call
+DURATION_STEP_S = 0.025  # length of one step of the model's durations
+BOUNDARY_DELAY_S = 0.061  # delay of the model's own boundaries against its sound (56 ms when fast, 71 when slow)
+CACHE_KIND, CACHE_VERSION = "voices", 1  # raised when the graph of the same model changes
+DURATION_TENSOR = "/Cast_32_output_0"  # internal tensor of the ONNX graph: steps of 25 ms for each letter
+# A network that returns its input: Hibari's constructor loads one, with an arena, and loading the voice's takes 0.1 s.
+IDENTITY_NETWORK = (
+    b'\x08\x08B\x02\x10\x11:+\n\x10\n\x01x\x12\x01y"\x08Identity\x12\x01e'
+    b"Z\t\n\x01x\x12\x04\n\x02\x08\x01b\t\n\x01y\x12\x04\n\x02\x08\x01"
+)
 
 
 def voice_phones(phones: Sequence[str]) -> list[str]:
@@ -102,21 +115,6 @@ def _variant(pairs: Sequence[tuple[str, int]], at: int) -> str:
     if phone in {"ə", "ɪ"} and not digit and at > 0 and tuple(after) in _ENDINGS.get(pairs[at - 1][0], ()):
         return _SHORT_I
     return LETTERS_OF_PHONE[phone]
-
-
-LANGUAGE = "en-us"
-CLAUSE_MARKS = frozenset({",", ";", ":"})
-MARKS = "".join(PAUSES_S)  # punctuation among the letters
-MAX_LETTERS = 400  # the model accepts at most this many letters in one call
-DURATION_STEP_S = 0.025  # length of one step of the model's durations
-BOUNDARY_DELAY_S = 0.061  # delay of the model's own boundaries against its sound (56 ms when fast, 71 when slow)
-CACHE_KIND, CACHE_VERSION = "voices", 1  # raised when the graph of the same model changes
-DURATION_TENSOR = "/Cast_32_output_0"  # internal tensor of the ONNX graph: steps of 25 ms for each letter
-# A network that returns its input: Hibari's constructor loads one, with an arena, and loading the voice's takes 0.1 s.
-IDENTITY_NETWORK = (
-    b'\x08\x08B\x02\x10\x11:+\n\x10\n\x01x\x12\x01y"\x08Identity\x12\x01e'
-    b"Z\t\n\x01x\x12\x04\n\x02\x08\x01b\t\n\x01y\x12\x04\n\x02\x08\x01"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,11 +186,11 @@ class NeuralVoice:
         from tts2face.sound.segments import find_edges
 
         edges = find_edges(sound, stated, self._classifier)
-        spoken = [at for at, one in enumerate(stated) if not one.may_be_skipped or edges[at + 1] > edges[at]]
+        spoken = [at for at, phone in enumerate(stated) if not phone.may_be_skipped or edges[at + 1] > edges[at]]
         spans, first = [], 1  # stated phones of a word
         for word in words:
-            begin = bisect_left(spoken, first)
-            spans.append(WordSpan(word.text, begin, begin + len(word.phones)))
+            start = bisect_left(spoken, first)
+            spans.append(WordSpan(word.text, start, start + len(word.phones)))
             first += len(word.phones) + 1
         labels = [stated[at].label for at in spoken]
         return Speech(sound, PhoneSequence(labels, [*edges[spoken], sound.duration]), tuple(spans))
@@ -212,18 +210,20 @@ def stated_phones(tokens: Sequence[LetteredWord], steps: NDArray[np.integer]) ->
     """
     from tts2face.sound.segments import StatedPhone
 
-    begins = np.cumsum(steps)[:-1] * DURATION_STEP_S - BOUNDARY_DELAY_S
-    found, at, is_marked = [StatedPhone(SILENCE, 0.0)], 0, False
+    starts = np.cumsum(steps)[:-1] * DURATION_STEP_S - BOUNDARY_DELAY_S
+    found = [StatedPhone(SILENCE, 0.0)]
+    at = 0
+    is_marked = False
     for token in tokens:
         if at:
-            found.append(StatedPhone(SILENCE, begins[at - 1], may_be_skipped=True, is_marked=is_marked))
+            found.append(StatedPhone(SILENCE, starts[at - 1], may_be_skipped=True, is_marked=is_marked))
         ends = [*token.places[1:], len(token.letters.rstrip(MARKS))]
         found += [
-            StatedPhone(phone, begins[at + place], begins[at + end] - begins[at + place])
+            StatedPhone(phone, starts[at + place], starts[at + end] - starts[at + place])
             for phone, place, end in zip(token.phones, token.places, ends, strict=True)
         ]
         at, is_marked = at + len(token.letters) + 1, token.letters[-1] in MARKS
-    return [*found, StatedPhone(SILENCE, begins[at - 1])]
+    return [*found, StatedPhone(SILENCE, starts[at - 1])]
 
 
 class _Network:
@@ -330,7 +330,9 @@ def add_graph_output(model: bytes, tensor: str) -> bytes:
 
     Protocol buffers merge appended messages, so that the output is appended as a ``GraphProto`` (ONNX IR).
     """
-    graph_field, output_field, name_field = 7, 12, 1
+    graph_field = 7
+    output_field = 12
+    name_field = 1
     message = _length_delimited(name_field, tensor.encode())
     return model + _length_delimited(graph_field, _length_delimited(output_field, message))
 

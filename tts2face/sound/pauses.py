@@ -37,7 +37,7 @@ def find_pauses(sound: Waveform) -> tuple[Span, ...]:
         return ()
     quiet = levels < noise + QUIET_SHARE * (speech - noise)
     spans = (true_runs(quiet) * LEVEL_WINDOW_S).tolist()
-    return tuple((begin, end) for begin, end in spans if end - begin >= MIN_PAUSE_S)
+    return tuple((start, end) for start, end in spans if end - start >= MIN_PAUSE_S)
 
 
 def speech_onset(sound: Waveform) -> float:
@@ -55,13 +55,13 @@ def speech_onset(sound: Waveform) -> float:
     threshold = np.quantile(relative, NOISE_QUANTILE) + ONSET_ABOVE_NOISE_DB
     loud = relative > np.clip(threshold, ONSET_DB, LATEST_ONSET_DB)
     closure, shortest = round(MAX_CLOSURE_S / ONSET_WINDOW_S), round(MIN_SOUND_S / ONSET_WINDOW_S)
-    begins, ends = true_runs(loud).T
-    is_new = np.concatenate([[True], begins[1:] - ends[:-1] > closure])
-    begins, ends = begins[is_new], ends[np.concatenate([is_new[1:], [True]])]
-    for begin, end in zip(begins, ends, strict=True):
-        if end - begin >= shortest and relative[begin:end].max() > BREATH_DB:
-            return float(begin * ONSET_WINDOW_S)
-    return float(begins[0] * ONSET_WINDOW_S)
+    starts, ends = true_runs(loud).T
+    is_new = np.concatenate([[True], starts[1:] - ends[:-1] > closure])
+    starts, ends = starts[is_new], ends[np.concatenate([is_new[1:], [True]])]
+    for start, end in zip(starts, ends, strict=True):
+        if end - start >= shortest and relative[start:end].max() > BREATH_DB:
+            return float(start * ONSET_WINDOW_S)
+    return float(starts[0] * ONSET_WINDOW_S)
 
 
 def cut_at_pauses(sound: Waveform, longest: float) -> tuple[Span, ...]:
@@ -76,10 +76,12 @@ def cut_at_pauses(sound: Waveform, longest: float) -> tuple[Span, ...]:
     """
     if longest <= 0:
         raise InputError(f"the longest part of a sound must be above 0 s, not {longest:g} s")
-    found, levels, cuts = find_pauses(sound), _window_levels(sound), [0.0]
+    found = find_pauses(sound)
+    levels = _window_levels(sound)
+    cuts = [0.0]
     while sound.duration - cuts[-1] > longest:
         earliest, latest = cuts[-1] + MIN_STRETCH_SHARE * longest, cuts[-1] + longest
-        middles = [(end - begin, (begin + end) / 2) for begin, end in found if earliest <= (begin + end) / 2 <= latest]
+        middles = [(end - start, (start + end) / 2) for start, end in found if earliest <= (start + end) / 2 <= latest]
         cuts.append(max(middles)[1] if middles else _quietest_instant(levels, earliest, latest))
     cuts.append(sound.duration)
     return tuple(pairwise(cuts))

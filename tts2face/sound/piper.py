@@ -37,22 +37,23 @@ from tts2face.sound.voice import (
 from tts2face.types import Speech, Waveform
 
 MODEL_INPUTS = frozenset({"input", "input_lengths", "scales"})
-BEGIN, PADDING, END = "^", "_", "$"
+START = "^"
+PADDING = "_"
+END = "$"
 STRESS_MARKS = MappingProxyType({1: "ˈ", 2: "ˌ"})
 # espeak-ng's letters of American English, in which these voices are trained, where they differ from the phone table.
 ENGLISH_LETTERS = MappingProxyType({"i": "iː", "u": "uː", "ɑ": "ɑː", "ɔ": "ɔː", "ɝ": "ɜː"})
 FLAP, SHORT_SCHWA = "ɾ", "ɐ"
 _ARTICLES = frozenset({("ə",), ("ə", "n")})
+WORD = re.compile(r"[^\W_]+(?:['’-][^\W_]+)*")
+WORD_AND_MARKS = re.compile(rf"({WORD.pattern})([.,;:!?]*)")
+ESPEAK_PHONES = "espeak"  # type of the supported voices; others need letters, or models that piper downloads
+AlignedWord = tuple[str, list[tuple[str, ...]]]  # a written word with its phones, for the aligner
+SAMPLE_RATES_HZ = (8_000, 48_000)
 
 
 class PiperNetwork:
-    """The model of a Piper voice: letters to sound, without noise, so that equal letters give equal bytes.
-
-    Raises
-    ------
-    DataError
-        The file is damaged or is another model.
-    """
+    """The model of a Piper voice: letters to sound, without noise, so that equal letters give equal bytes."""
 
     def __init__(self, path: Path, settings: Mapping[str, Any]) -> None:
         self._path, self._ids = path, {str(letter): list(ids) for letter, ids in settings["phoneme_id_map"].items()}
@@ -73,7 +74,7 @@ class PiperNetwork:
         DataError
             The model fails or returns no sound.
         """
-        ids = [*self._ids[BEGIN], *self._ids[PADDING]]
+        ids = [*self._ids[START], *self._ids[PADDING]]
         for letter in letters:
             ids += [*self._ids[letter], *self._ids[PADDING]] if letter in self._ids else []
         ids += self._ids[END]
@@ -96,15 +97,7 @@ class PiperNetwork:
 
 
 class PiperTextReader:
-    """piper-tts as reader of a text in the language of a voice: text to letters of each sentence.
-
-    Raises
-    ------
-    DataError
-        The settings are damaged.
-    BackendError
-        piper-tts is not installed.
-    """
+    """piper-tts as reader of a text in the language of a voice: text to letters of each sentence."""
 
     def __init__(self, network: PiperNetwork, settings: Mapping[str, Any]) -> None:
         try:
@@ -202,27 +195,11 @@ def onnx_errors() -> tuple[type[Exception], ...]:
     return TypeError, ValueError, KeyError, AttributeError, *runtime
 
 
-WORD = re.compile(r"[^\W_]+(?:['’-][^\W_]+)*")
-WORD_AND_MARKS = re.compile(rf"({WORD.pattern})([.,;:!?]*)")
-ESPEAK_PHONES = "espeak"  # type of the supported voices; others need letters, or models that piper downloads
-AlignedWord = tuple[str, list[tuple[str, ...]]]  # a written word with its phones, for the aligner
-SAMPLE_RATES_HZ = (8_000, 48_000)
-
-
 class PiperVoice:
     """A Piper voice (VITS in ONNX) with its settings file ``NAME.onnx.json`` in the same folder.
 
     American English is spoken by the phones of `lexicon`; in other languages the text is spoken by piper-tts, whose
     phones are those of espeak-ng.
-
-    Raises
-    ------
-    InputError
-        The voice does not exist, speaks another language, or does not use the phones of espeak-ng.
-    DataError
-        The settings are missing, or a file is damaged.
-    BackendError
-        The voice speaks another language than English, and piper-tts is not installed.
     """
 
     def __init__(self, path: Path, language: str, own_words: PronunciationMap, align: Align | None = None) -> None:

@@ -77,12 +77,12 @@ class PhoneRecogniser:
         """Columns of the network's output that stand for a phone: its own, and those of the nearest English phones."""
         heard = [
             phone,
-            *(one for near in nearest_phones(phone, ENGLISH) for one in (near, *ALSO.get(near, "").split())),
+            *(other for near in nearest_phones(phone, ENGLISH) for other in (near, *ALSO.get(near, "").split())),
         ]
-        return sorted({column for one in heard for column in self._symbols.get(one, [])})
+        return sorted({column for symbol in heard for column in self._symbols.get(symbol, [])})
 
     def hear(self, sound: Waveform) -> "Heard":
-        """What is heard in a sound of any length."""
+        """Phones that are heard in a sound of any length."""
         return Heard(self._output(sound), tuple(self._network.decoder_tokens), self._columns)
 
     def _output(self, sound: Waveform) -> NDArray[np.float32]:
@@ -93,11 +93,11 @@ class PhoneRecogniser:
         samples = levelled(Waveform(samples, RATE)).samples
         part, context, frame = (round(seconds * RATE) for seconds in (PART_S, CONTEXT_S, FRAME_S))
         found = []
-        for begin in range(0, max(len(samples), 1), part):
-            first, is_last = max(begin - context, 0), begin + part >= len(samples)
-            heard = self._hear(samples[first : begin + part + context])
-            last = len(heard) if is_last else (begin + part - first) // frame
-            found.append(heard[(begin - first) // frame : last])
+        for start in range(0, max(len(samples), 1), part):
+            first, is_last = max(start - context, 0), start + part >= len(samples)
+            heard = self._hear(samples[first : start + part + context])
+            last = len(heard) if is_last else (start + part - first) // frame
+            found.append(heard[(start - first) // frame : last])
         return np.concatenate(found)
 
     def _hear(self, samples: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -3,11 +3,12 @@
 What a voice's network states is exact to a step of it, 25 ms, and its pauses are where punctuation is. The edges are
 those of the segments that fit the sound best: a `PhoneClassifier` gives the probability of each phone in frames of
 5 ms, and a search over all divisions of the sound adds to them how well each segment keeps the stated duration and
-begin (segmental Viterbi search, after Ostendorf et al. 1996).
+start (segmental Viterbi search, after Ostendorf et al. 1996).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -20,7 +21,10 @@ from tts2face.numeric.kernels import kernel
 from tts2face.sound.features import mel_bands
 from tts2face.types import Waveform
 
-RATE, STEP, WINDOW, TRANSFORM = 16_000, 80, 320, 512  # Hz; samples between frames, of a frame, of its spectrum
+RATE = 16_000  # Hz
+STEP = 80  # samples between frames
+WINDOW = 320  # samples of a frame
+TRANSFORM = 512  # samples of its spectrum
 STEP_S = STEP / RATE
 N_BANDS, BAND_LIMITS_HZ = 40, (60.0, 7800.0)
 LEAST_POWER = 1e-7
@@ -28,11 +32,11 @@ LOUD_SHARE, BAND_SPREAD = 0.5, 3.0  # frames whose mean is the level of a sound;
 OFFSETS = (-16, -11, -8, -5, -3, -1, 0, 1, 3, 5, 8, 11, 16)  # frames of the window of a classifier
 SCORE_WEIGHT = 0.5  # of log probabilities: those of neighbouring frames are not independent
 DURATION_SPREAD = 0.35  # of log durations around the stated ones
-BEGIN_SPREAD_S = 0.03  # of begins around the stated ones; a Cauchy distribution, since some are far off
+START_SPREAD_S = 0.03  # of starts around the stated ones; a Cauchy distribution, since some are far off
 UNMARKED_PAUSE = -3.0  # log probability of a silence between words without punctuation
 SHORTEST, SHORTEST_SILENCE = 3, 6  # frames
 LONGEST_SHARE = 5  # of the longest stated duration
-REACH = 80  # frames around the stated begin, at the usual rate
+REACH = 80  # frames around the stated start, at the usual rate
 USUAL_DURATION_S = 0.08  # of phones; what is stated for slower speech is less exact
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -59,8 +63,7 @@ class StatedPhone:
     is_marked: bool = False
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Segments:
+class Segments(NamedTuple):
     """N segments of which a sound may consist, in the order of time, between J joints.
 
     Parameters
@@ -68,7 +71,7 @@ class Segments:
     labels : (N,)
         Columns of the frames' log probabilities.
     joints : (N, 2)
-        Joints at which each segment begins and ends. The first joint is the begin of the sound, the last one its end.
+        Joints at which each segment begins and ends. The first joint is where the sound begins, the last one its end.
     shortest : (N,)
         Least frames of each segment.
     passed, taken : (N,)
@@ -92,6 +95,30 @@ class Segments:
     ends: Floats
 
 
+class Divisions(NamedTuple):
+    """The best division of a sound up to each joint at each frame.
+
+    Parameters
+    ----------
+    score : (J, W)
+        Its log probability.
+    entered, before : (J, W)
+        Its last segment, and the frame at which that begins.
+    """
+
+    score: Floats
+    entered: Ints
+    before: Ints
+
+
+class Endings(NamedTuple):
+    """Ways through one segment: the score at each start (W,), the best at each end (W,), and the start that has it."""
+
+    starts: Floats
+    reached: Floats
+    start: Ints
+
+
 def divide(log_probabilities: NDArray[np.floating], segments: Segments) -> list[tuple[int, int, int]]:
     """The most probable division of a sound: each segment that is there, with its first frame and that after its last.
 
@@ -109,82 +136,79 @@ def divide(log_probabilities: NDArray[np.floating], segments: Segments) -> list[
     np.cumsum(log_probabilities, axis=0, out=sums[1:])
     bounds = segments.bounds
     shape = (len(bounds), int((bounds[:, 1] - bounds[:, 0]).max()) + 1)
-    score, entered, before = np.full(shape, -np.inf), np.full(shape, -1), np.zeros(shape, np.int64)
-    score[0, 0] = 0.0
-    space = np.zeros(shape[1]), np.zeros(shape[1]), np.zeros(shape[1], np.int64)
-    costs = segments.passed, segments.taken, segments.durations, segments.begins, segments.ends
-    _search(sums, (segments.labels, segments.joints, segments.shortest, bounds), costs, (score, entered, before), space)
-    joint, frame, found = len(bounds) - 1, int(bounds[-1, 1]), []
+    best = Divisions(np.full(shape, -np.inf), np.full(shape, -1), np.zeros(shape, np.int64))
+    best.score[0, 0] = 0.0
+    _search(sums, segments, best, Endings(np.zeros(shape[1]), np.zeros(shape[1]), np.zeros(shape[1], np.int64)))
+    joint = len(bounds) - 1
+    frame = int(bounds[-1, 1])
+    found = []
     while joint > 0:
-        segment = int(entered[joint, frame - bounds[joint, 0]])
+        segment = int(best.entered[joint, frame - bounds[joint, 0]])
         if segment < 0:
             return []
-        begin = int(before[joint, frame - bounds[joint, 0]])
-        if begin < frame:
-            found.append((segment, begin, frame))
-        joint, frame = int(segments.joints[segment, 0]), begin
+        start = int(best.before[joint, frame - bounds[joint, 0]])
+        if start < frame:
+            found.append((segment, start, frame))
+        joint, frame = int(segments.joints[segment, 0]), start
     return found[::-1]
 
 
 @kernel
-def _search(sums, segments, costs, found, space):  # type: ignore[no-untyped-def]
-    """Write the score (J, W) of the best division up to each joint at each frame, its last segment, and its begin.
-
-    `space` holds three arrays (W,), which are overwritten.
-    """
-    labels, joints, shortest, bounds = segments
-    passed, taken, durations, begins, ends = costs
-    score, entered, before = found
-    all_starts, reached, begin = space
-    for n in range(len(labels)):
-        label, source, target = labels[n], joints[n, 0], joints[n, 1]
+def _search(sums, segments, found, space):  # type: ignore[no-untyped-def]
+    """Write the best divisions up to each joint; `space` is overwritten."""
+    bounds, score = segments.bounds, found.score
+    for n in range(len(segments.labels)):
+        label = segments.labels[n]
+        source, target = segments.joints[n, 0], segments.joints[n, 1]
         (earliest, latest), (low, high) = bounds[source], bounds[target]
         so_far = score[source, : latest - earliest + 1]
-        starts = all_starts[: len(so_far)]
+        starts = space.starts[: len(so_far)]
         for at in range(len(starts)):  # whole arrays would take long to compile
-            starts[at] = so_far[at] + taken[n] + begins[n, at] - sums[earliest + at, label]
-        if durations[n, 0] > 0.0:
-            _end_unlimited(starts, (earliest, low, high), shortest[n], reached, begin)
+            starts[at] = so_far[at] + segments.taken[n] + segments.begins[n, at] - sums[earliest + at, label]
+        if segments.durations[n, 0] > 0.0:
+            _end_unlimited(starts, (earliest, low, high), segments.shortest[n], space)
         else:
-            _end_limited(starts, (earliest, low, high), shortest[n], durations[n], (reached, begin))
+            _end_limited(starts, (earliest, low, high), segments.shortest[n], segments.durations[n], space)
         for end in range(low, high + 1):
             at = end - low
-            value, start = reached[at] + sums[end, label] + ends[n, at], begin[at]
-            if earliest <= end <= latest and so_far[end - earliest] + passed[n] > value:
-                value, start = so_far[end - earliest] + passed[n], end
+            value, start = space.reached[at] + sums[end, label] + segments.ends[n, at], space.start[at]
+            if earliest <= end <= latest and so_far[end - earliest] + segments.passed[n] > value:
+                value, start = so_far[end - earliest] + segments.passed[n], end
             if value > score[target, at]:
-                score[target, at], entered[target, at], before[target, at] = value, n, start
+                score[target, at] = value
+                found.entered[target, at] = n
+                found.before[target, at] = start
 
 
 @kernel
 def _end_limited(starts, frames, shortest, durations, out):  # type: ignore[no-untyped-def]
-    """Write the best score of a segment that ends in each frame from `low` to `high`, and the begin that gives it."""
+    """Write the best score of a segment that ends in each frame from `low` to `high`, and the start that gives it."""
     earliest, low, high = frames
-    reached, begin = out
     for end in range(low, high + 1):
-        reached[end - low], begin[end - low] = -np.inf, 0
+        out.reached[end - low], out.start[end - low] = -np.inf, 0
         first, last = max(end - len(durations) + 1, earliest), min(end - shortest, earliest + len(starts) - 1)
         for at in range(first, last + 1):
             value = starts[at - earliest] + durations[end - at]
-            if value > reached[end - low]:
-                reached[end - low], begin[end - low] = value, at
+            if value > out.reached[end - low]:
+                out.reached[end - low], out.start[end - low] = value, at
 
 
 @kernel
-def _end_unlimited(starts, frames, shortest, reached, begin):  # type: ignore[no-untyped-def]
+def _end_unlimited(starts, frames, shortest, out):  # type: ignore[no-untyped-def]
     """As `_end_limited`, of a segment of any duration."""
     earliest, low, high = frames
-    best, best_at, at = -np.inf, earliest, earliest
+    best, best_at = -np.inf, earliest
+    at = earliest
     for end in range(low, high + 1):
         while at <= min(end - shortest, earliest + len(starts) - 1):
             if starts[at - earliest] > best:
                 best, best_at = starts[at - earliest], at
             at += 1
-        reached[end - low], begin[end - low] = best, best_at
+        out.reached[end - low], out.start[end - low] = best, best_at
 
 
 def find_edges(sound: Waveform, stated: Sequence[StatedPhone], classifier: PhoneClassifier) -> Floats:
-    """(N + 1,) begins of N stated phones in seconds, and the end of the sound; a skipped one begins with the next one.
+    """(N + 1,) starts of N stated phones in seconds, and the end of the sound; a skipped one begins with the next one.
 
     Parameters
     ----------
@@ -192,29 +216,29 @@ def find_edges(sound: Waveform, stated: Sequence[StatedPhone], classifier: Phone
         The first and the last one are silences.
     """
     probabilities = classifier.log_probabilities(frame_features(sound))[:-1]
-    begins = np.array([0.0, *(one.begin for one in stated[1:])])
-    found = divide(SCORE_WEIGHT * probabilities, _stated_segments(stated, begins, len(probabilities), classifier))
+    starts = np.array([0.0, *(phone.begin for phone in stated[1:])])
+    found = divide(SCORE_WEIGHT * probabilities, _stated_segments(stated, starts, len(probabilities), classifier))
     if not found:
-        return enforce_increasing(np.append(begins, sound.duration))
+        return enforce_increasing(np.append(starts, sound.duration))
     edges = np.full(len(stated) + 1, sound.duration)
-    for segment, begin, _ in found:
-        edges[segment] = max((begin - 0.5) * STEP_S, 0.0)
+    for segment, start, _ in found:
+        edges[segment] = max((start - 0.5) * STEP_S, 0.0)
     for segment in range(len(stated) - 1, 0, -1):
-        if stated[segment].may_be_skipped and segment not in {one for one, *_ in found}:
+        if stated[segment].may_be_skipped and segment not in {number for number, *_ in found}:
             edges[segment] = edges[segment + 1]
     return edges
 
 
 def _stated_segments(
-    stated: Sequence[StatedPhone], begins: Floats, n_frames: int, classifier: PhoneClassifier
+    stated: Sequence[StatedPhone], starts: Floats, n_frames: int, classifier: PhoneClassifier
 ) -> Segments:
-    """Segments one after another, near the stated begins and durations."""
+    """Segments one after another, near the stated starts and durations."""
     number = {label: at for at, label in enumerate(classifier.inventory)}
-    durations = np.array([one.duration for one in stated])
-    is_silence = np.array([one.label == SILENCE for one in stated])
+    durations = np.array([phone.duration for phone in stated])
+    is_silence = np.array([phone.label == SILENCE for phone in stated])
     slowness = max(1.0, float(durations[durations > 0].mean()) / USUAL_DURATION_S)
     reach = round(REACH * slowness)
-    frames = np.clip(np.round(begins / STEP_S).astype(np.int64), 0, n_frames)
+    frames = np.clip(np.round(starts / STEP_S).astype(np.int64), 0, n_frames)
     bounds = np.stack([np.maximum(frames - reach, 0), np.minimum(frames + reach, n_frames)], axis=1)
     bounds = np.concatenate([[[0, 0]], bounds[1:], [[n_frames, n_frames]]])
     expected = np.maximum(durations, STEP_S)
@@ -222,17 +246,17 @@ def _stated_segments(
     likely = -0.5 * np.square(np.log(seconds / expected[:, None]) / DURATION_SPREAD)
     likely[is_silence, 0] = 1.0
     times = bounds[:-1, :1] + np.arange((bounds[:, 1] - bounds[:, 0]).max() + 1)
-    apart = (times - frames[:, None]) / (BEGIN_SPREAD_S * slowness / STEP_S)
+    apart = (times - frames[:, None]) / (START_SPREAD_S * slowness / STEP_S)
     near = np.where(is_silence[:, None], 0.0, -np.log1p(0.5 * apart * apart))
     shortest = np.where(is_silence, SHORTEST_SILENCE, SHORTEST)
     shortest[[0, -1]] = 1
     numbers = np.arange(len(stated))
     return Segments(
-        np.array([number[one.label] for one in stated]),
+        np.array([number[phone.label] for phone in stated]),
         np.stack([numbers, numbers + 1], axis=1),
         shortest,
-        np.array([0.0 if one.may_be_skipped else -np.inf for one in stated]),
-        np.array([UNMARKED_PAUSE if one.may_be_skipped and not one.is_marked else 0.0 for one in stated]),
+        np.array([0.0 if phone.may_be_skipped else -np.inf for phone in stated]),
+        np.array([UNMARKED_PAUSE if phone.may_be_skipped and not phone.is_marked else 0.0 for phone in stated]),
         likely,
         bounds,
         near,

@@ -21,13 +21,7 @@ UNSCALED, BY_LENGTH = 0, 2  # of SciPy's compiled transforms
 
 
 def import_hibari() -> ModuleType:
-    """hibari-tts; without `scipy.fft` where its compiled code is found.
-
-    Raises
-    ------
-    ImportError
-        It is not installed.
-    """
+    """hibari-tts; without `scipy.fft` where its compiled code is found."""
     code = None if {"hibari", PACKAGE} & sys.modules.keys() else _compiled_transforms()
     if code is None:
         return import_module("hibari")
@@ -45,7 +39,7 @@ def import_hibari() -> ModuleType:
 
 
 class _Missing:
-    """A finder that tells the thread that made it, and no other, that there is no SciPy."""
+    """A finder that says to the thread that made it, and no other, that there is no SciPy."""
 
     def __init__(self) -> None:
         self._thread = get_ident()
@@ -62,7 +56,7 @@ def _compiled_transforms() -> Any | None:
     folders = [] if found is None else list(found.submodule_search_locations or ())
     names = [(folder, name, suffix) for folder in folders for name in CODES for suffix in EXTENSION_SUFFIXES]
     files = ((name, Path(folder, "fft", f"{name}{suffix}")) for folder, name, suffix in names)
-    name, file = next((one for one in files if one[1].is_file()), ("", None))
+    name, file = next((found for found in files if found[1].is_file()), ("", None))
     spec = None if file is None else spec_from_file_location(f"{PACKAGE}.{name.replace('/', '.')}", file)
     if spec is None or spec.loader is None:
         return None

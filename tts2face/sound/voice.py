@@ -21,6 +21,8 @@ from tts2face.types import Speech, Waveform
 if TYPE_CHECKING:
     from tts2face.sound.alignment import Align
 
+SENTENCE_MARKS = frozenset(".!?")
+
 
 @dataclass(frozen=True, slots=True)
 class SpokenWord:
@@ -78,7 +80,7 @@ class Voice(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class VoiceSetting:
-    """What a voice is made for.
+    """Language and text for which a voice is made.
 
     Parameters
     ----------
@@ -130,9 +132,6 @@ def apply_volume(samples: NDArray[np.floating], volume: float = 1.0) -> NDArray[
     peak = float(np.abs(amplified).max(initial=0.0))
     scaled: NDArray[np.float32] = amplified / np.float32(max(peak, 1.0))
     return np.clip(scaled, -1.0, 1.0)
-
-
-SENTENCE_MARKS = frozenset(".!?")
 
 
 def pronounce_content(content: SpeechInput, language: str, own_words: PronunciationMap) -> tuple[Word, ...]:

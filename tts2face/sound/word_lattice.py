@@ -15,7 +15,9 @@ from tts2face.sound.recogniser import FRAME_S
 from tts2face.sound.segments import STEP_S, Segments
 
 # Chosen on a voice that the classifier has not heard, in noise; docs/decisions/193-alignment.md
-SPIKE_WEIGHT, SPIKE_SPREAD_S, STRAY_SPIKE = 2.0, 0.02, 0.05
+SPIKE_WEIGHT = 2.0
+SPIKE_SPREAD_S = 0.02
+STRAY_SPIKE = 0.05
 TAIL = 0.02  # of a spike, on either side: joints of segments lie between the tails, and a reach around them
 REACH_S = 0.3
 PAUSE, LEADING_PAUSE = -2.0, -0.5  # log probabilities of a silence between words, and at the ends
@@ -90,26 +92,26 @@ def word_segments(
 ) -> tuple[Segments, list[PlacedPhone | None]]:
     """Segments of which the sound of words may consist, and their phones, None for silences.
 
-    Joints are the begin of the sound, the begin of each word, those between its phones, its end, and the end.
+    Joints are the start of the sound, the start of each word, those between its phones, its end, and the end.
     """
     end = n_frames * STEP_S
     bounds, joints = [(0.0, 0.0)], list[tuple[int, int]]()
     phones: list[PlacedPhone | None] = []
-    firsts = [_range([one[0].tails for one in word]) for word in words] + [(end, end)]
-    lasts = [(0.0, 0.0)] + [_range([one[-1].tails for one in word]) for word in words]
+    firsts = [_range([spoken[0].tails for spoken in word]) for word in words] + [(end, end)]
+    lasts = [(0.0, 0.0)] + [_range([spoken[-1].tails for spoken in word]) for word in words]
     for word, alternatives in enumerate(words):
         reached = len(bounds) - 1
         known = times[word] if times else None
-        begin = (lasts[word][0] - REACH_S, firsts[word][1] + REACH_S) if known is None else (known[0], known[0])
-        bounds.append(begin)
+        start = (lasts[word][0] - REACH_S, firsts[word][1] + REACH_S) if known is None else (known[0], known[0])
+        bounds.append(start)
         first = len(bounds) - 1
         joints.append((reached, first))
         phones.append(None)
         inner = []
         for alternative in alternatives:
             inner.append([first])
-            for one, other in pairwise(alternative):
-                bounds.append((one.tails[0] - REACH_S, other.tails[1] + REACH_S))
+            for phone, other in pairwise(alternative):
+                bounds.append((phone.tails[0] - REACH_S, other.tails[1] + REACH_S))
                 inner[-1].append(len(bounds) - 1)
         bounds.append(
             (lasts[word + 1][0] - REACH_S, firsts[word + 1][1] + REACH_S) if known is None else (known[1], known[1])
@@ -138,7 +140,7 @@ def _weighted(
     columns = np.array([silence if phone is None else phone.column for phone in phones])
     likely = durations[columns]
     offsets = np.arange((bounds[:, 1] - bounds[:, 0]).max() + 1)
-    begins, ends = np.zeros((2, len(phones), len(offsets)))
+    starts, ends = np.zeros((2, len(phones), len(offsets)))
     taken = np.full(len(phones), PAUSE)
     taken[[0, -1]] = LEADING_PAUSE
     for at, phone in enumerate(phones):
@@ -147,7 +149,7 @@ def _weighted(
             continue
         taken[at] = phone.share
         edges = (bounds[joints[at], :1] + offsets - 0.5) * STEP_S
-        begins[at] = SPIKE_WEIGHT * np.log(1.0 - phone.passed(edges[0]) + STRAY_SPIKE)
+        starts[at] = SPIKE_WEIGHT * np.log(1.0 - phone.passed(edges[0]) + STRAY_SPIKE)
         ends[at] = SPIKE_WEIGHT * np.log(phone.passed(edges[1]) + STRAY_SPIKE)
     is_silence = columns == silence
     return Segments(
@@ -158,7 +160,7 @@ def _weighted(
         taken=taken,
         durations=likely,
         bounds=bounds,
-        begins=begins,
+        begins=starts,
         ends=ends,
     )
 

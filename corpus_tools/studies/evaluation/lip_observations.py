@@ -17,7 +17,7 @@ from corpus_tools.studies.evaluation.person_tracks import TRACKED
 from corpus_tools.training.adapt_talker import separate_lips
 from corpus_tools.training.pooling.speech import PooledSpeech, talker_features
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.lips.explanation import speech_frames
+from tts2face.lips.motion_measures import speech_frames
 from tts2face.models.talker import Talker
 
 MIN_PART_S = 3.0  # tracks are cut at the first pause after as much: about a sentence

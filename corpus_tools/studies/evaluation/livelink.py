@@ -13,8 +13,8 @@ from lexicon.errors import InputError
 from tts2face.face.deformation import moved_landmarks
 from tts2face.lips.performer import match_shapes
 from tts2face.models.face_loading import load_face
-from tts2face.sound.features import intensity
 from tts2face.sound.pauses import cut_at_pauses
+from tts2face.sound.praat import intensity
 from tts2face.video.livelink import read_livelink
 
 LIVELINK_SUFFIX = ".csv"

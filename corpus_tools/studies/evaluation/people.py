@@ -23,7 +23,7 @@ from corpus_tools.studies.evaluation.heard import heard_phones, mapped_motion
 from corpus_tools.studies.evaluation.tracks import ExternalTrack, map_tracks
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.lips.explanation import DTW_BAND_S, speech_frames, warping_cost
+from tts2face.lips.motion_measures import DTW_BAND_S, speech_frames, warping_cost
 from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import Talker
 

@@ -36,7 +36,7 @@ from corpus_tools.studies.gestures.measures import (
 from lexicon.errors import InputError
 from lexicon.values.fields import check_fields
 from tts2face.gestures.stream import GestureFields
-from tts2face.lips.explanation import pearson
+from tts2face.lips.motion_measures import pearson
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
 from tts2face.types import Progress
 

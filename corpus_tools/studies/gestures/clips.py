@@ -16,7 +16,7 @@ from lexicon.errors import InputError
 from tts2face.gestures.field import initial_state, sample_field_moments
 from tts2face.gestures.field_kernels import MIN_MOMENT_GAP
 from tts2face.gestures.noise import NoiseStream
-from tts2face.gestures.presentation import SILENT_PROSODY
+from tts2face.gestures.prosody import SILENT_PROSODY
 from tts2face.gestures.stream import FIELD_OPTIONS, GestureFields
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import GESTURE_FPS, Palette, Style

@@ -15,7 +15,7 @@ from lexicon.errors import DataError
 from lexicon.sequence import SILENCE
 from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.face.mouth import MIDDLE_PAIR
-from tts2face.lips.explanation import correlation, range_ratio, speech_frames
+from tts2face.lips.motion_measures import correlation, range_ratio, speech_frames
 from tts2face.lips.performer import build_performer_retargeter
 from tts2face.lips.retargeting import BILABIALS
 from tts2face.models.face import Face

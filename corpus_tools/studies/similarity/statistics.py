@@ -23,7 +23,7 @@ from corpus_tools.studies.similarity.tables import (
 from lexicon.errors import InputError
 from lexicon.phones import phone_distance
 from lexicon.sequence import SILENCE
-from tts2face.lips.explanation import pearson
+from tts2face.lips.motion_measures import pearson
 from tts2face.models.landmarks import (
     CHIN,
     LOWER_LIP_INNER_MID,

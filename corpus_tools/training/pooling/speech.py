@@ -21,8 +21,8 @@ from lexicon.nominal_durations import nominal_phones
 from lexicon.phones import ARPABET
 from lexicon.pronounce import pronounce
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.lips.explanation import speech_frames
-from tts2face.lips.tokens import build_targets, target_phones
+from tts2face.lips.motion_measures import speech_frames
+from tts2face.lips.targets import build_targets, target_phones
 from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import Talker
 from tts2face.types import Progress, frame_count

@@ -25,7 +25,7 @@ from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE
 from tests.corpus_tools.speaking import FPS, OPENINGS, observation, track_arrays, with_words
-from tts2face.lips.explanation import speech_frames
+from tts2face.lips.motion_measures import speech_frames
 from tts2face.models.talker import Talker
 from tts2face.models.talker_file import write_talker
 

@@ -23,8 +23,8 @@ from corpus_tools.training.choose_adaptation import (
     recording_advice,
 )
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.lips.cloning import facing_gaps
 from tts2face.lips.exemplar import build_exemplar_model, speech_trajectory
+from tts2face.lips.lip_gaps import facing_gaps
 from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT, lip_opening
 from tts2face.models.talker import Talker
 from tts2face.models.talker_file import load_talker, read_talker, write_talker

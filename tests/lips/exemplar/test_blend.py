@@ -17,7 +17,8 @@ from tts2face.lips.contacts import (
 )
 from tts2face.lips.exemplar import ExemplarModel
 from tts2face.lips.options import THEOBALD_2007, SynthesisOptions
-from tts2face.lips.tokens import Targets, spans_with_reach
+from tts2face.lips.targets import Targets
+from tts2face.lips.tokens import spans_with_reach
 
 GAP = LipGap.with_spread(np.zeros(3, np.float32), np.array([[0.0, 1.0, 0.0]], np.float32), np.ones(1))
 

@@ -5,7 +5,8 @@ import pytest
 
 from lexicon.errors import InputError
 from tts2face.lips.exemplar import build_exemplar_model, select_tokens
-from tts2face.lips.explanation import UsedToken, explain_selection, token_outlines
+from tts2face.lips.explanation import UsedToken, explain_selection
+from tts2face.lips.outlines import token_outlines
 from tts2face.models.landmarks import lip_opening
 from tts2face.models.talker import Talker
 from tts2face.models.talker_file import load_talker

@@ -3,15 +3,8 @@ import numpy as np
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.lips.exemplar import ExemplarModel
 from tts2face.lips.similarity import token_samples
-from tts2face.lips.tokens import (
-    PAUSE_REACH_S,
-    build_targets,
-    collect_tokens,
-    phone_contexts,
-    sample_tokens,
-    spoken_spans,
-    substitute_phones,
-)
+from tts2face.lips.targets import build_targets, substitute_phones
+from tts2face.lips.tokens import PAUSE_REACH_S, collect_tokens, phone_contexts, sample_tokens, spoken_spans
 from tts2face.models.talker import Talker
 
 INVENTORY = tuple(sorted({"p", "b", "s", "t", "i", "ɪ", "ɔ", "u", SILENCE}))

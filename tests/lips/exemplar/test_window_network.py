@@ -18,8 +18,8 @@ from tts2face.lips.exemplar import (
     speech_trajectory,
 )
 from tts2face.lips.options import SynthesisOptions
+from tts2face.lips.targets import Targets, target_phones
 from tts2face.lips.token_search import context_weights
-from tts2face.lips.tokens import Targets, target_phones
 from tts2face.models.phone_network import PhoneNetwork, window_features
 from tts2face.models.talker import Talker
 from tts2face.models.talker_file import read_talker, write_talker

@@ -11,7 +11,8 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tests.face.posing import posed_vertices
 from tts2face.face.deformation import landmark_positions, scatter_landmarks
 from tts2face.face.mouth import MIDDLE_PAIR
-from tts2face.lips.articulation import articulation_tracks, build_articulator, pause_closure, seconds_from_closure
+from tts2face.lips.articulation import build_articulator
+from tts2face.lips.articulation_tracks import articulation_tracks, pause_closure, seconds_from_closure
 from tts2face.lips.exemplar import ExemplarModel, select_tokens
 from tts2face.lips.options import THEOBALD_2007, SynthesisOptions
 from tts2face.lips.teeth_and_tongue import incisor_edge, upper_teeth

@@ -9,7 +9,8 @@ import pytest
 
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence
-from tts2face.gestures.elements import KINDS, GazeTarget, ListeningSpan, Nod, StyleSpan
+from tts2face.gestures.elements import GazeTarget, ListeningSpan, Nod, StyleSpan
+from tts2face.gestures.kinds import KINDS
 from tts2face.lips.options import ExcludedToken
 from tts2face.models.palette import FEATURES
 from tts2face.request import Request

@@ -2,7 +2,7 @@
 
 import re
 
-from tts2face.gestures.elements import KINDS
+from tts2face.gestures.kinds import KINDS
 from tts2face.serving.studio.editing import EDITS
 from tts2face.serving.studio.protocol import LIMITS, MODULE, protocol_module
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from lexicon.sequence import PhoneSequence
-from tts2face.lips.explanation import DTW_BAND_S
+from tts2face.lips.motion_measures import DTW_BAND_S
 from tts2face.models.talker import Talker
 from tts2face.serving.service.messages import Event, Inputs, Task, Work
 from tts2face.serving.studio.tasks import digest_of, read_project

@@ -17,7 +17,8 @@ from typing import Any
 from lexicon.errors import InputError
 from lexicon.sequence import PhoneSequence
 from lexicon.values.checks import check_type, is_number
-from tts2face.gestures.elements import KINDS, ElementKind, Nod, StyleSpan, check_feature
+from tts2face.gestures.elements import Nod, StyleSpan, check_feature
+from tts2face.gestures.kinds import KINDS, ElementKind
 from tts2face.gestures.timeline import Timeline, expand_feature
 from tts2face.lips.options import ExcludedToken
 from tts2face.picture.options import Picture

@@ -8,13 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.marked_text import NOD_SIZE_LIMITS
-from tts2face.gestures.elements import (
-    CHANNEL_OFFSET_LIMITS,
-    EXPRESSION_WEIGHT_LIMITS,
-    GAIN_LIMITS,
-    GAZE_LIMITS_DEG,
-    KINDS,
-)
+from tts2face.gestures.elements import CHANNEL_OFFSET_LIMITS, EXPRESSION_WEIGHT_LIMITS, GAIN_LIMITS, GAZE_LIMITS_DEG
+from tts2face.gestures.kinds import KINDS
 from tts2face.models.palette import EXPRESSIONS, FEATURES
 from tts2face.serving.studio.editing import EDITS, MIN_PHONE_S
 from tts2face.types import HEAD_CHANNELS

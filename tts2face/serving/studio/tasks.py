@@ -18,8 +18,9 @@ import numpy as np
 
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence
-from tts2face.gestures.elements import BeyondClipError
-from tts2face.lips.explanation import N_INSTANTS, LipOutline, PhoneExplanation, lip_outlines, token_outlines
+from tts2face.gestures.kinds import BeyondClipError
+from tts2face.lips.explanation import PhoneExplanation
+from tts2face.lips.outlines import N_INSTANTS, LipOutline, lip_outlines, token_outlines
 from tts2face.models.talker import Talker
 from tts2face.serving.service.messages import DRAWING_THREADS, Event, Inputs, Task, Work
 from tts2face.session.animated_face import AnimatedFace

@@ -1,0 +1,41 @@
+"""Prosodic features of speech: intensity and pitch relative to the speaker's own level and median."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.sound.features import speech_level
+from tts2face.sound.praat import IntensityTrack, intensity_track, pitch
+from tts2face.types import Waveform
+
+AUDIBLE_DB = 30.0  # relative to 20 micropascals; a sound with a lower maximum contains no speech
+HIGH_SEMITONES = 12.0
+QUIET_DB, PROSODY_LOUD_DB = -35.0, 10.0  # limits relative to the mean level of speech; values beyond are clipped
+Float32Array = NDArray[np.float32]
+SILENT_PROSODY = np.array([QUIET_DB, 0.0], np.float32)
+MIN_PITCH_SOUND_S = 0.1  # shorter sounds have no pitch
+
+
+def speech_intensity(sound: Waveform) -> IntensityTrack | None:
+    """Intensity of a sound for `prosody_features` and `find_accents`; None for a sound too short to have a pitch."""
+    return intensity_track(sound) if sound.duration >= MIN_PITCH_SOUND_S else None
+
+
+def prosody_features(
+    sound: Waveform, times: NDArray[np.float64], track: IntensityTrack | None, *, with_pitch: bool
+) -> Float32Array:
+    """(T, 1 or 2) intensity in dB relative to the mean level of speech, and pitch in semitones relative to the median.
+
+    Times (T,) are in seconds; those outside the sound count as silence. `track` is its `speech_intensity`.
+    """
+    features = np.tile(SILENT_PROSODY[: 2 if with_pitch else 1], (len(times), 1))
+    if track is None:
+        return features
+    levels = track.at(np.arange(0.0, sound.duration, 0.02))
+    inside = (times >= 0.0) & (times < sound.duration)
+    if levels.max() < AUDIBLE_DB:
+        return features
+    level = speech_level(levels[:, None])
+    features[inside, 0] = np.clip(track.at(times[inside]) - level, QUIET_DB, PROSODY_LOUD_DB)
+    if with_pitch:
+        features[inside, 1] = np.clip(pitch(sound, times[inside]), -HIGH_SEMITONES, HIGH_SEMITONES)
+    return features
