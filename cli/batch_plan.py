@@ -42,13 +42,13 @@ def _print_speakers(plan: "Plan") -> None:
     """Print who speaks, with which face and voice."""
     from tts2face.serving.batch.report import planned_speakers
 
-    for one in planned_speakers(plan):
-        role = "no role" if one.role is None else f"role {one.role}"
-        if not one.n_lines:
-            print(f"speaker {one.name}: silent, {_lines(one.n_silent)}, {role}")  # noqa: T201 - the result
+    for speaker in planned_speakers(plan):
+        role = "no role" if speaker.role is None else f"role {speaker.role}"
+        if not speaker.n_lines:
+            print(f"speaker {speaker.name}: silent, {_lines(speaker.n_silent)}, {role}")  # noqa: T201 - the result
             continue
-        lines = _lines(one.n_lines) + (f" and {one.n_silent} silent" if one.n_silent else "")
-        print(f"speaker {one.name}: {lines}, {role}, face {one.face}, voice {one.voice}")  # noqa: T201 - the result
+        lines = _lines(speaker.n_lines) + (f" and {speaker.n_silent} silent" if speaker.n_silent else "")
+        print(f"speaker {speaker.name}: {lines}, {role}, face {speaker.face}, voice {speaker.voice}")  # noqa: T201 - the result
 
 
 def _lines(number: int) -> str:

@@ -53,7 +53,7 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
 
     named_stills = parse_stills(still or [])
     inputs = {"the recordings": recordings, "--stills": stills, "--markers": markers, "--neutral": neutral}
-    inputs |= {f"--still {name}": one.path for name, one in named_stills.items()}
+    inputs |= {f"--still {name}": expression.path for name, expression in named_stills.items()}
     refuse_overwriting(
         {"--out": out}, inputs | {"--palette": palette, "--provenance": provenance, "--model": tool.model}
     )

@@ -262,7 +262,7 @@ def audio_maps(
         result = add_audio_maps(
             recordings, load_talker(talker), out, run_options=run_options, stages=stages or ignore_stage
         )
-    audio_maps = ", ".join(f"{name} (features: {one.feature})" for name, one in result.audio_maps.items())
+    audio_maps = ", ".join(f"{name} (features: {audio_map.feature})" for name, audio_map in result.audio_maps.items())
     write_message(f"wrote {out}: audio maps {audio_maps}")
 
 

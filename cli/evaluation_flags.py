@@ -76,7 +76,7 @@ class SplitFlags:
         return self.recordings
 
     def _other_selections(self) -> tuple[object, ...]:
-        """What selects utterances otherwise than --recordings and --hold-out."""
+        """Flags that select utterances otherwise than --recordings and --hold-out."""
         return self.train, self.test, self.folds, self.hold_out_words, self.cross_talker
 
     def _check_cross_talker(self) -> None:

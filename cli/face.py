@@ -136,7 +136,7 @@ def photo(  # noqa: PLR0913 - one parameter a flag
     del yes
     from tts2face.photo.photograph import split_number
 
-    inputs = {f"the photo {one}": split_number(one)[0] for one in photos}
+    inputs = {f"the photo {photo}": split_number(photo)[0] for photo in photos}
     _check_outputs({"--out": out, "--preview": preview}, inputs | {"--model": model})
     from corpus_tools.dense.avatar import build_avatar
     from tts2face.models.face_loading import load_face

@@ -32,7 +32,7 @@ Names = Annotated[str, Parameter(help="Names of jobs, or at least six characters
 WAIT_S = 0.5
 SHOWN_CHARACTERS = 50  # of a text in the list
 keys = App(name="keys", help="API keys of the service.")
-SECRETS = frozenset(one.name for one in fields(ServiceSettings) if one.metadata["is_secret"])
+SECRETS = frozenset(setting.name for setting in fields(ServiceSettings) if setting.metadata["is_secret"])
 jobs = App(name="jobs", help="List, show, cancel, retry and prune the jobs of a database.")
 
 
@@ -78,12 +78,13 @@ def list_jobs(
 
     found = list_jobs(_existing(database), (state,) if state else (), limit)
     if as_json:
-        print(json.dumps([asdict(one) for one in found], ensure_ascii=False, indent=2))  # noqa: T201 - the result
+        print(json.dumps([asdict(segment) for segment in found], ensure_ascii=False, indent=2))  # noqa: T201 - the result
         return
-    for one in found:
-        print("  ".join(_row(one)).rstrip())  # noqa: T201 - the result
+    for segment in found:
+        print("  ".join(_row(segment)).rstrip())  # noqa: T201 - the result
     counts = ", ".join(
-        f"{sum(one.state == name for one in found)} {name}" for name in dict.fromkeys(one.state for one in found)
+        f"{sum(segment.state == name for segment in found)} {name}"
+        for name in dict.fromkeys(segment.state for segment in found)
     )
     print(f"{len(found)} jobs{': ' + counts if counts else ''}")  # noqa: T201 - the result
 
@@ -153,7 +154,7 @@ def prune(
 
 
 def _prune_store(store: str, database: str | None, outputs: tuple[Path, ...], days: float, *, dry_run: bool) -> str:
-    """What was removed from a store."""
+    """Sentence about the content that was removed from a store."""
     from tts2face.serving.batch.prune import prune_segments
     from tts2face.serving.batch.store import open_store
 
@@ -176,10 +177,17 @@ def _existing(database: str) -> str:
     return database
 
 
-def _row(one: "QueuedSegment") -> tuple[str, ...]:
-    took = "" if one.took_s is None else f"{one.took_s:.1f} s"
-    text = one.text if len(one.text) <= SHOWN_CHARACTERS else f"{one.text[:SHOWN_CHARACTERS]}..."
-    return one.name[:12], one.state.ljust(9), str(one.priority).rjust(4), took.rjust(8), text, one.reason
+def _row(segment: "QueuedSegment") -> tuple[str, ...]:
+    took = "" if segment.took_s is None else f"{segment.took_s:.1f} s"
+    text = segment.text if len(segment.text) <= SHOWN_CHARACTERS else f"{segment.text[:SHOWN_CHARACTERS]}..."
+    return (
+        segment.name[:12],
+        segment.state.ljust(9),
+        str(segment.priority).rjust(4),
+        took.rjust(8),
+        text,
+        segment.reason,
+    )
 
 
 @add_option_flags(("Settings", ServiceSettings), without=SECRETS, has_defaults=False)  # lists of processes show flags

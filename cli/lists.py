@@ -21,15 +21,15 @@ def voices(*, as_json: AsJson = False) -> None:
     entries = voices()
     rows = (
         (
-            one.name,
-            one.sex,
-            one.engine,
-            _languages_text(one.languages),
-            "yes" if one.is_installed else "no",
-            one.licence,
-            one.summary,
+            entry.name,
+            entry.sex,
+            entry.engine,
+            _languages_text(entry.languages),
+            "yes" if entry.is_installed else "no",
+            entry.licence,
+            entry.summary,
         )
-        for one in entries
+        for entry in entries
     )
     titles = ("voice", "sex", "engine", "languages", "installed", "licence", "summary")
     _print(entries, titles, rows, as_json)
@@ -40,7 +40,7 @@ def languages(*, as_json: AsJson = False) -> None:
     from tts2face.session.catalogue import languages
 
     entries = languages()
-    _print(entries, ("code", "name"), ((one.code, one.name) for one in entries), as_json)
+    _print(entries, ("code", "name"), ((entry.code, entry.name) for entry in entries), as_json)
 
 
 def faces(*, as_json: AsJson = False) -> None:
@@ -48,7 +48,7 @@ def faces(*, as_json: AsJson = False) -> None:
     from tts2face.session.catalogue import faces
 
     entries = faces()
-    rows = ((one.name, str(len(one.identities)), one.summary) for one in entries)
+    rows = ((entry.name, str(len(entry.identities)), entry.summary) for entry in entries)
     _print(entries, ("face", "identities", "summary"), rows, as_json)
 
 
@@ -59,7 +59,7 @@ def identities(
     from tts2face.session.catalogue import identities
 
     entries = identities(face)
-    _print(entries, ("identity", "summary"), ((one.name, one.summary) for one in entries), as_json)
+    _print(entries, ("identity", "summary"), ((entry.name, entry.summary) for entry in entries), as_json)
 
 
 def haircuts(*, as_json: AsJson = False) -> None:
@@ -67,7 +67,9 @@ def haircuts(*, as_json: AsJson = False) -> None:
     from tts2face.session.catalogue import haircuts
 
     entries = haircuts()
-    _print(entries, ("haircut", "face", "summary"), ((one.name, one.face, one.summary) for one in entries), as_json)
+    _print(
+        entries, ("haircut", "face", "summary"), ((entry.name, entry.face, entry.summary) for entry in entries), as_json
+    )
 
 
 def hair_colors(*, as_json: AsJson = False) -> None:
@@ -75,7 +77,7 @@ def hair_colors(*, as_json: AsJson = False) -> None:
     from tts2face.session.catalogue import hair_colors
 
     entries = hair_colors()
-    _print(entries, ("color", "sRGB"), ((one.name, one.color) for one in entries), as_json)
+    _print(entries, ("color", "sRGB"), ((entry.name, entry.color) for entry in entries), as_json)
 
 
 def styles(
@@ -87,7 +89,7 @@ def styles(
     from tts2face.session.catalogue import styles
 
     entries = styles(palette)
-    rows = ((one.name, one.source or EMPTY_CELL, one.summary) for one in entries)
+    rows = ((entry.name, entry.source or EMPTY_CELL, entry.summary) for entry in entries)
     _print(entries, ("style", "derived from", "summary"), rows, as_json)
 
 
@@ -98,14 +100,14 @@ def talkers(*, as_json: AsJson = False) -> None:
     entries = talkers()
     rows = (
         (
-            one.name,
-            one.language,
-            str(one.n_utterances),
-            f"{one.minutes:g}",
-            "yes" if one.has_own_face else "no",
-            one.licence,
+            entry.name,
+            entry.language,
+            str(entry.n_utterances),
+            f"{entry.minutes:g}",
+            "yes" if entry.has_own_face else "no",
+            entry.licence,
         )
-        for one in entries
+        for entry in entries
     )
     _print(entries, ("talker", "language", "utterances", "minutes", "own face", "licence"), rows, as_json)
 
@@ -115,7 +117,10 @@ def formats(*, as_json: AsJson = False) -> None:
     from tts2face.session.catalogue import formats
 
     entries = formats()
-    rows = ((one.name, " ".join(one.suffixes), "yes" if one.is_installed else "no", one.summary) for one in entries)
+    rows = (
+        (entry.name, " ".join(entry.suffixes), "yes" if entry.is_installed else "no", entry.summary)
+        for entry in entries
+    )
     _print(entries, ("format", "suffixes", "installed", "summary"), rows, as_json)
 
 

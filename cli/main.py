@@ -158,7 +158,7 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     refuse_others(photo, {"--consent": consent, **files}, others)
     picture = options_from_flags(Picture, options)
     if photo is not None:  # before a text is read: a command that has to set up the landmark model is run again
-        check_photo(photo, files, {"--out": out, "--explain": explain, **{one: one for one in export or ()}})
+        check_photo(photo, files, {"--out": out, "--explain": explain, **{path: path for path in export or ()}})
         face = face_of_photo(photo, consent, fit=fit, smile=smile, quiet=quiet)
     from cli.speak import SpeakOptions, run_request
 

@@ -38,7 +38,7 @@ def run_people_evaluation(talker: str, people: list[Path], comparison: Compariso
     external = read_tracks(comparison.tracks) if comparison.tracks is not None else None
     sounds = None
     if comparison.sounds is not None:
-        sounds = find_sounds(comparison.sounds, [one for person in tests for one in person])
+        sounds = find_sounds(comparison.sounds, [observation for person in tests for observation in person])
         tests = [with_hand_edges(person, sounds) for person in tests]
     found = evaluate_people(load_talker(talker), tests, external, sounds)
     for warning in found.warnings:

@@ -39,7 +39,10 @@ HANDLED_S = 2.0  # after which compiled code that does not return is ended with 
 SHOW_CURSOR = b"\x1b[?25h"  # a progress bar hides it
 INTERRUPTED = "tts2face: interrupted; {}"
 UNCHANGED = "an output that was not complete yet is as it was before"  # also after the first of several outputs
-TRIM_THRESHOLD, MMAP_THRESHOLD, MOST_ARENAS = -1, -3, -8  # parameter numbers of mallopt in glibc's malloc.h
+# parameter numbers of mallopt in glibc's malloc.h
+TRIM_THRESHOLD = -1
+MMAP_THRESHOLD = -3
+MOST_ARENAS = -8
 N_ARENAS = 2  # heaps from which threads allocate; one for each thread takes 14 MB more in a clip
 LARGE_BYTES = 1 << 20  # blocks of at least this size are mapped one by one; pictures of 512 x 512 are smaller
 FIRST_BYTES = 8 << 20  # the same until a first result: each mapped block clears its pages, 80,000 by then
@@ -75,11 +78,11 @@ def release_frames(error: BaseException) -> None:
     seen: set[BaseException] = set()
     waiting: list[BaseException | None] = [error]
     while waiting:
-        one = waiting.pop()
-        if one is not None and one not in seen:
-            seen.add(one)
-            traceback.clear_frames(one.__traceback__)
-            waiting += [one.__cause__, one.__context__]
+        raised = waiting.pop()
+        if raised is not None and raised not in seen:
+            seen.add(raised)
+            traceback.clear_frames(raised.__traceback__)
+            waiting += [raised.__cause__, raised.__context__]
 
 
 class Terminated(KeyboardInterrupt):
@@ -211,7 +214,7 @@ def discard_output(stream: TextIO | None = None) -> None:
 
 
 def ask(question: str) -> str:
-    """What a person at the terminal answers to a question on standard error; empty without a terminal or an answer."""
+    """Answer of a person at the terminal to a question on standard error; empty without a terminal or an answer."""
     if not sys.stdin.isatty():
         return ""
     sys.stderr.write(f"{question} ")

@@ -57,9 +57,11 @@ def _units() -> dict[str, str]:
 @functools.cache
 def _abbreviations(language: str) -> dict[str, str]:
     """Abbreviations by their capitals; of two spellings (No, no) the capitalised one."""
-    written = sorted((one for one in abbreviations(language) if len(one) > 1), reverse=True)
+    written = sorted((word for word in abbreviations(language) if len(word) > 1), reverse=True)
     return {
-        one.upper(): one for one in written if one.upper() != one and (one[0].isupper() or one.upper() not in _NAMES)
+        word.upper(): word
+        for word in written
+        if word.upper() != word and (word[0].isupper() or word.upper() not in _NAMES)
     }
 
 
@@ -109,16 +111,16 @@ def _passages(text: str, words: list[re.Match[str]]) -> list[tuple[int, int]]:
     for at in range(len(words) + 1):
         if at < len(words) and _may_be_capital(words[at].group()):
             continue
-        begin, end = first, at
-        while begin < end and begin > 0 and not _divides(text, words, begin):
-            begin += 1
-        while end > begin and end < len(words) and not _divides(text, words, end):
+        start, end = first, at
+        while start < end and start > 0 and not _divides(text, words, start):
+            start += 1
+        while end > start and end < len(words) and not _divides(text, words, end):
             end -= 1
-        inside = words[begin:end]
+        inside = words[start:end]
         if _is_shouted([word.group() for word in inside]) or any(
             _abbreviation(text, word, _abbreviations("en")) for word in inside
         ):
-            found.append((begin, end))
+            found.append((start, end))
         first = at + 1
     return found
 
@@ -217,7 +219,9 @@ def _spelling(text: str, word: re.Match[str], before: str, after: str) -> str:
 
 def _beside_number(text: str, word: re.Match[str]) -> str:
     """A unit, currency, month or ending beside digits, as its table writes it; empty for another word."""
-    letters, before, after = word.group(), text[max(word.start() - 2, 0) : word.start()], text[word.end() :][:3]
+    letters = word.group()
+    before = text[max(word.start() - 2, 0) : word.start()]
+    after = text[word.end() :][:3]
     if before.endswith("/") and letters in ("H", "S"):  # km/h
         return letters.lower()
     has_number = before.rstrip()[-1:].isdigit()

@@ -11,11 +11,11 @@ from lexicon.sentence_ends import ends_sentence
 _END = re.compile(r"""(?<![.!?…])[.!?…]++["'”’)\]]*+(?=\s++[^a-z])|[。！？｡।॥؟۔]+["'”’」』）]*|\n\s*\n""")
 _CLAUSE = re.compile(r"[,;:—–、，；：،؛](?=\s)|[、，；：]")
 # Words before which an English phrase may end where a sentence has no clause mark, the better places first.
-_PHRASE_BEGINS = (
+_PHRASE_STARTS = (
     "and but or so because which who whose where when while until unless if though although since that",
     "about after against around at before behind between by during for from in into near on over through to under with",
 )
-_PHRASE_PLACES = tuple(re.compile(rf"(?<!\d)\s(?=(?:{words.replace(' ', '|')})\s(?!\d))") for words in _PHRASE_BEGINS)
+_PHRASE_PLACES = tuple(re.compile(rf"(?<!\d)\s(?=(?:{words.replace(' ', '|')})\s(?!\d))") for words in _PHRASE_STARTS)
 _BETWEEN_WORDS = re.compile(r"(?<=[^\W\d_A-Z])\s(?=[^\W\d_A-Z])")
 _MIN_PHRASE_CHARACTERS = 20  # of either part; shorter ones sound like words of their own
 _MAX_UNDIVIDED_CHARACTERS = 600  # a longer word, as of digits, is divided; addresses are shorter
@@ -36,13 +36,13 @@ def split_chunks(text: str, limit: int, language: str = "en-us") -> Iterator[str
     """
     if limit < 1:
         raise InputError(f"the limit of a chunk must be at least 1 character, not {limit}; increase it")
-    begin = 0
+    start = 0
     for match in _END.finditer(text):
-        if _is_abbreviated(text, begin, match, language):
+        if _is_abbreviated(text, start, match, language):
             continue
-        yield from _split_sentence(text[begin : match.end()], limit)
-        begin = match.end()
-    yield from _split_sentence(text[begin:], limit)
+        yield from _split_sentence(text[start : match.end()], limit)
+        start = match.end()
+    yield from _split_sentence(text[start:], limit)
 
 
 def split_phrase(sentence: str, limit: int) -> tuple[str, str]:
@@ -72,36 +72,36 @@ def middle_place(text: str) -> int:
     return min(places, key=lambda place: abs(place - middle), default=middle)
 
 
-def _is_abbreviated(text: str, begin: int, end: "re.Match[str]", language: str) -> bool:
+def _is_abbreviated(text: str, start: int, end: "re.Match[str]", language: str) -> bool:
     """Whether the full stop of a possible sentence end belongs to an abbreviation."""
     if end.group().rstrip("\"'”’)]") != ".":
         return False
-    before = text[max(begin, end.start() - _CONTEXT_BEFORE) : end.start()]
+    before = text[max(start, end.start() - _CONTEXT_BEFORE) : end.start()]
     return not ends_sentence(before, text[end.end() : end.end() + _CONTEXT_AFTER].lstrip(), language)
 
 
 def _split_sentence(sentence: str, limit: int) -> Iterator[str]:
-    text, begin = " ".join(sentence.split()), 0
-    while len(text) - begin > limit:
-        end = _cut_position(text, begin, limit)
-        yield text[begin:end].rstrip()
-        begin = end + text.startswith(" ", end)
-    if begin < len(text):
-        yield text[begin:]
+    text, start = " ".join(sentence.split()), 0
+    while len(text) - start > limit:
+        end = _cut_position(text, start, limit)
+        yield text[start:end].rstrip()
+        start = end + text.startswith(" ", end)
+    if start < len(text):
+        yield text[start:]
 
 
-def _cut_position(text: str, begin: int, limit: int) -> int:
+def _cut_position(text: str, start: int, limit: int) -> int:
     """Index at which a text whose rest from `begin` is longer than the limit is split."""
-    end = begin + limit
-    clauses = [match.end() for match in _CLAUSE.finditer(text, begin + limit // 3, end)]
+    end = start + limit
+    clauses = [match.end() for match in _CLAUSE.finditer(text, start + limit // 3, end)]
     if clauses:
         return clauses[-1]
-    space = text.rfind(" ", begin + 1, end + 1)
+    space = text.rfind(" ", start + 1, end + 1)
     if space > 0:
         return space
     if not (text[end - 1].isascii() and text[end].isascii()):
         return end
-    longest = begin + max(limit, _MAX_UNDIVIDED_CHARACTERS)
+    longest = start + max(limit, _MAX_UNDIVIDED_CHARACTERS)
     word_end = text.find(" ", end, longest + 1)
     if word_end > 0:
         return word_end

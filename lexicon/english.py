@@ -42,10 +42,12 @@ def fold_to_arpabet(segments: tuple[IpaPhone, ...]) -> tuple[IpaPhone, ...]:
         if segment.is_syllabic and not PHONES[phone].is_vowel:
             result.append(IpaPhone("ə", stress, is_syllabic=True))
             stress = 0
-        for at, one in enumerate(phones):
-            is_vowel = PHONES[one].is_vowel
+        for at, own_phone in enumerate(phones):
+            is_vowel = PHONES[own_phone].is_vowel
             own_stress = stress if is_vowel and at == 0 else 0
-            by_stress = _FULL_VOWELS.get(one, one) if own_stress else _REDUCED_VOWELS.get(one, one)
+            by_stress = (
+                _FULL_VOWELS.get(own_phone, own_phone) if own_stress else _REDUCED_VOWELS.get(own_phone, own_phone)
+            )
             result.append(IpaPhone(by_stress, own_stress, is_syllabic=is_vowel))
     return tuple(result)
 

@@ -26,8 +26,8 @@ def english_segments(texts: Sequence[str], marks: Sequence[str], own: Dictionary
     spoken: list[tuple[IpaPhone, ...] | None] = []
     forms = _lookup_forms(texts)
     ends = [at + 1 for at, mark in enumerate(marks) if mark in _SENTENCE_MARKS]
-    for begin, end in pairwise(sorted({0, *ends, len(texts)})):
-        spoken += _sentence_segments(forms[begin:end], marks[begin:end], own)
+    for start, end in pairwise(sorted({0, *ends, len(texts)})):
+        spoken += _sentence_segments(forms[start:end], marks[start:end], own)
     missing = [at for at, segments in enumerate(spoken) if segments is None]
     by_rules = segments_by_rules([texts[at] for at in missing], DEFAULT_LANGUAGE)
     for at, segments in zip(missing, by_rules, strict=True):

@@ -39,10 +39,10 @@ def _name_letters(match: "re.Match[str]") -> str:
 
 def _pieces(text: str, language: str, kept: frozenset[str]) -> Iterator[str]:
     at = 0
-    for begin, end in foreign_runs(text, language):
-        name = "" if letter_script(text[begin]) in kept else run_name(text[begin:end])
+    for start, end in foreign_runs(text, language):
+        name = "" if letter_script(text[start]) in kept else run_name(text[start:end])
         if name:
-            yield text[at:begin]
-            yield " " * text[begin - 1 : begin].isalnum() + name + " " * text[end : end + 1].isalnum()
+            yield text[at:start]
+            yield " " * text[start - 1 : start].isalnum() + name + " " * text[end : end + 1].isalnum()
             at = end
     yield text[at:]

@@ -28,7 +28,7 @@ class ForeignWords:
 
     Parameters
     ----------
-    begin, end
+    start, end
         Half-open range of characters.
     language
         In which they are spoken; empty: their letters are spelled by name.
@@ -36,14 +36,14 @@ class ForeignWords:
         Name of their writing system.
     """
 
-    begin: int
+    start: int
     end: int
     language: str
     script: str
 
     @property
     def note(self) -> str:
-        """What is done with them."""
+        """How they are spoken."""
         return f"{self.script} words are " + (f"spoken in {self.language}" if self.language else "spelled")
 
 
@@ -55,17 +55,19 @@ def make_readable(text: MarkedText, language: str) -> tuple[MarkedText, tuple[st
     """
     if text.text.isascii():
         return text, ()
-    unread, found, runs = blank_given_words(text), list[ForeignWords](), list[StyleRun]()
+    unread = blank_given_words(text)
+    found = list[ForeignWords]()
+    runs = list[StyleRun]()
     ends = [*(run.start for run in text.runs[1:]), len(unread)]
     for run, end in zip(text.runs, ends, strict=True):
         runs.append(run)
         for words in _foreign_words(unread, (run.start, end), run.language or language):
             found.append(words)
             if words.language:
-                runs.append(replace(run, start=words.begin, language=words.language))
+                runs.append(replace(run, start=words.start, language=words.language))
                 runs.append(replace(run, start=words.end))
     kept = [run for run, after in zip(runs, [*runs[1:], None], strict=True) if after is None or run.start < after.start]
-    return _rewritten(replace(text, runs=tuple(kept)), found), tuple(dict.fromkeys(one.note for one in found))
+    return _rewritten(replace(text, runs=tuple(kept)), found), tuple(dict.fromkeys(word.note for word in found))
 
 
 def _foreign_words(text: str, span: tuple[int, int], language: str) -> Iterator[ForeignWords]:
@@ -75,14 +77,14 @@ def _foreign_words(text: str, span: tuple[int, int], language: str) -> Iterator[
     """
     first, last = span
     group: list[tuple[int, int]] = []
-    for begin, end in ((first + a, first + b) for a, b in foreign_runs(text[first:last], language)):
-        if group and all(unicodedata.category(mark)[0] == "M" for mark in text[group[-1][1] : begin]):
+    for start, end in ((first + a, first + b) for a, b in foreign_runs(text[first:last], language)):
+        if group and all(unicodedata.category(mark)[0] == "M" for mark in text[group[-1][1] : start]):
             group[-1] = (group[-1][0], end)  # marks that distinguish no words are dropped when the text is read
             continue
-        if group and not _is_joined(text, group[-1], (begin, end)):
+        if group and not _is_joined(text, group[-1], (start, end)):
             yield from _of_group(text, group)
             group = []
-        group.append((begin, end))
+        group.append((start, end))
     yield from _of_group(text, group)
 
 
@@ -100,7 +102,7 @@ def _script_of(run: str) -> str:
 
 
 def _of_group(text: str, group: Sequence[tuple[int, int]]) -> Iterator[ForeignWords]:
-    if not all(_is_read(text[begin:end]) for begin, end in group):
+    if not all(_is_read(text[start:end]) for start, end in group):
         yield from _divided(text, group[0][0], group[-1][1])
 
 
@@ -109,35 +111,35 @@ def _is_read(run: str) -> bool:
     return bool(run_name(run)) or unicodedata.normalize("NFKC", run) in read_table("units.tsv")
 
 
-def _divided(text: str, begin: int, end: int) -> Iterator[ForeignWords]:
+def _divided(text: str, start: int, end: int) -> Iterator[ForeignWords]:
     """Foreign words with their language, by parts where no language reads all of them."""
-    words = text[begin:end]
+    words = text[start:end]
     script, spoken = script_name(_script_of(words)), guess_language(unicodedata.normalize("NFKC", words), "")
     if spoken == "ja" and has_kanji(words) and not _has_reader():
-        begins = [part.start() for part in _KANJI.finditer(words)]
-        parts = list(zip(begins, [*begins[1:], len(words)], strict=True))
+        starts = [part.start() for part in _KANJI.finditer(words)]
+        parts = list(zip(starts, [*starts[1:], len(words)], strict=True))
     elif spoken in languages() and not any(True for _ in foreign_runs(words, spoken)):
-        yield ForeignWords(begin, end, spoken, script)
+        yield ForeignWords(start, end, spoken, script)
         return
     else:
         parts = list(_scripts(words))
     if len(parts) == 1:
-        yield ForeignWords(begin, end, "", script)
+        yield ForeignWords(start, end, "", script)
         return
     for first, last in parts:
-        yield from _divided(text, begin + first, begin + last)
+        yield from _divided(text, start + first, start + last)
 
 
 def _scripts(words: str) -> Iterator[tuple[int, int]]:
     """Longest parts of letters of one writing system, with what follows each."""
-    begin, before = 0, ""
+    start, before = 0, ""
     for at, letter in enumerate(words):
         script = letter_script(letter) if letter.isalpha() else before
         if before and script != before:
-            yield begin, at
-            begin = at
+            yield start, at
+            start = at
         before = script
-    yield begin, len(words)
+    yield start, len(words)
 
 
 def _has_reader() -> bool:
@@ -153,18 +155,21 @@ def _rewritten(text: MarkedText, words: Sequence[ForeignWords]) -> MarkedText:
 
     Words that no language reads are the names of their letters; signs that stand for letters (㌔) are these letters.
     """
-    pieces, at, ends, shifts = list[str](), 0, [0], [0]
-    for one in words:
-        written = text.text[one.begin : one.end]
-        if one.language and not any(map(_is_sign, written)):
+    pieces = list[str]()
+    at = 0
+    ends = [0]
+    shifts = [0]
+    for word in words:
+        written = text.text[word.start : word.end]
+        if word.language and not any(map(_is_sign, written)):
             continue
-        spoken = unicodedata.normalize("NFKC", written) if one.language else letter_names(written)
-        before, after = text.text[one.begin - 1 : one.begin], text.text[one.end : one.end + 1]
+        spoken = unicodedata.normalize("NFKC", written) if word.language else letter_names(written)
+        before, after = text.text[word.start - 1 : word.start], text.text[word.end : word.end + 1]
         spoken = " " * before.isalnum() + spoken + " " * after.isalnum()
-        pieces += [text.text[at : one.begin], spoken]
-        at = one.end
-        ends.append(one.end)
-        shifts.append(shifts[-1] + len(spoken) - (one.end - one.begin))
+        pieces += [text.text[at : word.start], spoken]
+        at = word.end
+        ends.append(word.end)
+        shifts.append(shifts[-1] + len(spoken) - (word.end - word.start))
     if at == 0:
         return text
 

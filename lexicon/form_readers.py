@@ -38,7 +38,10 @@ _CONTEXT_AFTER = 48  # characters after a full stop that decide whether a senten
 
 def read_numeric_date(m: re.Match[str], _: str) -> str:
     """3/15/2024 is March fifteenth; 13/13/13 is not a date and is read number by number."""
-    first, separator, second, last = m["nd1"], m["ndsep"], m["nd2"], m["ndy"]
+    first = m["nd1"]
+    separator = m["ndsep"]
+    second = m["nd2"]
+    last = m["ndy"]
     words = readings.numeric_date_words(int(first), int(second), last, separator)
     sign = {"/": "slash", ".": "point", "-": "dash"}[separator]
     return words or f" {sign} ".join(number_words(part) for part in (first, second, last))
@@ -54,7 +57,9 @@ def read_iso_date(m: re.Match[str], _: str) -> str:
 
 def read_month_first(m: re.Match[str], _: str) -> str:
     """March 3, 2024 is March third, twenty twenty-four."""
-    month, day, last = readings.month_number(m["mf"]), int(m["mfd"]), m["mfy"] or ""
+    month = readings.month_number(m["mf"])
+    day = int(m["mfd"])
+    last = m["mfy"] or ""
     if 1 <= day <= 31:
         return readings.date_words(day, month, last)
     return f"{readings.MONTHS[month - 1]} {number_words(m['mfd'])}" + (f", {year_words(int(last))}" if last else "")
@@ -67,7 +72,9 @@ def read_month_year(m: re.Match[str], _: str) -> str:
 
 def read_day_first(m: re.Match[str], previous: str) -> str:
     """3 March 2024 is the third of March, twenty twenty-four."""
-    month, day, last = readings.month_number(m["df"]), int(m["dfd"]), m["dfy"] or ""
+    month = readings.month_number(m["df"])
+    day = int(m["dfd"])
+    last = m["dfy"] or ""
     if not 1 <= day <= 31:
         return f"{number_words(m['dfd'])} {readings.MONTHS[month - 1]}" + (f" {year_words(int(last))}" if last else "")
     words = readings.date_words(day, month, last, day_first=True)

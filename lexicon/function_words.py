@@ -36,7 +36,7 @@ def _forms() -> dict[str, _Forms]:
 @functools.cache
 def _weak_forms() -> dict[str, tuple[tuple[str, ...], ...]]:
     return {
-        word: tuple(tuple(one.phone for one in parse_ipa(form)) for form in forms.split())
+        word: tuple(tuple(segment.phone for segment in parse_ipa(form)) for form in forms.split())
         for word, (forms,) in read_table("weak_forms.tsv").items()
     }
 

@@ -19,7 +19,9 @@ from lexicon.verb_tense import tense_tag
 
 NEAR_WORDS = 9  # words on each side that are searched for evidence
 # Weights of the evidence: a neighbour outweighs the tag, which outweighs the topic.
-_TAG_WEIGHT, _NEIGHBOUR_WEIGHT, _NEAR_WEIGHT = 2.0, 3.0, 1.5
+_TAG_WEIGHT = 2.0
+_NEIGHBOUR_WEIGHT = 3.0
+_NEAR_WEIGHT = 1.5
 _MOST_NEAR = 2  # words of the topic that count
 # Before a verb, whatever the tagger says: it takes many verbs of this list for nouns (to object).
 _BEFORE_VERB = word_set(

@@ -32,7 +32,7 @@ class StyleRun:
 
     def is_spoken_as(self, other: "StyleRun") -> bool:
         """Whether all but the start is that of another run."""
-        here, there = ((one.styles, one.rate, one.volume, one.voice, one.language) for one in (self, other))
+        here, there = ((run.styles, run.rate, run.volume, run.voice, run.language) for run in (self, other))
         return here == there
 
 

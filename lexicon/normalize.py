@@ -54,7 +54,7 @@ def _letter_unit_pattern() -> str:
 def _abbreviation_pattern() -> str:
     table = readings.read_table("abbreviations.tsv")
     written = sorted(table, key=len, reverse=True)
-    titles = "|".join(one.upper() for one in written if table[one][1] in forms.TITLES)
+    titles = "|".join(title.upper() for title in written if table[title][1] in forms.TITLES)
     dotless = rf"(?:Mr|Mrs|Ms|Dr|Prof|etc|vs|approx){_STOP}"
     return rf"(?P<abbr>(?:{'|'.join(map(re.escape, written))})(?=\.)|(?:{titles})(?=\. ?[A-Z])|{dotless})\.?"
 

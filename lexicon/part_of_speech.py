@@ -47,10 +47,10 @@ class _Model:
         """Weight of each tag for a feature; empty for an unknown feature."""
         name = json.dumps(feature, ensure_ascii=False).encode() + b":"
         at = int(np.searchsorted(self.hashes, hash(name)))
-        if at == len(self.hashes) or not self.text.startswith(name, begin := int(self.places[at])):
+        if at == len(self.hashes) or not self.text.startswith(name, start := int(self.places[at])):
             return {}
-        begin += len(name)
-        found: dict[str, float] = json.loads(self.text[begin : self.text.index(b"}", begin) + 1])
+        start += len(name)
+        found: dict[str, float] = json.loads(self.text[start : self.text.index(b"}", start) + 1])
         return found
 
 
@@ -75,14 +75,14 @@ def _model() -> _Model:
         raise DataError(f"{path} is damaged ({broken}); reinstall hibari-tts") from broken
 
 
-def _index_features(text: bytes, begin: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _index_features(text: bytes, start: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Hashes of the names of the features in order, and their places; each feature is ``"name":{...}``."""
     hashes: list[int] = []
     places: list[int] = []
-    while begin > 1:  # 1 where no feature follows
-        places.append(begin)
-        hashes.append(hash(text[begin : text.index(b":{", begin) + 1]))
-        begin = text.find(b"},", begin) + 2
+    while start > 1:  # 1 where no feature follows
+        places.append(start)
+        hashes.append(hash(text[start : text.index(b":{", start) + 1]))
+        start = text.find(b"},", start) + 2
     order = np.argsort(hashes)
     return np.array(hashes)[order], np.array(places)[order]
 

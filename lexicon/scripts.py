@@ -106,8 +106,8 @@ def check_script(text: str, language: str) -> None:
     if language == "ja" and has_kanji(text):
         load_reader()
     words: dict[str, None] = {}
-    for begin, end in foreign_runs(text, language):
-        run = text[begin:end]
+    for start, end in foreign_runs(text, language):
+        run = text[start:end]
         if not run_name(run) and unicodedata.normalize("NFKC", run) not in readings.read_table("units.tsv"):
             words[run] = None
     if words:

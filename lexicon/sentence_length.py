@@ -55,25 +55,25 @@ def pieces_of_text(
     phones = [mark for mark in placed.marks if isinstance(mark, PhoneMark)]
     pauses = [mark for mark in placed.marks if isinstance(mark, PauseMark)]
     pause_places, run_places = [mark.at for mark in pauses], [run.start for run in placed.runs]
-    starts, begin = [mark.at for mark in phones], 0
+    starts, start = [mark.at for mark in phones], 0
     for number, chunk in enumerate(split_chunks(placed.text, MAX_SENTENCE_CHARACTERS, language)):
         first, rest = split_phrase(chunk, FIRST_PIECE_CHARACTERS) if number == 0 else (chunk, "")
         waiting = [rest, first] if rest else [first]
         while waiting:
             part = waiting.pop()
-            end = begin + n_letters(part)
-            given = phones[bisect_left(starts, begin) : bisect_left(starts, end)]
-            inside = pauses[bisect_right(pause_places, begin) : bisect_left(pause_places, end)]
-            runs = overlapping_runs(placed.runs, run_places, begin, end)
+            end = start + n_letters(part)
+            given = phones[bisect_left(starts, start) : bisect_left(starts, end)]
+            inside = pauses[bisect_right(pause_places, start) : bisect_left(pause_places, end)]
+            runs = overlapping_runs(placed.runs, run_places, start, end)
             n_spoken = _spoken_letters(part, language, given, own)
             silent = LETTERS_PER_S * sum(mark.seconds for mark in inside)
-            is_long = n_spoken > (MAX_SPOKEN_LETTERS if begin else FIRST_SPOKEN_LETTERS)
-            is_slow = n_spoken * _slowness(runs, begin, end) + silent > MAX_SPOKEN_LETTERS
-            at = _dividing_place(part, begin, given, () if is_long else inside) if is_long or is_slow else 0
+            is_long = n_spoken > (MAX_SPOKEN_LETTERS if start else FIRST_SPOKEN_LETTERS)
+            is_slow = n_spoken * _slowness(runs, start, end) + silent > MAX_SPOKEN_LETTERS
+            at = _dividing_place(part, start, given, () if is_long else inside) if is_long or is_slow else 0
             if at > 0:
                 waiting += [part[at:], part[:at].rstrip()]
                 continue
-            begin = end
+            start = end
             yield part, bool(waiting)
 
 
@@ -91,25 +91,25 @@ def _spoken_letters(
     return n
 
 
-def _slowness(runs: Sequence[StyleRun], begin: int, end: int) -> float:
+def _slowness(runs: Sequence[StyleRun], start: int, end: int) -> float:
     """Duration of the letters of a range of letters at the rates of its runs, in units of that at a rate of 1."""
     ends = [*(run.start for run in runs[1:]), end]
-    lasting = sum((last - max(run.start, begin)) / run.rate for run, last in zip(runs, ends, strict=True))
-    return lasting / (end - begin) if end > begin else 1.0
+    lasting = sum((last - max(run.start, start)) / run.rate for run, last in zip(runs, ends, strict=True))
+    return lasting / (end - start) if end > start else 1.0
 
 
-def _dividing_place(chunk: str, begin: int, given: Sequence[PhoneMark], pauses: Sequence[PauseMark]) -> int:
+def _dividing_place(chunk: str, start: int, given: Sequence[PhoneMark], pauses: Sequence[PauseMark]) -> int:
     """Index near the middle of a chunk that is not within a word with given phones; 0 if there is none.
 
     It is that of a pause if there are `pauses`.
     """
     places = [at for at, character in enumerate(chunk) if not character.isspace()]
-    middle = begin + bisect_left(places, middle_place(chunk))
+    middle = start + bisect_left(places, middle_place(chunk))
     at = min((mark.at for mark in pauses), key=lambda place: abs(place - middle), default=middle)
-    at = next((mark.at if mark.at > begin else mark.end for mark in given if mark.at < at < mark.end), at)
-    return places[at - begin] if begin < at < begin + len(places) else 0
+    at = next((mark.at if mark.at > start else mark.end for mark in given if mark.at < at < mark.end), at)
+    return places[at - start] if start < at < start + len(places) else 0
 
 
-def overlapping_runs(runs: tuple[StyleRun, ...], starts: list[int], begin: int, end: int) -> tuple[StyleRun, ...]:
+def overlapping_runs(runs: tuple[StyleRun, ...], starts: list[int], start: int, end: int) -> tuple[StyleRun, ...]:
     """Runs that cover letters of a range; `starts` are those of all runs."""
-    return runs[bisect_right(starts, begin) - 1 : bisect_right(starts, end - 1)]
+    return runs[bisect_right(starts, start) - 1 : bisect_right(starts, end - 1)]

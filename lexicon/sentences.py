@@ -114,13 +114,15 @@ def split_sentences(
     phone_positions = [mark.at for mark in phones]
     others = [mark for mark in placed.marks if not isinstance(mark, PauseMark | PhoneMark)]
     pending: Sentence | None = None
-    leading_pause, end, n_used = sum(mark.seconds for mark in pauses[:1] if mark.at == 0), 0, 0
+    leading_pause = sum(mark.seconds for mark in pauses[:1] if mark.at == 0)
+    end = 0
+    n_used = 0
     for chunk, is_cut in pieces_of_text(placed, language, own or {}):
-        begin, end = end, end + n_letters(chunk)
-        runs = overlapping_runs(placed.runs, starts, begin, end)
-        inside = pauses[bisect_right(pause_positions, begin) : bisect_right(pause_positions, end)]
-        utterances, silence = _phrases(chunk, begin, runs, inside, language)
-        given = phones[bisect_left(phone_positions, begin) : bisect_left(phone_positions, end)]
+        start, end = end, end + n_letters(chunk)
+        runs = overlapping_runs(placed.runs, starts, start, end)
+        inside = pauses[bisect_right(pause_positions, start) : bisect_right(pause_positions, end)]
+        utterances, silence = _phrases(chunk, start, runs, inside, language)
+        given = phones[bisect_left(phone_positions, start) : bisect_left(phone_positions, end)]
         if given:
             utterances = [_add_given_phones(part, given, part.language or language) for part in utterances]
         if pending is not None:
@@ -188,18 +190,18 @@ def index_by_letters(text: MarkedText) -> MarkedText:
 
 
 def _phrases(
-    chunk: str, begin: int, runs: tuple[StyleRun, ...], pauses: Sequence[PauseMark], language: str
+    chunk: str, start: int, runs: tuple[StyleRun, ...], pauses: Sequence[PauseMark], language: str
 ) -> tuple[list[Phrase], float]:
     """Phrases of a chunk of text, and the marked silence before the first of them."""
     places = [at for at, character in enumerate(chunk) if not character.isspace()]
-    end = begin + len(places)
+    end = start + len(places)
     silences = {mark.at: mark.seconds for mark in pauses}
     changes = [run.start for before, run in pairwise(runs) if _speech_settings(run) != _speech_settings(before)]
-    bounds = sorted({begin, end, *changes, *silences})
+    bounds = sorted({start, end, *changes, *silences})
     found: list[Phrase] = []
     before = 0.0
     for first, last in pairwise(bounds):
-        written = chunk[places[first - begin] : places[last - begin - 1] + 1]
+        written = chunk[places[first - start] : places[last - start - 1] + 1]
         run = next(run for run in reversed(runs) if run.start <= first)
         text = spoken_form(written, run.language or language)
         pause = silences.get(last)

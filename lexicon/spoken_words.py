@@ -50,7 +50,7 @@ def pronounce_marked(
 
 
 def reading_notes(text: str, language: str) -> tuple[str, ...]:
-    """What is done with words that the language of a text does not read; raises as `parse_marks`."""
+    """How words are spoken that the language of a text does not read; raises as `parse_marks`."""
     return () if text.isascii() else make_readable(parse_marks(text, language), language)[1]
 
 

@@ -36,7 +36,7 @@ from lexicon.ssml_values import (
     primary_subtag,
 )
 
-_BEGINS = re.compile(r"\ufeff?\s*<(?:speak[\s>/]|\?xml\s|!DOCTYPE\s)")
+_STARTS = re.compile(r"\ufeff?\s*<(?:speak[\s>/]|\?xml\s|!DOCTYPE\s)")
 _MARK = re.compile(r"\[/?(?:style|nod|pause)\b")
 _TIME = re.compile(r"\+?([0-9]{1,9}(?:\.[0-9]{1,9})?|\.[0-9]{1,9})\s*(ms|s)")
 # Volume factor and nod size of each level: accented words are 2-5 dB louder than their neighbours, and nods are the
@@ -51,7 +51,7 @@ Attributes = Mapping[str, str]
 
 def is_ssml(text: str) -> bool:
     """Whether a text is SSML: it begins with ``<speak``, an XML or a document type declaration."""
-    return _BEGINS.match(text) is not None
+    return _STARTS.match(text) is not None
 
 
 def parse_ssml(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:
@@ -261,6 +261,6 @@ class _SsmlReader:
 def _add_phonemes(builder: MarkedTextBuilder, text: str, phones: str, alphabet: str) -> None:
     """Add words with given phones."""
     for number, (word, segments) in enumerate(phoneme_words(text, phones, alphabet)):
-        begin = builder.at + (number > 0)
-        builder.add_mark(PhoneMark(begin, begin + len(word), segments))
+        start = builder.at + (number > 0)
+        builder.add_mark(PhoneMark(start, start + len(word), segments))
         builder.add_text(f" {word}" if number else word)

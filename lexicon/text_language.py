@@ -31,7 +31,7 @@ _WORD = re.compile(r"[^\W\d_]+(?:['’][^\W\d_]+)?")
 
 
 def guess_language(text: str, default: str = DEFAULT_LANGUAGE) -> str:
-    """The espeak-ng code of the language of a text; `default` where nothing tells another one.
+    """The espeak-ng code of the language of a text; `default` where nothing points to another one.
 
     The writing system of most letters decides, then letters that few languages have. A text in Latin letters needs
     more common words of a language than of English and of the others, two at least unless it is very short; it is
@@ -68,7 +68,7 @@ def _of_words(text: str, default: str) -> str:
         points[language] = sum(word in known for word in words)
         points[language] += min(MAX_LETTERS, sum(text.count(letter) for letter in letters))
     english = points.pop("en")
-    language, most = max(points.items(), key=lambda one: one[1])
+    language, most = max(points.items(), key=lambda counted: counted[1])
     is_clear = most > english and (most > 1 or (len(words) <= SHORT_WORDS and not english))
     return language if is_clear else default
 

@@ -46,8 +46,10 @@ def tense_tag(tags: Sequence[str], lower: Sequence[str], at: int) -> str:
     at
         Index of the verb.
     """
-    begin = max(at - _MAX_WORDS, 0)
-    tags, lower, at = tags[begin : at + _MAX_WORDS], lower[begin : at + _MAX_WORDS], at - begin
+    start = max(at - _MAX_WORDS, 0)
+    tags = tags[start : at + _MAX_WORDS]
+    lower = lower[start : at + _MAX_WORDS]
+    at = at - start
     place = at - 1
     while place >= 0 and (lower[place] in _SKIPPED or lower[place].endswith("ly")):
         place -= 1

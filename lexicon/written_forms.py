@@ -62,7 +62,7 @@ def signed_number_words(written: str) -> str:
 
 def money_words(amount: str, currency: str, magnitude: str) -> str:
     """$5.20 is five dollars and twenty cents, $2.5M two point five million dollars."""
-    one, many, cent, cents = CURRENCIES[currency]
+    singular, many, cent, cents = CURRENCIES[currency]
     sign = "minus " if amount.startswith("-") else ""
     amount = amount.lstrip("+-")
     whole, _, decimals = amount.replace(",", "").partition(".")
@@ -70,7 +70,7 @@ def money_words(amount: str, currency: str, magnitude: str) -> str:
         return f"{sign}{number_words(amount)} {MAGNITUDES.get(magnitude, magnitude)} {many}"
     if decimals and (len(decimals) != 2 or not cent):
         return f"{sign}{number_words(amount)} {many}"
-    whole_words = f"{number_words(whole or '0')} {one if int(whole or 0) == 1 else many}"
+    whole_words = f"{number_words(whole or '0')} {singular if int(whole or 0) == 1 else many}"
     if not int(decimals or 0):
         return sign + whole_words
     small = f"{cardinal_words(int(decimals))} {cent if int(decimals) == 1 else cents}"
@@ -79,8 +79,8 @@ def money_words(amount: str, currency: str, magnitude: str) -> str:
 
 def measure_words(amount: str, unit: str) -> str:
     """5 km is five kilometers, 1 km one kilometer."""
-    one, many = read_table("units.tsv")[unit]
-    return f"{signed_number_words(amount)} {one if amount.lstrip('+-') == '1' else many}"
+    singular, many = read_table("units.tsv")[unit]
+    return f"{signed_number_words(amount)} {singular if amount.lstrip('+-') == '1' else many}"
 
 
 def year_or_number_words(written: str) -> str:

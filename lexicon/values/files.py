@@ -53,7 +53,7 @@ def is_file(path: Path) -> bool:
 
 
 def is_there(path: Path, is_kind: Callable[[int], bool] = lambda _: True) -> bool:
-    """Whether there is a file of a kind, as `stat.S_ISDIR`; an OSError where that cannot be told.
+    """Whether there is a file of a kind, as `stat.S_ISDIR`; an OSError where that cannot be read.
 
     pathlib says no to a name that is longer than any file's from Python 3.14 on.
     """

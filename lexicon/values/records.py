@@ -63,7 +63,7 @@ def _adapter(kind: Hashable) -> "TypeAdapter[Any]":
 
 
 def _foreign(value: Any) -> Any:
-    """What stands for a value that JSON does not have, such as a date of TOML: of no type that is expected."""
+    """Stand-in of a value that JSON does not have, such as a date of TOML: of no type that is expected."""
     return {type(value).__name__: str(value)}
 
 

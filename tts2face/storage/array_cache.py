@@ -71,9 +71,9 @@ def write_cached(kind: str, version: int, name: str, arrays: Arrays) -> None:
 def read_kept(
     path: Path, kind: str, version: int, build: Callable[[dict[str, NDArray[Any]], dict[str, Any]], Built | None]
 ) -> Built | None:
-    """What `build` makes of a file's arrays and metadata; None if there is none, or it is damaged, so that it is made.
+    """Result of `build` for a file's arrays and metadata; None without the file, or if it is damaged.
 
-    A DataError or KeyError of `build` tells that it is damaged.
+    A DataError or KeyError of `build` says that it is damaged.
     """
     with suppress(InputError, DataError, KeyError):
         return build(*read_tensors(path, kind, version))

@@ -50,7 +50,7 @@ class StoreAwayError(BackendError):
 
 @dataclass(frozen=True, slots=True)
 class Stored:
-    """What is stored under a name: its bytes, and when it was stored, in seconds since 1970."""
+    """Content under a name: its bytes, and when it was stored, in seconds since 1970."""
 
     name: str
     n_bytes: int

@@ -1,4 +1,4 @@
-"""Files under names that say what made them, in a local folder or a bucket. A file appears complete or not at all.
+"""Files under names that say what made them, complete or not there at all, in a local folder or a bucket.
 
 A name is a file name, or one in a folder of its first two characters (`divided`), of which a store may hold many.
 """
@@ -182,15 +182,15 @@ class FolderStore:
 
     def _files(self, within: str = "") -> Iterator[tuple[str, os.stat_result]]:
         try:
-            found = sorted(os.scandir(self.folder / within), key=lambda one: one.name)
+            found = sorted(os.scandir(self.folder / within), key=lambda entry: entry.name)
         except FileNotFoundError:
             return
-        for one in found:
-            if not within and len(one.name) == len("ab") and one.is_dir():
-                yield from self._files(f"{one.name}/")
-            elif NAME_INFIX not in one.name and one.is_file():
+        for entry in found:
+            if not within and len(entry.name) == len("ab") and entry.is_dir():
+                yield from self._files(f"{entry.name}/")
+            elif NAME_INFIX not in entry.name and entry.is_file():
                 with suppress(FileNotFoundError):  # another process has removed it
-                    yield f"{within}{one.name}", one.stat()
+                    yield f"{within}{entry.name}", entry.stat()
 
 
 ContentStore = FolderStore | BucketStore  # their methods are the same, except for those of caches

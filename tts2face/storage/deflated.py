@@ -62,7 +62,7 @@ def pack_arrays(arrays: Mapping[str, NDArray[Any]]) -> tuple[NDArray[np.uint8], 
     for name, array in arrays.items():
         ways: dict[tuple[int, ...], bytes] = {(): array.tobytes()}
         ways |= {(axis,): _steps(array, axis) for axis in (FIRST, LAST)}
-        way = min(ways, key=lambda one: len(zlib.compress(ways[one], DRAFT_LEVEL)))
+        way = min(ways, key=lambda axes: len(zlib.compress(ways[axes], DRAFT_LEVEL)))
         contents.append(ways[way])
         listed.append([name, array.dtype.name, list(array.shape), *way])
     return deflate(b"".join(contents)), listed

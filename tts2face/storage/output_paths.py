@@ -113,10 +113,10 @@ def _is_path(given: Path | str) -> bool:
     return os.path.lexists(given) and (isinstance(given, Path) or Path(given).suffix != "")
 
 
-def _is_same(one: Path, other: Path) -> bool:
-    if one.exists() and other.exists():
-        return one.samefile(other)
-    return os.path.realpath(one) == os.path.realpath(other)
+def _is_same(path: Path, other: Path) -> bool:
+    if path.exists() and other.exists():
+        return path.samefile(other)
+    return os.path.realpath(path) == os.path.realpath(other)
 
 
 def _lies_in(path: Path, folder: Path) -> bool:

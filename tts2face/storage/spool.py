@@ -15,7 +15,9 @@ class Spool:
     """Growing array (n, width) of little-endian numbers in a temporary file that has no name."""
 
     def __init__(self, width: int, dtype: str = "<f4") -> None:
-        self.width, self.dtype, self.n_rows = width, np.dtype(dtype), 0
+        self.width = width
+        self.dtype = np.dtype(dtype)
+        self.n_rows = 0
         self._file: IO[bytes] = tempfile.SpooledTemporaryFile(MAX_MEMORY_BYTES)  # noqa: SIM115 - closed by close
 
     @property

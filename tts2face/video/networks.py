@@ -66,7 +66,7 @@ def find_bundle(path: Path | None = None) -> Path:
 
 
 def find_segmenter(bundle: Path | None = None) -> Path | None:
-    """Path of the network that tells persons from backgrounds; None if it is not installed.
+    """Path of the network that separates persons from backgrounds; None if it is not installed.
 
     It lies beside a bundle of landmark models that is named, in the user's cache folder, or in a package.
     """

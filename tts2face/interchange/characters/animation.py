@@ -53,7 +53,10 @@ class BoneTracks:
     def __init__(
         self, face: Face, binding: CharacterBinding, character: Character, tree: NodeTree, writer: GlbWriter
     ) -> None:
-        self._face, self._character, self._tree, self._writer = face, character, tree, writer
+        self._face = face
+        self._character = character
+        self._tree = tree
+        self._writer = writer
         self._binding = binding
         turn = float(np.radians(binding.yaw_deg))
         self._turn = head_rotation(0.0, turn, 0.0)  # from the file's axes to the face's

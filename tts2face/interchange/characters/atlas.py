@@ -166,7 +166,9 @@ def _rows(
     for number in order:
         width, height = sizes[number]
         if x and x + width + 2 * BORDER > limit:
-            x, y, row_height = 0, y + row_height, 0
+            x = 0
+            y = y + row_height
+            row_height = 0
         places[number] = (x + BORDER, y + BORDER, width, height)
         x += width + 2 * BORDER
         right, row_height = max(right, x), max(row_height, height + 2 * BORDER)

@@ -19,7 +19,9 @@ from tts2face.models.face import Face
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-OPAQUE, MASK, BLEND = "OPAQUE", "MASK", "BLEND"
+OPAQUE = "OPAQUE"
+MASK = "MASK"
+BLEND = "BLEND"
 KEY = "character"  # of the face's metadata
 
 

@@ -54,7 +54,7 @@ def eyeball_centres(head: HeadMesh, character: Character) -> dict[int, FloatArra
 def gaze_turns(eye: int) -> dict[str, NDArray[np.float32]]:
     """Rotation vector of each gaze shape of an eye, as on the default head."""
     side = SIDE_NAMES[eye]
-    model = next(one for one in default_head().eyes if any(name.endswith(side) for name in one.turns))
+    model = next(eyeball for eyeball in default_head().eyes if any(name.endswith(side) for name in eyeball.turns))
     return dict(model.turns)
 
 

@@ -61,7 +61,7 @@ PROVISIONAL_HEIGHT_MM = 150.0  # of the moved part of a face, until the distance
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImportReport:
-    """What an import found and did.
+    """Report of an import: how much it found and did.
 
     Parameters
     ----------

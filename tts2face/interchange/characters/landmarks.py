@@ -150,8 +150,10 @@ def _medoids(readings: Sequence[tuple[SurfacePoints, FloatArray]], vertices: NDA
     return SurfacePoints(corners, np.clip(weights, 0.0, 1.0) / np.clip(weights, 0.0, 1.0).sum(axis=1, keepdims=True))
 
 
-def _joined(one: SurfacePoints, other: SurfacePoints) -> SurfacePoints:
-    return SurfacePoints(np.concatenate([one.vertices, other.vertices]), np.concatenate([one.weights, other.weights]))
+def _joined(points: SurfacePoints, other: SurfacePoints) -> SurfacePoints:
+    return SurfacePoints(
+        np.concatenate([points.vertices, other.vertices]), np.concatenate([points.weights, other.weights])
+    )
 
 
 def _opened_weights(face: Face) -> list[NDArray[np.float32]]:

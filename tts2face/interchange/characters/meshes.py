@@ -26,7 +26,9 @@ from tts2face.interchange.gltf.nodes import NodeTree
 from tts2face.interchange.gltf.reader import DRACO, GltfFile
 from tts2face.storage.pictures import MAX_DECODING_BYTES, decoding_bytes
 
-TRIANGLES, STRIP, FAN = 4, 5, 6
+TRIANGLES = 4
+STRIP = 5
+FAN = 6
 MAX_VERTICES = 2_000_000  # of all meshes; a film character has 200,000
 MAX_TARGETS = 1000  # morph targets of a mesh
 FloatArray = NDArray[np.float64]
@@ -75,7 +77,9 @@ class _Primitive:
     """One primitive of a mesh, shown by one node."""
 
     def __init__(self, file: GltfFile, fields: Fields, node: int) -> None:
-        self._file, self._fields, self._node = file, fields, node
+        self._file = file
+        self._fields = fields
+        self._node = node
         self._attributes = fields.child("attributes")
         if fields.extension(DRACO) is not None:
             raise DataError(f"{fields.place} is compressed with Draco; export the character without compression")
@@ -213,9 +217,13 @@ class MaterialReader:
     def _material(self, fields: Fields, toon: Fields | None) -> Material:
         rough = fields.child("pbrMetallicRoughness")
         glossy = fields.extension("KHR_materials_pbrSpecularGlossiness")
-        holder, colour_key, image_key = rough, "baseColorFactor", "baseColorTexture"
+        holder = rough
+        colour_key = "baseColorFactor"
+        image_key = "baseColorTexture"
         if glossy is not None and not rough.has(image_key):
-            holder, colour_key, image_key = glossy, "diffuseFactor", "diffuseTexture"
+            holder = glossy
+            colour_key = "diffuseFactor"
+            image_key = "diffuseTexture"
         colour = holder.numbers(colour_key, 4, (1.0, 1.0, 1.0, 1.0))
         texture = holder.child(image_key)
         index = texture.index("index", self._file.count("textures"), "textures") if holder.has(image_key) else None

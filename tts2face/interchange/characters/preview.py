@@ -34,7 +34,10 @@ LINES = (
     (OUTER_LIP_LOWER, (255, 120, 200)),
     ((*FACE_OVAL, FACE_OVAL[0]), (90, 220, 120)),
 )
-PREVIEW_PX, CELL_PX, LABEL_PX, N_COLUMNS = 640, 192, 16, 8
+PREVIEW_PX = 640
+CELL_PX = 192
+LABEL_PX = 16
+N_COLUMNS = 8
 OPEN_WEIGHT = 0.5  # of the opening shape in the second picture of the preview
 SHOWN_OPENING_SHAPES = ("jawOpen", f"{VISEME_PREFIX}aa")
 WALL = "#8a8f98"

@@ -184,11 +184,13 @@ def _facing(corners: FloatArray) -> float:
 
 def _barycentric(pixel: FloatArray, corners: FloatArray) -> FloatArray:
     """Barycentric weights (F, 3) of a pixel in projected triangles (F, 3, 2)."""
-    one, two, there = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], pixel - corners[:, 0]
-    area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+    first_edge = corners[:, 1] - corners[:, 0]
+    second_edge = corners[:, 2] - corners[:, 0]
+    there = pixel - corners[:, 0]
+    area = first_edge[:, 0] * second_edge[:, 1] - first_edge[:, 1] * second_edge[:, 0]
     area = np.where(np.abs(area) < 1e-12, np.inf, area)
-    second = (there[:, 0] * two[:, 1] - there[:, 1] * two[:, 0]) / area
-    third = (one[:, 0] * there[:, 1] - one[:, 1] * there[:, 0]) / area
+    second = (there[:, 0] * second_edge[:, 1] - there[:, 1] * second_edge[:, 0]) / area
+    third = (first_edge[:, 0] * there[:, 1] - first_edge[:, 1] * there[:, 0]) / area
     return np.stack([1.0 - second - third, second, third], axis=1)
 
 
@@ -197,9 +199,13 @@ def _nearest_weights(place: FloatArray, corners: FloatArray) -> FloatArray:
 
     Source: Ericson 2005, Real-Time Collision Detection, section 5.1.5.
     """
-    one, two, there = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], place - corners[:, 0]
-    d11, d12, d22 = (one * one).sum(axis=1), (one * two).sum(axis=1), (two * two).sum(axis=1)
-    d1, d2 = (there * one).sum(axis=1), (there * two).sum(axis=1)
+    first_edge = corners[:, 1] - corners[:, 0]
+    second_edge = corners[:, 2] - corners[:, 0]
+    there = place - corners[:, 0]
+    d11 = (first_edge * first_edge).sum(axis=1)
+    d12 = (first_edge * second_edge).sum(axis=1)
+    d22 = (second_edge * second_edge).sum(axis=1)
+    d1, d2 = (there * first_edge).sum(axis=1), (there * second_edge).sum(axis=1)
     area = np.maximum(d11 * d22 - d12 * d12, 1e-30)
     second, third = (d22 * d1 - d12 * d2) / area, (d11 * d2 - d12 * d1) / area
     inner = np.stack([1.0 - second - third, second, third], axis=1)

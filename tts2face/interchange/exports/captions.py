@@ -53,7 +53,7 @@ def written_tokens(text: str) -> list[str]:
 
 
 def _ends_cue(cue: Sequence[Label], token: Label, *, has_text: bool) -> bool:
-    n_characters = sum(len(one.text) for one in cue) + len(token.text.rstrip())
+    n_characters = sum(len(label.text) for label in cue) + len(token.text.rstrip())
     is_pause = not has_text and token.start - cue[-1].end >= MIN_PAUSE_S
     return is_pause or n_characters > MAX_CUE_CHARACTERS or token.end - cue[0].start > MAX_CUE_S
 
@@ -92,15 +92,15 @@ def _shared_times(
     shares = _shares([word.text for word in words])
     timed = []
     for token, (first, last) in zip(tokens, _shares(tokens), strict=True):
-        covered = [number for number, (begin, end) in enumerate(shares) if begin < last and end > first]
+        covered = [number for number, (first_start, end) in enumerate(shares) if first_start < last and end > first]
         at, until = covered[0], covered[-1]
-        begin, finish = _within(words[at], shares[at], first), _within(words[until], shares[until], last)
-        timed.append(Label(token, begin, finish))
+        first_start, finish = _within(words[at], shares[at], first), _within(words[until], shares[until], last)
+        timed.append(Label(token, first_start, finish))
     return timed
 
 
 def _shares(texts: Sequence[str]) -> list[tuple[float, float]]:
-    """Begin and end of each text as shares of all letters."""
+    """Start and end of each text as shares of all letters."""
     total, at = sum(len(text) for text in texts), 0
     shares = []
     for text in texts:
@@ -111,8 +111,8 @@ def _shares(texts: Sequence[str]) -> list[tuple[float, float]]:
 
 def _within(word: Label, span: tuple[float, float], share: float) -> float:
     """Time within a word at a share of all letters."""
-    begin, end = span
-    part = min(max((share - begin) / (end - begin), 0.0), 1.0)
+    first_start, end = span
+    part = min(max((share - first_start) / (end - first_start), 0.0), 1.0)
     return word.start + part * (word.end - word.start)
 
 
@@ -129,7 +129,9 @@ def _lines(tokens: Sequence[Label]) -> str:
 class _CaptionWriter:
     """Writes cues as clips arrive."""
 
-    decimal, heading, has_numbers = ".", "WEBVTT\n\n", False
+    decimal = "."
+    heading = "WEBVTT\n\n"
+    has_numbers = False
 
     def __init__(self, target: Target) -> None:
         self._file = target.path.open("w", encoding="utf-8", newline="\n")
@@ -193,7 +195,9 @@ class WordVttWriter(_CaptionWriter):
 class SentenceSrtWriter(_CaptionWriter):
     """SubRip by sentence."""
 
-    decimal, heading, has_numbers = ",", "", True
+    decimal = ","
+    heading = ""
+    has_numbers = True
 
     def content(self, tokens: Sequence[Label]) -> str:
         """Text of a cue; SubRip has no escapes."""

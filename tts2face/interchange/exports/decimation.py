@@ -107,8 +107,8 @@ def _summed(corners: IntArray, n: int, each: _Quadrics, share: FloatArray) -> _Q
 
     rows = np.tile(np.arange(len(corners)), corners.shape[1])
     gather = csr_array((np.tile(share, corners.shape[1]), (corners.T.ravel(), rows)), shape=(n, len(corners)))
-    sums = (np.asarray(gather @ one.reshape(len(one), math.prod(one.shape[1:]))) for one in each)
-    return _Quadrics(*(one.reshape(n, *shape.shape[1:]) for one, shape in zip(sums, each, strict=True)))
+    sums = (np.asarray(gather @ values.reshape(len(values), math.prod(values.shape[1:]))) for values in each)
+    return _Quadrics(*(values.reshape(n, *shape.shape[1:]) for values, shape in zip(sums, each, strict=True)))
 
 
 def _borders(points: FloatArray, triangles: IntArray) -> _Quadrics:
@@ -182,7 +182,7 @@ def _without_folds(points: FloatArray, triangles: IntArray, targets: IntArray) -
     """The moves without those that turn a triangle over or make it a line."""
     places, moved = points[:, :N_SPACE], targets[triangles]
     changed = (moved != triangles).any(axis=1) & _has_area(moved)
-    (before, old), (after, new) = (_normals(places, one[changed]) for one in (triangles, moved))
+    (before, old), (after, new) = (_normals(places, values[changed]) for values in (triangles, moved))
     turned = (before * after).sum(axis=1) < LEAST_TURN_COS
     wrong = turned | (new < np.minimum(old, LEAST_QUALITY))
     corners = triangles[changed][wrong].ravel()

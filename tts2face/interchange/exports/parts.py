@@ -130,14 +130,14 @@ class FrameGrid:
                 f"clips of one file must share fps, sound rate and channels; this one has {clip.fps:g} frames/s, "
                 f"{clip.speech.waveform.rate} Hz and {len(clip.motion.channels)} channels"
             )
-        begin = first_sample(self._n_source, self._rate, self.source_fps)
+        shift = first_sample(self._n_source, self._rate, self.source_fps)
         values = np.concatenate([clip.motion.values, clip.head.values], axis=1)
         rows = values if self.fps == self.source_fps else self._resample(values)
         self._n_source += len(values)
         self._n_frames += len(rows)
-        self._end_sample = begin + len(clip.speech.waveform.samples)
+        self._end_sample = shift + len(clip.speech.waveform.samples)
         self._last = values[-1:]
-        return self._part(rows, clip, begin, text)
+        return self._part(rows, clip, shift, text)
 
     def remainder(self) -> Part:
         """Frames after the last source frame, which repeat it up to the end of the sound."""
@@ -155,9 +155,9 @@ class FrameGrid:
         at = np.arange(self._n_frames, until, dtype=np.float64) * float(ratio) - first
         return interpolate_rows(rows, at)
 
-    def _part(self, rows: Float32Array, clip: Clip | None = None, begin: int = 0, text: str = "") -> Part:
+    def _part(self, rows: Float32Array, clip: Clip | None = None, shift: int = 0, text: str = "") -> Part:
         k = len(self._channels)
-        return Part(rows[:, :k], rows[:, k:], clip, begin, text)
+        return Part(rows[:, :k], rows[:, k:], clip, shift, text)
 
 
 def frame_rows(values: Float32Array, decimals: str) -> Iterator[str]:
@@ -187,9 +187,9 @@ class PhoneLabels:
         """Yield the phones that are complete after a part; its last one may still be continued by the next part."""
         if part.clip is None:
             return
-        phones, begin = part.clip.speech.phones, part.begin
+        phones, shift = part.clip.speech.phones, part.begin
         half_sample = 0.5 / part.clip.speech.waveform.rate
-        starts = [begin + float(edge) for edge in phones.edges]
+        starts = [shift + float(edge) for edge in phones.edges]
         yield from self._reach(starts[0], half_sample)
         for text, start, end in zip(phones.phones, starts[:-1], starts[1:], strict=True):
             if self._pending is not None and text == SILENCE == self._pending.text:

@@ -67,7 +67,7 @@ def stage_glb(face: Face, channels: tuple[str, ...]) -> bytes:
     rows = _rows(face, surface, skeleton, fields)
     moved = np.where(moves.any(axis=2, keepdims=True), face.shapes[: len(channels)], np.float32(0))
     surfaces = stage_surfaces(face, fields, moved)
-    primitives = [_primitive(face, number, one, (rows, moves), buffer) for number, one in enumerate(surfaces)]
+    primitives = [_primitive(face, number, drawn, (rows, moves), buffer) for number, drawn in enumerate(surfaces)]
     content = {
         "asset": {"version": "2.0", "generator": "tts2face", "extras": _stage(face, surface, skeleton, channels)},
         "extensionsUsed": [QUANTISED, *([TEXTURE_EXTENSION] if face.textures else [])],
@@ -75,7 +75,7 @@ def stage_glb(face: Face, channels: tuple[str, ...]) -> bytes:
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"name": "face", "mesh": 0}],
-        "materials": [_material(one, surface, face, unlit=one.part.name in unlit) for one in surfaces],
+        "materials": [_material(drawn, surface, face, unlit=drawn.part.name in unlit) for drawn in surfaces],
         "meshes": [
             {
                 "name": "face",
@@ -135,7 +135,7 @@ def _primitive(
         "attributes": attributes,
         "indices": buffer.add_accessor(surface.triangles.ravel().astype(kind), INDICES),
         "material": number,
-        "targets": [{"POSITION": buffer.add_sparse_accessor(one, normalized=True)} for one in moves[:, own]],
+        "targets": [{"POSITION": buffer.add_sparse_accessor(move, normalized=True)} for move in moves[:, own]],
     }
 
 
@@ -192,7 +192,7 @@ def _typical_texels(texture: Texture) -> list[list[float]]:
 def _textures(face: Face, buffer: GltfBuffer) -> dict[str, Any]:
     if not face.textures:
         return {}
-    images = [{"bufferView": buffer.add_view(_webp(one)), "mimeType": "image/webp"} for one in face.textures]
+    images = [{"bufferView": buffer.add_view(_webp(texture)), "mimeType": "image/webp"} for texture in face.textures]
     textures = [{"sampler": 0, "extensions": {TEXTURE_EXTENSION: {"source": n}}} for n in range(len(images))]
     return {"images": images, "samplers": [{}], "textures": textures}
 
@@ -210,7 +210,7 @@ def _webp(texture: Texture) -> bytes:
 
 
 def _stage(face: Face, surface: Surface, skeleton: Skeleton, channels: tuple[str, ...]) -> Mapping[str, Any]:
-    """What the preview takes from the renderer: lamps, cameras, joints; lengths in metres."""
+    """Values that the preview takes from the renderer: lamps, cameras, joints; lengths in metres."""
     jaw = face.shape_names.index("jawOpen") if "jawOpen" in face.shape_names else -1
     opening = lip_opening(face, jaw)[: len(channels)]
     eyes = [

@@ -12,7 +12,10 @@ from tts2face.picture.surface import EYE_KIND, SKIN, STRANDS
 HIDDEN_SKY = 0.045  # share of the sky that a vertex hidden from all sides has in a light field
 HIDDEN_MM = 5.0  # error of hidden skin, which is removed
 SKIN_MM, MOUTH_MM = 0.8, 0.2  # error of skin that no channel moves, and the least one, of lips and lids
-EYE_MM, INSIDE_MM, CLOTH_MM = 0.3, 0.25, 1.2  # of eyeballs; teeth, gums and tongue; clothes
+# of eyeballs; teeth, gums and tongue; clothes
+EYE_MM = 0.3
+INSIDE_MM = 0.25
+CLOTH_MM = 1.2
 CLOTH_LENGTH_MM = 150.0  # of a surface that is no part of the head
 LEAST_TRIANGLES = 200  # of a surface that is reduced
 LEAST_PHOTO_TRIANGLES = 500  # in a photograph, whose lids are narrow and fit the skin exactly
@@ -35,7 +38,7 @@ def stage_surfaces(face: Face, fields: NDArray[np.float32], moves: NDArray[np.fl
     light = fields[:, [0, N_HARMONICS + 1]]
     sky = np.maximum(light[:, 0], light.sum(axis=1))
     shown = (sky >= HIDDEN_SKY) | moves.any(axis=(0, 2))
-    return [_along_curve(face, _reduced(face, one, shown, (moves, light))) for one in divide_surface(face)]
+    return [_along_curve(face, _reduced(face, surface, shown, (moves, light))) for surface in divide_surface(face)]
 
 
 def _reduced(
@@ -45,7 +48,9 @@ def _reduced(
     values: tuple[NDArray[np.float32], NDArray[np.float32]],
 ) -> ExportSurface:
     """The surface without what no view shows, and with fewer triangles; cards of hair stay as they are."""
-    part, own, triangles = surface.part, surface.vertices, surface.triangles
+    part = surface.part
+    own = surface.vertices
+    triangles = surface.triangles
     is_photo = face.light.is_flat and part.texture == 0
     if part.kind == STRANDS or len(triangles) < (LEAST_PHOTO_TRIANGLES if is_photo else LEAST_TRIANGLES):
         return surface

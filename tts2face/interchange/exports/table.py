@@ -122,8 +122,8 @@ FORMATS = (
                ("captions", "KaraokeVttWriter")),
     FormatInfo("wav", (".wav",), "the sound, 16-bit PCM", ("sound", "WavWriter"), is_sound=True),
 )  # fmt: skip
-_BY_NAME = {one.name: one for one in FORMATS}
-_BY_SUFFIX = {suffix: one for one in FORMATS for suffix in one.suffixes}
+_BY_NAME = {info.name: info for info in FORMATS}
+_BY_SUFFIX = {suffix: info for info in FORMATS for suffix in info.suffixes}
 _NAME = re.compile(r"[a-z0-9][a-z0-9-]+")  # of a format before a colon; a single letter is a drive
 
 
@@ -155,7 +155,7 @@ def _by_suffix(name: str) -> dict[str, FormatInfo]:
     """Formats by their suffixes: those of other packages, too, for a name with an ending that is none of ours."""
     if "." not in name or name.lower().endswith((*_BY_SUFFIX, *MOVIE_SUFFIXES)):
         return _BY_SUFFIX
-    return {suffix: one for one in reversed(all_formats()) for suffix in one.suffixes}
+    return {suffix: info for info in reversed(all_formats()) for suffix in info.suffixes}
 
 
 def split_format(given: str | Path) -> tuple[Path, str | None]:
@@ -182,13 +182,13 @@ def find_format(path: Path, name: str | None = None) -> FormatInfo:
     """
     if name is not None:
         if not _is_name(name):
-            names = ", ".join(one.name for one in all_formats())
+            names = ", ".join(info.name for info in all_formats())
             raise InputError(f"there is no export format {name!r}; choose one of {names}")
         return _by_name(name)
     known, suffix = _by_suffix(path.name), _longest_suffix(path.name)
     if suffix is not None:
         return known[suffix]
-    endings, last = [ending for one in all_formats() for ending in one.suffixes], path.suffix.lower()
+    endings, last = [ending for info in all_formats() for ending in info.suffixes], path.suffix.lower()
     several = [ending for ending in endings if last and ending.endswith(last)]
     if several:
         raise InputError(f"{path.name} may have several formats; end its name in {_choices(several)}")
@@ -210,7 +210,7 @@ def batch_format(name: str) -> tuple[str, FormatInfo]:
     if _is_name(name):
         return _by_name(name).suffixes[0], _by_name(name)
     raise InputError(
-        f"there is no export format {name!r}; give an ending ({_choices([one[1:] for one in known])}) or a name "
+        f"there is no export format {name!r}; give an ending ({_choices([info[1:] for info in known])}) or a name "
         "that `tts2face formats` lists"
     )
 

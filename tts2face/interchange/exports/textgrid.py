@@ -44,7 +44,7 @@ def _tier(number: int, name: str, intervals: Sequence[Interval]) -> Iterator[str
 def textgrid(phones: "PhoneSequence", words: Sequence["WordSpan"], *, note: str = "") -> str:
     """Praat TextGrid with the tiers ``words`` and ``phones``; to be saved as UTF-8.
 
-    A tier ``confidence`` tells how probably the words of a recording are said, a tier ``note`` holds a given note.
+    A tier ``confidence`` says how probably the words of a recording are said, a tier ``note`` holds a given note.
 
     Raises
     ------

@@ -106,7 +106,10 @@ class UsdWriter:
             translations.Set(usd.Vt.Vec3fArray.FromNumpy(moved), frame)
 
     def _define_surface(self, stage: Any, surface: ExportSurface, name: str, shape_names: list[str]) -> None:
-        usd, face, skeleton, own = self._usd, self._face, self._skeleton, surface.vertices
+        usd = self._usd
+        face = self._face
+        skeleton = self._skeleton
+        own = surface.vertices
         path = f"{ROOT_PATH}/{re.sub(r'[^A-Za-z0-9_]', '_', name)}"
         mesh = usd.UsdGeom.Mesh.Define(stage, path)
         mesh.CreatePointsAttr(_vectors(usd, face.vertices[own]))

@@ -183,7 +183,9 @@ class _OpenFile:
     """One file of an `ExportWriter`."""
 
     def __init__(self, file: ExportFile, face: "Face | None", fps: float | None) -> None:
-        self.path, self._format, self._face = file.path, file.format, face
+        self.path = file.path
+        self._format = file.format
+        self._face = face
         self._fps = (fps or file.format.default_fps) if file.format.has_frames else None
         self._grid: FrameGrid | None = None
         self._writer: FormatWriter | None = None

@@ -11,12 +11,16 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from tts2face.numeric.kernels import kernel
 
-ATTRIBUTES, TRIANGLES, INDICES = "ATTRIBUTES", "TRIANGLES", "INDICES"
+ATTRIBUTES = "ATTRIBUTES"
+TRIANGLES = "TRIANGLES"
+INDICES = "INDICES"
 NO_FILTER, EXPONENTIAL = "NONE", "EXPONENTIAL"
 GROUP = 16  # elements whose deltas share one width
 MAX_BLOCK_BYTES, MAX_BLOCK = 8192, 256
 TAIL_BYTES = 32  # least size of the attributes' tail
-ATTRIBUTES_HEADER, TRIANGLES_HEADER, INDICES_HEADER = 0xA0, 0xE1, 0xD1
+ATTRIBUTES_HEADER = 0xA0
+TRIANGLES_HEADER = 0xE1
+INDICES_HEADER = 0xD1
 
 Bytes = NDArray[np.uint8]
 
@@ -60,7 +64,9 @@ def _decode_attributes(content: Bytes, count: int, stride: int) -> Bytes:
 @kernel
 def _decode_blocks(data: Any, block: int, last: Any, out: Any) -> bool:  # noqa: C901 - one pass over bits
     """Decode blocks of deltas into `out` (count, stride), which begins after the element `last`; False if too short."""
-    count, stride, at = out.shape[0], out.shape[1], 0
+    count = out.shape[0]
+    stride = out.shape[1]
+    at = 0
     for first in range(0, count, block):
         n = min(block, count - first)
         n_groups = (n + 15) // 16
@@ -102,8 +108,10 @@ def _decode_blocks(data: Any, block: int, last: Any, out: Any) -> bool:  # noqa:
 class _IndexStream:
     """Reader of variable-length differences of indices."""
 
-    def __init__(self, content: bytes, begin: int, end: int) -> None:
-        self._content, self._at, self._end = content, begin, end
+    def __init__(self, content: bytes, start: int, end: int) -> None:
+        self._content = content
+        self._at = start
+        self._end = end
         self.last = 0
 
     def byte(self) -> int:
@@ -147,7 +155,9 @@ class _TriangleDecoder:
 
     def __init__(self, stream: _IndexStream, table: bytes) -> None:
         self._stream, self._table = stream, table
-        self._edges, self._vertices, self._next = _Recent((0, 0)), _Recent(0), 0
+        self._edges = _Recent((0, 0))
+        self._vertices = _Recent(0)
+        self._next = 0
 
     def triangle(self, code: int) -> tuple[int, int, int]:
         return self._on_edge(code >> 4, code & 15) if code < 0xF0 else self._apart(code)
@@ -202,7 +212,9 @@ def _decode_triangles(content: bytes, count: int) -> list[int]:
 def _decode_indices(content: bytes, count: int) -> list[int]:
     if len(content) < 1 + 4 or content[0] != INDICES_HEADER:
         raise _damaged()
-    stream, last, found = _IndexStream(content, 1, len(content) - 4), [0, 0], []
+    stream = _IndexStream(content, 1, len(content) - 4)
+    last = [0, 0]
+    found = []
     for _ in range(count):
         value = stream.number()
         baseline, value = value & 1, value >> 1

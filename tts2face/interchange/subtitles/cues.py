@@ -138,7 +138,7 @@ _VOICE_MARK = re.compile(r"^\s*\x02([^\x03]*)\x03")
 
 @dataclass(frozen=True, slots=True)
 class SpokenText:
-    """What of a cue is spoken, on one line, the text as shown, and its parts by speaker.
+    """Text of a cue: as it is spoken, on one line, the text as shown, and its parts by speaker.
 
     The speaker of a part is a label or WebVTT voice, or empty for a dash without a name.
     """
@@ -182,7 +182,7 @@ def _at_dashes(line: str) -> list[str]:
     In a line without a dash at its start a long dash may be a pause, and one after a quotation belongs to its frame.
     """
     has_first = _DASH.match(line) is not None
-    begins = [0]
+    starts = [0]
     for match in _INNER_DASH.finditer(line):
         is_turn = match["dash"] == ">>" or (
             _ENDS_SENTENCE.search(line[max(match.start() - _END_CHARACTERS, 0) : match.start()]) is not None
@@ -190,8 +190,8 @@ def _at_dashes(line: str) -> list[str]:
             and not line[match.end("dash") :][:1].isdigit()  # -5 is a number
             and (has_first or (match["dash"] in "-–" and match["letter"].isalpha()))
         )
-        begins += [match.end()] if is_turn else []
-    return [line[begin:end] for begin, end in zip(begins, [*begins[1:], None], strict=True)]
+        starts += [match.end()] if is_turn else []
+    return [line[start:end] for start, end in zip(starts, [*starts[1:], None], strict=True)]
 
 
 def _is_dialogue(lines: Sequence[str]) -> bool:

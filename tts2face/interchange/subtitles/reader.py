@@ -13,7 +13,10 @@ from tts2face.interchange.subtitles.decoding import read_text
 from tts2face.interchange.subtitles.substation import read_substation
 from tts2face.interchange.subtitles.ttml import read_ttml
 
-SUBRIP, WEBVTT, SUBSTATION, TTML = "SubRip", "WebVTT", "SubStation Alpha", "TTML"
+SUBRIP = "SubRip"
+WEBVTT = "WebVTT"
+SUBSTATION = "SubStation Alpha"
+TTML = "TTML"
 SUFFIXES = {
     ".srt": SUBRIP,
     ".vtt": WEBVTT,
@@ -132,7 +135,7 @@ def _timed(written: Sequence[WrittenCue], warnings: list[SubtitleWarning]) -> tu
     return tuple(cues)
 
 
-def _estimated_end(begin: float, following: float | None, text: str) -> float:
+def _estimated_end(start: float, following: float | None, text: str) -> float:
     """End of a cue by the length of its text, but not after the start of the next one."""
-    end = begin + max(MIN_ESTIMATED_S, len(text) / CHARACTERS_PER_S)
-    return min(end, following) if following is not None and following > begin else end
+    end = start + max(MIN_ESTIMATED_S, len(text) / CHARACTERS_PER_S)
+    return min(end, following) if following is not None and following > start else end

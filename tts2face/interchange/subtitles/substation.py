@@ -49,7 +49,7 @@ def read_substation(lines: Sequence[str]) -> tuple[list[WrittenCue], list[Subtit
 
 
 def _format_fields(written: str, number: int, warnings: list[SubtitleWarning]) -> tuple[str, ...] | None:
-    fields = tuple("name" if one.strip().lower() == "actor" else one.strip().lower() for one in written.split(","))
+    fields = tuple("name" if cell.strip().lower() == "actor" else cell.strip().lower() for cell in written.split(","))
     if {"start", "end", "text"} <= set(fields) and fields[-1] == "text":
         return fields
     warnings.append(SubtitleWarning(number, "this Format line lacks Start, End or Text at its end; it is not used"))
@@ -62,8 +62,8 @@ def _dialogue(written: str, fields: Sequence[str], number: int, warnings: list[S
         warnings.append(SubtitleWarning(number, f"this line has {len(values)} of {len(fields)} fields; it is left out"))
         return None
     found: Mapping[str, str] = dict(zip(fields, values, strict=True))
-    begin, end = parse_clock(found["start"]), parse_clock(found["end"])
-    if begin is None:
+    start, end = parse_clock(found["start"]), parse_clock(found["end"])
+    if start is None:
         warnings.append(
             SubtitleWarning(number, f"the start {found['start'].strip()[:20]!r} cannot be read; the cue is left out")
         )
@@ -74,4 +74,4 @@ def _dialogue(written: str, fields: Sequence[str], number: int, warnings: list[S
         )
     text = "" if _DRAWING.search(found["text"]) else _LINE_BREAK.sub("\n", found["text"]).replace("\\h", " ")
     style = found.get("style", "").strip().lstrip("*")
-    return WrittenCue(begin, end, text, number, speaker=found.get("name", "").strip(), style=style)
+    return WrittenCue(start, end, text, number, speaker=found.get("name", "").strip(), style=style)

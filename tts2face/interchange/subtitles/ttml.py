@@ -112,23 +112,23 @@ class _TtmlReader:
 
     def _open(self, name: str, own: Attributes, parent: _Element) -> _Element:
         start = parent.next_s if parent.is_sequence else parent.begin_s
-        begin, end = start, parent.end_s
+        given, end = start, parent.end_s
         if name in _TIMED:
             offset = self._seconds(own.get("begin"))
-            begin = start + (offset or 0.0)
+            given = start + (offset or 0.0)
             length, until = self._seconds(own.get("dur")), self._seconds(own.get("end"))
-            ends = [end, None if length is None else begin + length, None if until is None else start + until]
-            end = min((one for one in ends if one is not None), default=None)
+            ends = [end, None if length is None else given + length, None if until is None else start + until]
+            end = min((instant for instant in ends if instant is not None), default=None)
         speaker = own.get("agent") or own.get("role") or parent.speaker
         return _Element(
             name,
-            begin,
+            given,
             end,
             own.get("timeContainer") == "seq",
             speaker,
             own.get("style") or parent.style,
             own.get("lang") or parent.language,
-            begin,
+            given,
             own.get("space", "preserve" if parent.keeps_space else "") == "preserve",
         )
 
