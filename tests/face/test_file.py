@@ -17,7 +17,6 @@ from tts2face.models.face_file import Identity, read_face, write_face
 from tts2face.models.face_loading import load_face
 from tts2face.processes.shared import Shared
 from tts2face.session.catalogue import IdentityEntry, identities
-from tts2face.storage import shipped
 from tts2face.storage.shipped import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 
@@ -206,25 +205,8 @@ def test_arrays_that_do_not_fit_are_refused() -> None:
         replace(face, triangles=np.full((20, 3), N, np.int32))
 
 
-def test_a_former_face_is_said_once_and_shown_by_another_without_its_hair(caplog):
-    shipped._say_new_name.cache_clear()
-    assert {find_file("cartoon", "face").name for _ in range(2)} == {"ada.face"}
-    (note,) = [record.message for record in caplog.records if "cartoon" in record.message]
-    assert note == "the face cartoon is no longer part of this program; ada is used"
-    face = load_face("cartoon", hair="bob02", hair_color="red")
-    assert np.array_equal(face.vertices, load_face("ada").vertices)
-
-
-def test_a_former_identity_is_said_once_and_shown_by_another_where_there_is_one(caplog, tmp_path: Path) -> None:
-    shipped._say_new_name.cache_clear()
-    head = find_file("head", "face")
-    former = [read_face(head, "walter") for _ in range(2)]
-    assert all(face.metadata["identity"] == "erik" for face in former)
-    (note,) = [record.message for record in caplog.records if "walter" in record.message]
-    assert note == "the identity walter is no longer part of this program; erik is used"
-    assert not {*shipped.FORMER["identity"]} & {entry.name for entry in identities()}
-    own = small_face()
-    write_face(tmp_path / "own.face", own, {"walter": Identity(np.ones((N, 3), np.float32))})
+def test_an_identity_that_a_face_lacks_is_refused(tmp_path: Path) -> None:
+    write_face(tmp_path / "own.face", small_face(), {"walter": Identity(np.ones((N, 3), np.float32))})
     assert read_face(tmp_path / "own.face", "walter").metadata["identity"] == "walter"
     with pytest.raises(InputError, match="no identity 'kenji'; it has: walter"):
         read_face(tmp_path / "own.face", "kenji")

@@ -43,7 +43,6 @@ from tts2face.storage.model_pictures import (
     texture_tensors,
 )
 from tts2face.storage.schema import Contents
-from tts2face.storage.shipped import present_name
 from tts2face.storage.tensors import read_tensors, write_tensors
 
 KIND = "face"
@@ -137,14 +136,13 @@ def read_face(path: Path, identity: str | None = None, *, checks_pictures: bool 
     Raises
     ------
     InputError
-        The file does not exist, or the identity neither now nor in earlier versions.
+        The file or the identity does not exist.
     DataError
         The file is damaged, of another kind or version, or invalid (`tts2face.models.face_schema`).
     """
     arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
     check_face(path, arrays, header)
     names = [name for name, _, _ in header["identities"]]
-    identity = None if identity is None else present_name(identity, "identity", names)
     if identity is not None and identity not in names:
         offered = ", ".join(names) or "none"
         raise InputError(f"the face {path.stem} has no identity {identity!r}; it has: {offered}")

@@ -10,7 +10,7 @@ from tts2face.models.hair import attach_hair, parse_hair_colour
 from tts2face.models.hair_file import LitHair, load_hair, tint_hair, wear_hair
 from tts2face.models.light import Lamps
 from tts2face.processes.shared import Shared, file_state
-from tts2face.storage.shipped import FORMER, SHIPPED_FOLDER, find_file
+from tts2face.storage.shipped import SHIPPED_FOLDER, find_file
 
 
 def load_face(
@@ -39,7 +39,7 @@ def load_face(
     """
     path = find_file(name, KIND)
     of_hair = SHIPPED_FOLDER if hair is None or not Path(hair).suffix else Path(hair)  # that of a face is shipped
-    key = (file_state(path), file_state(of_hair), identity, hair, hair_color, name in FORMER[KIND])
+    key = (file_state(path), file_state(of_hair), identity, hair, hair_color)
     return _FACES.get(key, lambda: _read_face(name, path, identity, hair, hair_color))
 
 
@@ -48,8 +48,6 @@ _FACES: Shared[Face] = Shared()
 
 def _read_face(name: str, path: Path, identity: str | None, hair: str | None, hair_color: str | None) -> Face:
     face = read_face(path, identity, checks_pictures=path.parent != SHIPPED_FOLDER)
-    if name in FORMER[KIND]:
-        return face  # options of its hair are those of the former face
     if face.hairdo is None:
         if hair not in (None, BALD) or hair_color is not None:
             raise InputError(f"no haircut fits the face {name}; remove --hair and --hair-color, or choose another face")

@@ -13,7 +13,6 @@ from tts2face.session.catalogue import identities
 from tts2face.session.named_models import Models
 from tts2face.sound.voice_pool import has_voice, voice_names
 from tts2face.source import NATURAL, parse_articulation
-from tts2face.storage.shipped import present_name
 
 
 def check_names(models: Models, request: Mapping[str, Any]) -> None:
@@ -31,7 +30,7 @@ def check_names(models: Models, request: Mapping[str, Any]) -> None:
         raise InputError(f"there is no voice {voice!r}; give {', '.join(voice_names())}, or a Piper voice (.onnx)")
     if models.identity is not None:
         known = _identities(models.face)
-        if present_name(models.identity, "identity", known) not in known:
+        if models.identity not in known:
             offered = ", ".join(known) or "none"
             raise InputError(f"the face {models.face} has no identity {models.identity!r}; it has {offered}")
     if models.hair not in (None, BALD) or models.hair_color is not None:

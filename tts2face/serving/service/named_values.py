@@ -14,7 +14,6 @@ from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.library import Library, shipped_names
 from tts2face.serving.work.resource_check import DICTIONARY, FACE
 from tts2face.session import catalogue
-from tts2face.storage.shipped import FORMER
 
 COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
 MODEL_KINDS = ("talker", "face", "palette")
@@ -86,4 +85,4 @@ def check_background(background: str) -> None:
 
 
 def _served_names(kind: str) -> tuple[str, ...]:
-    return (*shipped_names(kind), *FORMER.get(kind, {}), *((OWN_FACE,) if kind == FACE else ()))
+    return (*shipped_names(kind), *((OWN_FACE,) if kind == FACE else ()))
