@@ -30,6 +30,11 @@ DROP = """const bytes = Uint8Array.from(atob(arguments[0]), (one) => one.charCod
         fire(document.querySelector('.q-uploader__dnd'), 'drop');
         done(true);
     }, 200))"""
+# A menu has no size for a while after it is mounted, as on a busy page.
+BUSY = """const {get} = Object.getOwnPropertyDescriptor(HTMLElement.prototype, 'offsetHeight');
+    const until = performance.now() + 500;
+    const height = function () { return this.matches('.q-menu') && performance.now() < until ? 0 : get.call(this); };
+    Object.defineProperty(HTMLElement.prototype, 'offsetHeight', {get: height})"""
 HANDLE = "const one = document.querySelector(`[data-place='${arguments[0]}']`)?.getBoundingClientRect();"
 
 
@@ -131,6 +136,7 @@ def test_a_head_is_made_in_place_of_a_picture_that_speaks(dialog: Browser, servi
     dialog.run("[...document.querySelectorAll('.q-radio')].find((one) => one.innerText.includes('3D head')).click()")
     dialog.wait("return !document.querySelector('.studio-photo')?.offsetParent")
     assert dialog.run("return document.querySelector('.photo-found').innerText.includes('Keep wrinkles')")
+    dialog.run(BUSY)
     dialog.run("document.querySelector('.photo-found .q-select').click()")
     blue = "[...document.querySelectorAll('[role=option]')].find((one) => one.innerText.includes('blue'))"
     dialog.wait(f"return !!{blue}")

@@ -29,7 +29,8 @@ _ICONS = {None: "brightness_auto", True: "dark_mode", False: "light_mode"}
 
 def begin_page(request: HttpRequest) -> None:
     """Style of a page, and its colours as the browser chose them last."""
-    ui.add_css(_style())
+    ui.add_css(_text_beside("studio.css"))
+    ui.add_body_html(f'<script type="module">{_text_beside("menus.js")}</script>')
     ui.colors(primary="#1f5fbf", negative="#b3261e", positive="#1b6e3c")
     ui.dark_mode(_chosen_dark(request))
 
@@ -123,6 +124,6 @@ def _chosen_dark(request: HttpRequest) -> bool | None:
     return {"1": True, "0": False}.get(request.cookies.get(DARK_COOKIE, ""))
 
 
-@lru_cache(maxsize=1)
-def _style() -> str:
-    return Path(__file__).with_name("studio.css").read_text(encoding="utf-8")
+@lru_cache(maxsize=2)
+def _text_beside(name: str) -> str:
+    return Path(__file__).with_name(name).read_text(encoding="utf-8")
