@@ -37,13 +37,6 @@ def join_segments(segments: Sequence[Path], out: Path, fps: float, sounds: Seque
     ----------
     sounds
         For each segment, what replaces its sound; empty: nothing.
-
-    Raises
-    ------
-    DataError
-        A segment is damaged or was encoded with other settings.
-    BackendError
-        The file cannot be written.
     """
     import av
 

@@ -52,15 +52,7 @@ class Track:
 
 
 def open_track(path: Path) -> Track:
-    """Track of a recording, which is decoded once; the last one stays open.
-
-    Raises
-    ------
-    InputError, DataError
-        The recording does not exist or cannot be read.
-    BackendError
-        The disk of temporary files is full; an hour takes 350 MB.
-    """
+    """Track of a recording, which is decoded once; the last one stays open."""
     try:
         status = path.stat()
     except OSError as refused:

@@ -126,11 +126,15 @@ def cast_from_tables(tables: Mapping[str, Any], place: str, folder: Path | None 
         if name not in ("default", "role"):
             raise DataError(f"{place}: there is no table {name!r}; use [default] and [[role]]")
     roles, default = tables.get("role", []), tables.get("default", {})
-    if not isinstance(roles, list) or not isinstance(default, dict) or not all(isinstance(one, dict) for one in roles):
+    if (
+        not isinstance(roles, list)
+        or not isinstance(default, dict)
+        or not all(isinstance(role, dict) for role in roles)
+    ):
         raise DataError(f"{place}: write the defaults as [default], and each role as [[role]]")
     return Cast(
         _settings(default, f"{place}, [default]", folder),
-        tuple(_role(one, f"{place}, role {number}", folder) for number, one in enumerate(roles, start=1)),
+        tuple(_role(role, f"{place}, role {number}", folder) for number, role in enumerate(roles, start=1)),
     )
 
 

@@ -16,15 +16,7 @@ from tts2face.source import NATURAL, parse_articulation
 
 
 def check_names(models: Models, request: Mapping[str, Any]) -> None:
-    """Refuse a voice, an identity, a haircut or a style that does not exist.
-
-    Raises
-    ------
-    InputError
-        There is no such voice, identity, haircut or style, or no such model.
-    DataError
-        A model is damaged.
-    """
+    """Refuse a voice, an identity, a haircut or a style that does not exist."""
     voice = request.get("voice")
     if voice is not None and not has_voice(voice) and not str(voice).endswith(".onnx"):
         raise InputError(f"there is no voice {voice!r}; give {', '.join(voice_names())}, or a Piper voice (.onnx)")
@@ -52,4 +44,4 @@ def _check_hair(face: str, hair: str | None, colour: str | None) -> None:
 
 @lru_cache(maxsize=64)
 def _identities(face: str) -> tuple[str, ...]:
-    return () if face == OWN_FACE else tuple(one.name for one in identities(face))
+    return () if face == OWN_FACE else tuple(identity.name for identity in identities(face))

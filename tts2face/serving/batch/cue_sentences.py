@@ -84,7 +84,7 @@ def sentence_groups(
     for at, window in enumerate(windows):
         if groups:
             before = groups[-1][-1]
-            n_characters = sum(len(windows[one].cue.text) + 1 for one in groups[-1])
+            n_characters = sum(len(windows[number].cue.text) + 1 for number in groups[-1])
             is_one = keys[at] is not None and keys[at] == keys[before] and window.begin - windows[before].end <= max_gap
             is_short = n_characters + len(window.cue.text) <= MAX_SENTENCE_CHARACTERS
             texts = windows[before].cue.text, window.cue.text

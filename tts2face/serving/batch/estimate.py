@@ -37,7 +37,7 @@ class Estimate:
 def estimate_batch(plan: Plan, out: Path, store: Store | None) -> Estimate:
     """Estimate of what a run of a plan takes; nothing is written."""
     entries = read_manifest(out)
-    stale = [one for one in plan.outputs if not is_current(entries.get(one.name), one, out)]
+    stale = [output for output in plan.outputs if not is_current(entries.get(output.name), output, out)]
     needed = {segment.address: segment for output in stale for segment in output.needed}
     missing = [segment for address, segment in needed.items() if store is None or store.result(address) is None]
     fps = plan.outputs[0].fps if plan.outputs else 30.0

@@ -27,13 +27,7 @@ MAX_SHOWN = 3
 
 
 def check_faces(output: Output) -> None:
-    """Refuse exports of an output with several faces, whose channels differ, or of a mesh where there is none.
-
-    Raises
-    ------
-    InputError
-        It has several faces, or a talker's own face.
-    """
+    """Refuse exports of an output with several faces, whose channels differ, or of a mesh where there is none."""
     if not output.exports:
         return
     faces = dict.fromkeys(map(_face_of, output.segments))
@@ -72,7 +66,7 @@ class Exporter:
             gestures = Request(gestures=output.segments[0].request.get("gestures", Request().gestures))
             face = mesh_of(session.animated_face(has_gestures=gestures.has_gestures), files)
         with ExportWriter(files, face=face) as writer:
-            lengths = [one.slot_frames if one.fills_slot else None for one in output.tracks]
+            lengths = [track.slot_frames if track.fills_slot else None for track in output.tracks]
             for clip in joined_clips(tracks, output.fps, output.sounds, lengths):
                 writer.add(clip)
         return [file.path for file in files]
@@ -96,11 +90,6 @@ def joined_clips(
     ----------
     lengths
         Frames of each track, after which its last words may sound on; empty or None: all of its frames.
-
-    Raises
-    ------
-    DataError
-        A track is damaged.
     """
     from tts2face.serving.batch.audio_track import open_track
 
@@ -133,10 +122,10 @@ def _mixed(own: Waveform, sounding: NDArray[np.float32], n_samples: int) -> tupl
     return Waveform(mixed, own.rate), sounding[n_samples:]
 
 
-def _sum(one: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np.float32]:
+def _sum(values: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np.float32]:
     """Sum of two sounds from the same instant."""
-    total = np.zeros(max(len(one), len(other)), np.float32)
-    total[: len(one)] += one
+    total = np.zeros(max(len(values), len(other)), np.float32)
+    total[: len(values)] += values
     total[: len(other)] += other
     return total
 

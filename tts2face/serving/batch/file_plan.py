@@ -159,7 +159,7 @@ class FilePlan:
         windows = cue_windows(cues, fps, (before, after), is_spoken=self.speakers.is_spoken, rate_of=self._rate_of)
         self._windows = {(window.cue.number, window.part): window for window in windows}
         self.n_silent = len(read.cues) - len({window.cue.number for window in windows})
-        self._following = {(one.cue.number, one.part): later for one, later in pairwise(windows)}
+        self._following = {(window.cue.number, window.part): later for window, later in pairwise(windows)}
         if self.base.options.audio is None:
             self._find_sentences(windows)
         return windows
@@ -215,10 +215,10 @@ class FilePlan:
 
     def _speaks_on(self, window: Window, following: Window) -> bool:
         """Whether one speaker has both lines, the first of which may use the time up to the second."""
-        before, after = (self.speakers.look(one.cue, one.part) for one in (window, following))
+        before, after = (self.speakers.look(shown.cue, shown.part) for shown in (window, following))
         same = [
-            (one.cue.speaker, look.other, look.models, look.request.get("voice"))
-            for one, look in ((window, before), (following, after))
+            (segment.cue.speaker, look.other, look.models, look.request.get("voice"))
+            for segment, look in ((window, before), (following, after))
         ]
         return following.begin <= window.slot_end and same[0] == same[1]
 
@@ -279,7 +279,7 @@ class FilePlan:
         segments = tuple(segment for _, segment in parts)
         options = self.base.options
         suffix = "" if options.format == "none" else f".{options.format}"
-        exports = tuple(batch_format(one)[0] for one in options.exports)
+        exports = tuple(batch_format(export)[0] for export in options.exports)
         source = (str(self.path),)
         output = Output(name, source, float(begin / fps), float(fps), cues, segments, suffix=suffix, exports=exports)
         check_faces(output)
@@ -329,8 +329,10 @@ class FilePlan:
         if sentence is None:
             return segment
         parts = tuple(
-            Part(n_letters(text), one.end - one.begin, _slot(one, fills=segment.fills_slot), one.margin_begin)
-            for one, text in zip(sentence.windows, sentence.texts, strict=True)
+            Part(
+                n_letters(text), window.end - window.begin, _slot(window, fills=segment.fills_slot), window.margin_begin
+            )
+            for window, text in zip(sentence.windows, sentence.texts, strict=True)
         )
         return replace(segment, parts=parts, part=sentence.windows.index(window))
 

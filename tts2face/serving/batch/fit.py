@@ -122,17 +122,21 @@ def fit_speech(text: str, limits: Limits, measure: Measure) -> Fit:
     search = _Search(text, limits, measure)
     keeps_to_cue = limits.policy == REPORT
     search.faster(
-        max(limits.rate, limits.max_rate), [one.window_s if keeps_to_cue else one.easy_s for one in limits.rooms]
+        max(limits.rate, limits.max_rate), [room.window_s if keeps_to_cue else room.easy_s for room in limits.rooms]
     )
-    if limits.policy == CUT_PAUSES and search.exceeds([one.easy_s for one in limits.rooms]) and search.shorten_pauses():
-        search.faster(max(limits.rate, limits.max_rate), [one.easy_s for one in limits.rooms])
+    if (
+        limits.policy == CUT_PAUSES
+        and search.exceeds([room.easy_s for room in limits.rooms])
+        and search.shorten_pauses()
+    ):
+        search.faster(max(limits.rate, limits.max_rate), [room.easy_s for room in limits.rooms])
     if not keeps_to_cue:  # beyond the limit each part has a rate of its own: one that is too long does not hurry all
         own = limits.rooms[limits.part]
         ends = [float("inf")] * len(limits.rooms)
         ends[limits.part] = own.next_s if own.is_shared else own.last_s
         search.faster(RATE_LIMITS[1], ends)
     if search.rate == limits.rate and limits.min_rate < limits.rate:
-        search.slower(limits.min_rate, [one.window_s for one in limits.rooms])
+        search.slower(limits.min_rate, [room.window_s for room in limits.rooms])
     return search.result()
 
 

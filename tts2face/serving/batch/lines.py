@@ -109,7 +109,7 @@ def read_lines(path: Path, names: Sequence[str]) -> Lines:
         if key in found:
             raise DataError(f"{path}, line {number}: cue {key[1]} has a row already; remove one of them")
         found[key] = _settings(row, (path, number))
-    return Lines(str(path), {key: one for key, one in found.items() if one != NO_SETTINGS})
+    return Lines(str(path), {key: settings for key, settings in found.items() if settings != NO_SETTINGS})
 
 
 def _check_columns(path: Path, columns: Sequence[str]) -> None:
@@ -159,13 +159,7 @@ def _shown(place: Place) -> str:
 
 
 def write_lines(path: Path, rows: Iterable[Mapping[str, Any]]) -> None:
-    """Write a table of lines, whose rows have `COLUMNS`; the file appears when it is complete.
-
-    Raises
-    ------
-    BackendError
-        It cannot be written.
-    """
+    """Write a table of lines, whose rows have `COLUMNS`; the file appears when it is complete."""
     table = StringIO(newline="")
     writer = csv.DictWriter(table, COLUMNS, restval="")
     writer.writeheader()

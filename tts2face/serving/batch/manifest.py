@@ -32,17 +32,11 @@ def read_manifest(folder: Path) -> dict[str, dict[str, Any]]:
     entries = content.get("outputs") if isinstance(content, dict) else None
     if not isinstance(entries, list):
         return {}
-    return {str(one["file"]): one for one in entries if isinstance(one, dict) and "file" in one}
+    return {str(entry["file"]): entry for entry in entries if isinstance(entry, dict) and "file" in entry}
 
 
 def read_segments(folder: Path) -> set[str]:
-    """Addresses of all segments that the batch of a manifest uses.
-
-    Raises
-    ------
-    DataError
-        The manifest is damaged, or of a version that does not list them.
-    """
+    """Addresses of all segments that the batch of a manifest uses."""
     path = folder / JSON_NAME
     try:
         content = parse_json(path.read_text(encoding="utf-8"), str(path))
@@ -59,7 +53,9 @@ def is_current(entry: Mapping[str, Any] | None, output: Output, folder: Path) ->
     if entry is None or entry.get("address") != output.address or entry.get("status") != "done":
         return False
     files = {output.name: entry.get("bytes")} if output.suffix else {}
-    files |= {str(one.get("file")): one.get("bytes") for one in entry.get("exports", ()) if isinstance(one, dict)}
+    files |= {
+        str(export.get("file")): export.get("bytes") for export in entry.get("exports", ()) if isinstance(export, dict)
+    }
     if not set(output.names) <= set(files):
         return False
     return all((folder / name).is_file() and (folder / name).stat().st_size == size for name, size in files.items())
@@ -112,7 +108,9 @@ def write_manifest(folder: Path, plan: Plan, entries: Mapping[str, Mapping[str, 
         "outputs": ordered,
         "n_cues": plan.n_cues,
         "n_silent_cues": plan.n_silent,
-        "warnings": [{"file": one.file, "line": one.line, "message": one.message} for one in plan.warnings],
+        "warnings": [
+            {"file": warning.file, "line": warning.line, "message": warning.message} for warning in plan.warnings
+        ],
         "segments": sorted(plan.segments),
     }
     write_atomically(folder / JSON_NAME, json.dumps(content, ensure_ascii=False, indent=1).encode())

@@ -93,7 +93,7 @@ class Output:
         if self.exports:
             content["exports"] = list(self.exports)
         if any(self.sounds):
-            content["sounds"] = [(one.hash, one.offset) if one else None for one in self.sounds]
+            content["sounds"] = [(sound.hash, sound.offset) if sound else None for sound in self.sounds]
         return content_address(content)
 
 
@@ -171,8 +171,8 @@ def join_outputs(name: str, outputs: Sequence[Output]) -> Output:
             )
         segments += output.segments
         sounds += [
-            replace(one, offset=one.offset - offset_frames) if one else None
-            for one in output.sounds or [None] * len(output.segments)
+            replace(sound, offset=sound.offset - offset_frames) if sound else None
+            for sound in output.sounds or [None] * len(output.segments)
         ]
         offset_frames += sum(segment.slot_frames or segment.window_frames for segment in output.segments)
     source = tuple(path for output in outputs for path in output.source)
@@ -188,13 +188,7 @@ def join_outputs(name: str, outputs: Sequence[Output]) -> Output:
 
 
 def output_names(files: Sequence[Path]) -> list[str]:
-    """Names of outputs: the stems of subtitle files, with their folders or suffixes where stems are equal.
-
-    Raises
-    ------
-    InputError
-        A file is given twice.
-    """
+    """Names of outputs: the stems of subtitle files, with their folders or suffixes where stems are equal."""
     if len({path.resolve() for path in files}) < len(files):
         raise InputError("a subtitle file is given twice; remove one of them")
     for name_of in (

@@ -59,18 +59,18 @@ def plan_batch(  # noqa: PLR0913 - one parameter a kind of settings
         Lines() if lines is None else read_lines(lines, names),
     )
     planned = [FilePlan(base, path, name) for path, name in zip(files, names, strict=True)]
-    outputs = [output for one in planned for output in one.outputs()]
+    outputs = [output for plan in planned for output in plan.outputs()]
     if options.per == "film" and outputs:
         outputs = [join_outputs("film", outputs)]
         check_faces(outputs[0])
-    found = tuple(line for one in planned for line in one.lines())
+    found = tuple(line for plan in planned for line in plan.lines())
     base.lines.check((line.file, line.number, line.part) for line in found)
-    warnings = [warning for one in planned for warning in one.warnings]
-    used = {role for one in planned for role in one.speakers.used}
+    warnings = [warning for plan in planned for warning in plan.warnings]
+    used = {role for plan in planned for role in plan.speakers.used}
     warnings += [
         PlanWarning("the cast", 0, text) for text in (*base.cast.unused(used), *_without_role(base.cast, found))
     ]
-    n_cues, n_silent = sum(one.n_cues for one in planned), sum(one.n_silent for one in planned)
+    n_cues, n_silent = sum(plan.n_cues for plan in planned), sum(plan.n_silent for plan in planned)
     return Plan(tuple(outputs), tuple(warnings), n_cues, n_silent, found)
 
 
@@ -83,6 +83,6 @@ def _without_role(cast: Cast, lines: Sequence[PlannedLine]) -> list[str]:
             counts[name] = counts.get(name, 0) + 1
     if not counts:
         return []
-    shown = [f"{name} ({n} line{'s' * (n > 1)})" for name, n in sorted(counts.items(), key=lambda one: -one[1])]
+    shown = [f"{name} ({n} line{'s' * (n > 1)})" for name, n in sorted(counts.items(), key=lambda count: -count[1])]
     more = f" and {len(shown) - MAX_NAMED} more" if len(shown) > MAX_NAMED else ""
     return [f"no role applies to {', '.join(shown[:MAX_NAMED])}{more}; they have the default face and voice"]

@@ -62,12 +62,12 @@ def prune_unused(store: Store, kept: Collection[str], older_than_s: float, *, dr
     """Remove segments and unfinished files stored some seconds ago or earlier, except those that are kept."""
     before = time.time() - older_than_s
     found = list(store.entries())
-    removed = [one for one in found if one.name not in kept and one.stored_s <= before]
+    removed = [stored for stored in found if stored.name not in kept and stored.stored_s <= before]
     abandoned = _unfinished_files(store, before)
-    n_bytes = sum(one.n_bytes for one in removed) + sum(size for _, size in abandoned)
+    n_bytes = sum(stored.n_bytes for stored in removed) + sum(size for _, size in abandoned)
     if not dry_run:
-        for one in removed:
-            store.remove(one.name)
+        for stored in removed:
+            store.remove(stored.name)
         for path, _ in abandoned:
             path.unlink(missing_ok=True)
     return Pruned(len(removed) + len(abandoned), n_bytes, len(found) - len(removed))

@@ -53,11 +53,6 @@ def fit_recording(session: Session, request: Request, segment: Segment) -> tuple
 
     An excerpt of a dubbing track may contain other words than the subtitles, or none: then lips follow the sound, or
     rest.
-
-    Raises
-    ------
-    InputError, DataError, BackendError
-        As `Session.stream`; of an excerpt only where the recording cannot be read.
     """
     try:
         pieces = list(session.stream(request))
@@ -69,7 +64,7 @@ def fit_recording(session: Session, request: Request, segment: Segment) -> tuple
         seconds = segment.window_frames / float(exact_rate(request.fps))
         idle = replace(request, source=Idle(max(seconds, IDLE_LIMITS_S[0])))
         return idle, 0.0, [f"the recording has no speech here ({_reason(wrong)})"]
-    found = [f"{' '.join(one.words)!r}" for piece in pieces for one in piece.mismatches]
+    found = [f"{' '.join(mismatch.words)!r}" for piece in pieces for mismatch in piece.mismatches]
     if found and segment.audio_begin is not None:
         return _without_words(session, request, segment)
     warnings = [f"the recording probably does not contain {', '.join(found)}"] if found else []

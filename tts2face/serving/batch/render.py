@@ -97,7 +97,7 @@ def _add_overlap(
         writer.add_sound(sound.samples)
         return
     n_frames, shown = frame_count(sound.duration, last.fps), (last.motion, last.head)
-    motion, head = (replace(one, values=np.repeat(one.values[-1:], n_frames, axis=0)) for one in shown)
+    motion, head = (replace(track, values=np.repeat(track.values[-1:], n_frames, axis=0)) for track in shown)
     writer.add(Clip(motion, head, Speech.without_phones(sound)))
 
 
@@ -266,7 +266,7 @@ class SegmentSpeech:
         """The request of a part, of which only the first words may be kept."""
         if words is None and not self._segment.parts:
             return prepare(replace(self._request, source=spoken))
-        part, first = self._parts[at], sum(one.n_letters for one in self._parts[:at])
+        part, first = self._parts[at], sum(part.n_letters for part in self._parts[:at])
         if self._segment.parts:
             spoken = replace(spoken, lead=part.lead_frames / self.fps)
         last = first + (part.n_letters if words is None else sum(map(n_letters, words)))

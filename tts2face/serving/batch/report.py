@@ -46,7 +46,7 @@ def planned_speakers(plan: Plan) -> tuple[PlannedSpeaker, ...]:
         PlannedSpeaker(name, sum(spoken), role, face, voice, len(spoken) - sum(spoken))
         for (name, role, face, voice), spoken in found.items()
     ]
-    return tuple(sorted(speakers, key=lambda one: -one.n_lines))
+    return tuple(sorted(speakers, key=lambda speaker: -speaker.n_lines))
 
 
 def shown_face(models: Models) -> str:
@@ -71,7 +71,7 @@ def measure_plan(
 
     renderer, found = SegmentRenderer(), dict[str, SegmentResult]()
     segments = {line.segment.address: line.segment for line in plan.lines if line.segment is not None}
-    for done, segment in enumerate(sorted(segments.values(), key=lambda one: repr(one.models)), start=1):
+    for done, segment in enumerate(sorted(segments.values(), key=lambda segment: repr(segment.models)), start=1):
         result = _fit_of(segment, store, renderer)
         if result is not None:
             found[segment.address] = result

@@ -100,7 +100,7 @@ def run_batch(
     check_outputs(plan, folder)
     run = _Run(plan, folder, store or open_store(folder / SEGMENT_FOLDER), read_manifest(folder))
     write_manifest(folder, plan, run.entries)  # its list of segments keeps them from being pruned
-    stale = [one for one in plan.outputs if not is_current(run.entries.get(one.name), one, folder)]
+    stale = [output for output in plan.outputs if not is_current(run.entries.get(output.name), output, folder)]
     needed = {segment.address: segment for output in stale for segment in output.needed}
     for output in stale:
         run.waiting[output.name] = {segment.address for segment in output.needed}
@@ -121,9 +121,9 @@ def run_batch(
     finally:  # also of an interrupted batch
         write_manifest(folder, plan, run.entries)
     failed = tuple(
-        (one.name, str(run.entries[one.name].get("reason", "")))
-        for one in stale
-        if run.entries.get(one.name, {}).get("status") == "failed"
+        (output.name, str(run.entries[output.name].get("reason", "")))
+        for output in stale
+        if run.entries.get(output.name, {}).get("status") == "failed"
     )
     return BatchResult(
         run.n_made,
@@ -149,13 +149,7 @@ def _prepare_folder(folder: Path) -> None:
 def _find_missing(
     run: _Run, needed: Mapping[str, Segment], on_output: Callable[[dict[str, Any]], None] | None
 ) -> dict[str, Segment]:
-    """Segments that are to be rendered; those that are stored are noted.
-
-    Raises
-    ------
-    BackendError
-        The store cannot be used.
-    """
+    """Segments that are to be rendered; those that are stored are noted."""
     missing = {}
     with ThreadPoolExecutor(N_LOOKS) as pool:
         for (address, segment), found in zip(needed.items(), pool.map(run.store.result, needed), strict=True):
@@ -169,16 +163,13 @@ def _find_missing(
 
 
 def check_outputs(plan: Plan, folder: Path) -> None:
-    """Refuse outputs that would replace subtitles or recordings.
-
-    Raises
-    ------
-    InputError
-        An output is an input.
-    """
+    """Refuse outputs that would replace subtitles or recordings."""
     sources = {path for output in plan.outputs for path in output.source}
     sources |= {
-        str(one.request["audio"]) for output in plan.outputs for one in output.segments if "audio" in one.request
+        str(segment.request["audio"])
+        for output in plan.outputs
+        for segment in output.segments
+        if "audio" in segment.request
     }
     inputs = {Path(path).resolve() for path in sources}
     for name in [name for output in plan.outputs for name in output.names] + [JSON_NAME, CSV_NAME]:
@@ -209,20 +200,20 @@ def _finish_segment(
 
 def _finish_output(run: _Run, output: Output) -> None:
     """Join the segments of an output, or note why it failed."""
-    reasons = [run.reasons[one.address] for one in output.needed if one.address in run.reasons]
+    reasons = [run.reasons[segment.address] for segment in output.needed if segment.address in run.reasons]
     if reasons:
         run.entries[output.name] = failed_entry(output, reasons[0])
         return
-    results = [run.results[one.address] for one in (output.segments if output.suffix else output.tracks)]
+    results = [run.results[segment.address] for segment in (output.segments if output.suffix else output.tracks)]
     try:
         with TemporaryDirectory(prefix="tts2face-") as copies:
-            parts = {one.address: run.store.fetch(one.address, Path(copies)) for one in output.needed}
+            parts = {segment.address: run.store.fetch(segment.address, Path(copies)) for segment in output.needed}
             written = []
             if output.exports:
-                written = run.exporter.write(output, [parts[one.address] for one in output.tracks], run.folder)
+                written = run.exporter.write(output, [parts[segment.address] for segment in output.tracks], run.folder)
             if output.suffix:
                 path = run.folder / output.name
-                join_segments([parts[one.address] for one in output.segments], path, output.fps, output.sounds)
+                join_segments([parts[segment.address] for segment in output.segments], path, output.fps, output.sounds)
         entry = done_entry(output, run.folder, results, written)
     except Tts2faceError as wrong:
         run.entries[output.name] = failed_entry(output, str(wrong))

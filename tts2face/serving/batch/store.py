@@ -95,19 +95,19 @@ class Store:
 
     def addresses(self) -> Iterator[str]:
         """Addresses of all stored segments."""
-        for one in self.files.entries():
-            address = Path(one.name).stem
-            if one.name == _result(address):
+        for entry in self.files.entries():
+            address = Path(entry.name).stem
+            if entry.name == _result(address):
                 yield address
 
     def entries(self) -> Iterator[Stored]:
         """All stored segments by address; each with the bytes of its files together, and the time of the latest."""
         found: dict[str, Stored] = {}
-        for one in self.files.entries():
-            address = Path(one.name).stem
-            if one.name in (_movie(address), _result(address)):
+        for entry in self.files.entries():
+            address = Path(entry.name).stem
+            if entry.name in (_movie(address), _result(address)):
                 other = found.get(address, Stored(address, 0, 0.0))
-                found[address] = Stored(address, other.n_bytes + one.n_bytes, max(other.stored_s, one.stored_s))
+                found[address] = Stored(address, other.n_bytes + entry.n_bytes, max(other.stored_s, entry.stored_s))
         yield from found.values()
 
     def remove(self, address: str) -> None:

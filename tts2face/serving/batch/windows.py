@@ -119,7 +119,8 @@ def _with_slots(windows: Sequence[Window], fps: Fraction, rate_of: Callable[[Cue
 def _n_spoken(text: str) -> int:
     """Characters of English by which the time of a text is estimated: figures and East Asian ones take that of many."""
     return sum(
-        FIGURE_CHARACTERS if one.isdigit() else WIDE_CHARACTERS if east_asian_width(one) in "WF" else 1 for one in text
+        FIGURE_CHARACTERS if character.isdigit() else WIDE_CHARACTERS if east_asian_width(character) in "WF" else 1
+        for character in text
     )
 
 

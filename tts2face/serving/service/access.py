@@ -15,11 +15,6 @@ class KeyRing:
     """Who may use a service: everybody who reaches it if no file of keys is named, otherwise whom the file names now.
 
     A named file never opens the service, however few keys it holds and whatever is wrong with it.
-
-    Raises
-    ------
-    InputError, DataError
-        As `read_keys`.
     """
 
     def __init__(self, path: Path | None) -> None:
@@ -50,7 +45,7 @@ class KeyRing:
         """A key that was found earlier, as it is now; raises as `find` if it has been removed."""
         if self.is_open:
             return key
-        found = next((one for one in self._keys if one.hash == key.hash), None)
+        found = next((held for held in self._keys if held.hash == key.hash), None)
         if found is None and not self._keys:
             raise _unauthorized("the service has no API keys now, so that nobody is served; ask its operator")
         if found is None:
@@ -71,17 +66,12 @@ class KeyRing:
 
     def named(self, name: str) -> ApiKey | None:
         """The key of a name."""
-        return next((one for one in ((LOCAL_KEY,) if self.is_open else self._keys) if one.name == name), None)
+        return next((key for key in ((LOCAL_KEY,) if self.is_open else self._keys) if key.name == name), None)
 
     async def reload(self) -> tuple[str, ...]:
         """Read the file again, in a thread, as its disk may be slow; names of its keys.
 
         The keys stay as they are until it has been read.
-
-        Raises
-        ------
-        InputError, DataError
-            As `read_keys`; then nobody is served.
         """
         async with self._reading:
             found: tuple[ApiKey, ...] = ()
@@ -102,13 +92,7 @@ def _unauthorized(message: str) -> RefusedError:
 
 
 def require_scope(request: HttpRequest, scope: str, what: str) -> ApiKey:
-    """Key of a request, which must have a scope; `what` names in the plural what needs it.
-
-    Raises
-    ------
-    RefusedError
-        The key does not have the scope.
-    """
+    """Key of a request, which must have a scope; `what` names in the plural what needs it."""
     key: ApiKey = request.state.key
     if scope not in key.scopes:
         raise RefusedError(403, "forbidden", f"{what} need a key with the scope {scope}; this one has none such")

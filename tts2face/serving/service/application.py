@@ -89,7 +89,7 @@ def create_app(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> FastA
     app.add_exception_handler(HTTPException, _answer_http)
     for mount in mounts:
         mount.add(app, state)
-    state.metrics.begin_paths({one.path for one in _routes(app.routes)})
+    state.metrics.begin_paths({route.path for route in _routes(app.routes)})
     app.add_middleware(Guard, state=state)
     return app
 
@@ -127,14 +127,14 @@ def _methods(request: HttpRequest) -> set[str]:
 
     Starlette names those of one route only.
     """
-    routes = [one for one in _routes(request.app.routes) if one.matches(request.scope)[0] != Match.NONE]
-    form = min((one.path for one in routes), key=lambda path: path.count("{"), default="")
-    found = {method for one in routes if one.path == form for method in getattr(one, "methods", None) or ()}
+    routes = [route for route in _routes(request.app.routes) if route.matches(request.scope)[0] != Match.NONE]
+    form = min((route.path for route in routes), key=lambda path: path.count("{"), default="")
+    found = {method for route in routes if route.path == form for method in getattr(route, "methods", None) or ()}
     return found | {"HEAD"} if "GET" in found else found
 
 
 def _routes(routes: Iterable[Any]) -> Iterator[Any]:
     """All routes, those of included routers among them, which FastAPI keeps as one."""
-    for one in routes:
-        router = getattr(one, "original_router", None)
-        yield from (one,) if router is None else _routes(router.routes)
+    for route in routes:
+        router = getattr(route, "original_router", None)
+        yield from (route,) if router is None else _routes(router.routes)

@@ -63,13 +63,7 @@ class Adjustments:
             self.made.append(f"the language is {language}")
 
     async def note_words(self, state: ServiceState, text: str, language: str) -> None:
-        """Note what is done with words of other writing systems.
-
-        Raises
-        ------
-        RefusedError, InputError
-            The text is too long, or has a mark that cannot be read.
-        """
+        """Note what is done with words of other writing systems."""
         state.check_length(text)
         self.made += await asyncio.to_thread(reading_notes, text, language_code(language))
 
@@ -109,7 +103,7 @@ def voice_kind(name: str) -> _Kind | None:
     (_Kind(language='en-gb', sex='female'), 'male', None)
     """
     heaviest: tuple[float, _Kind] | None = None
-    for part in (_WEIGHTED.fullmatch(one.strip()) for one in re.split(r"[+-]", name[:400])):
+    for part in (_WEIGHTED.fullmatch(named.strip()) for named in re.split(r"[+-]", name[:400])):
         kind = None if part is None else _single_kind(part["name"])
         if part is None or kind is None:
             return None
@@ -127,13 +121,7 @@ def _single_kind(name: str) -> _Kind | None:
 
 
 def combined_name(voices: str | list[str]) -> str:
-    """Name of a combination of voices of OpenAI and Kokoro, which stands for the one of most weight.
-
-    Raises
-    ------
-    InputError
-        There is no voice, or it is one of the service, which is not combined.
-    """
+    """Name of a combination of voices of OpenAI and Kokoro, which stands for the one of most weight."""
     parts = voices.split("+") if isinstance(voices, str) else voices
     names = [name for part in parts[:MAX_COMBINED] if (name := "".join(part.split()))]
     if not names:
@@ -146,8 +134,8 @@ def combined_name(voices: str | list[str]) -> str:
 
 def nearest_voice(kind: _Kind, language: str) -> str:
     """The installed voice that speaks a language, of the sex if there is one; neural ones come first."""
-    spoken = [one for one in catalogue.voices() if one.is_installed and language in one.languages]
-    return min(spoken, key=lambda one: one.sex != kind.sex).name if spoken else "espeak"
+    spoken = [voice for voice in catalogue.voices() if voice.is_installed and language in voice.languages]
+    return min(spoken, key=lambda voice: voice.sex != kind.sex).name if spoken else "espeak"
 
 
 def choose_voice(name: str, language: str | None, text: str, adjustments: Adjustments) -> tuple[str, str]:
@@ -170,7 +158,7 @@ def choose_voice(name: str, language: str | None, text: str, adjustments: Adjust
     kind = voice_kind(name)
     if kind is None:
         check_voice(name)
-        spoken = next(one.languages for one in catalogue.voices() if one.name == name)
+        spoken = next(voice.languages for voice in catalogue.voices() if voice.name == name)
         if language is None:
             guessed = guess_language(text)
             language = guessed if guessed in spoken else DEFAULT_LANGUAGE

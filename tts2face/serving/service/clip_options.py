@@ -48,13 +48,7 @@ class OptionValues:
 
 
 async def divide_options(state: ServiceState, key: ApiKey, given: dict[str, Any]) -> OptionValues:
-    """Divide options that differ from their defaults; names of uploads become paths.
-
-    Raises
-    ------
-    RefusedError
-        A model, voice or background does not exist for the key.
-    """
+    """Divide options that differ from their defaults; names of uploads become paths."""
     models = {name: value for name, value in given.items() if name in MODEL_FIELDS}
     picture = {name: value for name, value in given.items() if name in PICTURE_FIELDS}
     request = {name: value for name, value in given.items() if name not in {*models, *picture}}

@@ -62,7 +62,7 @@ class KeyTurns:
         ClientDisconnect
             The client of the present request has left.
         """
-        n_waiting = sum(not one.cancelled() for one in self._waiting.get(key, ()))
+        n_waiting = sum(not turn.cancelled() for turn in self._waiting.get(key, ()))
         if n_waiting >= self._shares.waiting:
             message = f"{n_waiting} files of the key {key} wait to be decoded; send it again later"
             raise RefusedError(429, "busy", message, {"Retry-After": str(RETRY_S)})
@@ -171,13 +171,7 @@ class Decoders:
 
     @contextmanager
     def receiving(self, key: str) -> Iterator[None]:
-        """Receive the recording of a talker; who sends slowly holds a place of the own key only.
-
-        Raises
-        ------
-        RefusedError
-            The key sends as many already as it may.
-        """
+        """Receive the recording of a talker; who sends slowly holds a place of the own key only."""
         if self._bodies[key] >= BODIES_OF_KEY:
             message = f"the key {key} sends {BODIES_OF_KEY} recordings already; send this one when one has arrived"
             raise RefusedError(429, "busy", message, {"Retry-After": str(RETRY_S)})

@@ -156,13 +156,7 @@ class Exchange:
 
     @contextmanager
     def watched(self) -> Iterator[None]:
-        """End what the block waits for as soon as the client leaves.
-
-        Raises
-        ------
-        ClientDisconnect
-            It has left.
-        """
+        """End what the block waits for as soon as the client leaves."""
         if self.has_left:
             raise ClientDisconnect
         task = asyncio.current_task()
@@ -265,13 +259,7 @@ CLIENT: ContextVar[Exchange | None] = ContextVar("client", default=None)  # for 
 
 
 def while_client_stays() -> AbstractContextManager[None]:
-    """Block whose waiting ends as soon as the client of the present request, if there is one, leaves.
-
-    Raises
-    ------
-    ClientDisconnect
-        It has left.
-    """
+    """Block whose waiting ends as soon as the client of the present request, if there is one, leaves."""
     client = CLIENT.get()
     return nullcontext() if client is None else client.watched()
 

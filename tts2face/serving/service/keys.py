@@ -135,7 +135,7 @@ def add_key(path: Path, name: str, scopes: Sequence[str], **limits: Any) -> str:
     keys = read_keys(path) if path.exists() else ()
     secret = KEY_PREFIX + secrets.token_urlsafe(N_KEY_BYTES)
     key = ApiKey(name, hashlib.sha256(secret.encode()).hexdigest(), tuple(scopes), **limits)
-    if any(one.name == name for one in keys):
+    if any(key.name == name for key in keys):
         raise InputError(f"{path} has a key named {name} already; choose another name, or remove it first")
     write_keys(path, (*keys, key))
     return secret

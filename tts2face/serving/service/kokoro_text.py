@@ -31,11 +31,6 @@ def kokoro_ipa(written: str) -> str:
 def with_marks(text: str) -> str:
     """A text with the marks of this service in place of Kokoro-FastAPI's; SSML as it is.
 
-    Raises
-    ------
-    InputError
-        A pause is no number of seconds, a word has no phones or a wrong one, or phones have no word.
-
     Examples
     --------
     >>> with_marks("A [pause:1.0s] [tomato](/təmˈɑːtO/), see [this](/a page).")
@@ -69,11 +64,6 @@ def _given(match: "re.Match[str]") -> str:
 
 def phones_text(phones: str) -> str:
     """A text of words with given phones, divided by spaces, with the punctuation around them.
-
-    Raises
-    ------
-    InputError
-        There is none, or a letter is no phone.
 
     Examples
     --------

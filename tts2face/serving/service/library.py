@@ -44,13 +44,7 @@ def shipped_names(kind: str) -> tuple[str, ...]:
 
 
 def check_new_name(kind: str, name: str) -> None:
-    """Refuse a name for an upload that has the wrong form, or is taken by a shipped model.
-
-    Raises
-    ------
-    RefusedError
-        With the reason.
-    """
+    """Refuse a name for an upload that has the wrong form, or is taken by a shipped model."""
     if NAME.fullmatch(name) is None:
         raise RefusedError(
             422, "invalid_name",
@@ -68,7 +62,7 @@ def describe_shipped(kind: str, name: str) -> dict[str, Any]:
         return asdict(catalogue.describe_talker(path))
     if kind == FACE:
         return asdict(catalogue.describe_face(path))
-    return {"styles": [{"name": one.name, "summary": one.summary} for one in catalogue.styles(name)]}
+    return {"styles": [{"name": style.name, "summary": style.summary} for style in catalogue.styles(name)]}
 
 
 class Library:
@@ -144,13 +138,7 @@ class Library:
         return self._fetch(resource.picture)
 
     def check_room(self, key: ApiKey, kind: str, name: str, n_bytes: int) -> None:
-        """Refuse an upload that has no place, before it is read.
-
-        Raises
-        ------
-        RefusedError
-            The name is wrong or taken, or the key's quota is used up.
-        """
+        """Refuse an upload that has no place, before it is read."""
         check_new_name(kind, name)
         if self._table.find(key.name, kind, name) is not None:
             raise self._name_taken(kind, name)
@@ -165,7 +153,7 @@ class Library:
             As `check_room`.
         """
         check_new_name(kind, name)
-        size = sum((checked / one).stat().st_size for one in (CONTENT, PICTURE) if (checked / one).is_file())
+        size = sum((checked / name).stat().st_size for name in (CONTENT, PICTURE) if (checked / name).is_file())
         self._check_quota(key, self._table.usage(key.name), size)
         made = resource_from_folder(key.name, kind, name, checked, self._blobs)
         is_added = self._table.add(

@@ -30,13 +30,7 @@ Count = Callable[[], None]  # counts a sentence as a request of its key, or rais
 
 
 def parse_message(text: str) -> Any:
-    """Content of a message of a WebSocket; None where it is no JSON.
-
-    Raises
-    ------
-    RefusedError
-        It is longer than `MAX_MESSAGE_CHARACTERS`.
-    """
+    """Content of a message of a WebSocket; None where it is no JSON."""
     if len(text) > MAX_MESSAGE_CHARACTERS:
         raise RefusedError(
             413, "too_large", f"a message has {len(text)} characters; send at most {MAX_MESSAGE_CHARACTERS}, in parts"
@@ -97,13 +91,7 @@ class LiveText:
         self._has_room.set()
 
     async def receive(self, content: Mapping[str, Any], samples: bytes = b"") -> None:
-        """Follow a message of the client, as soon as there is room for its text or its sound.
-
-        Raises
-        ------
-        RefusedError
-            It has too much text, or sentences that the key may not have spoken now; the rest of it is dropped.
-        """
+        """Follow a message of the client, as soon as there is room for its text or its sound."""
         try:
             if samples:
                 await self._hear(samples)

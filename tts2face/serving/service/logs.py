@@ -66,7 +66,9 @@ class LineFormatter(logging.Formatter):
         return {"event": "library", "logger": record.name, "message": message if self._with_text else lines[0][:300]}
 
     def _error(self, error: BaseException) -> dict[str, Any]:
-        frames = [f"{one.filename}:{one.lineno} {one.name}" for one in traceback.extract_tb(error.__traceback__)]
+        frames = [
+            f"{frame.filename}:{frame.lineno} {frame.name}" for frame in traceback.extract_tb(error.__traceback__)
+        ]
         found: dict[str, Any] = {"error": type(error).__name__, "traceback": frames}
         if self._with_text:
             found["error_message"] = str(error)

@@ -9,13 +9,7 @@ _LONG_WORD = re.compile(rf"[!-~]{{{MAX_WORD_CHARACTERS + 1}}}|\d{{{MAX_WORD_CHAR
 
 
 def check_words(text: str) -> None:
-    """Refuse words and numbers of more than `MAX_WORD_CHARACTERS`; scripts without spaces are not concerned.
-
-    Raises
-    ------
-    InputError
-        There is such a word.
-    """
+    """Refuse words and numbers of more than `MAX_WORD_CHARACTERS`; scripts without spaces are not concerned."""
     if (found := _LONG_WORD.search(text)) is not None:
         raise InputError(
             f"the text has a word of more than {MAX_WORD_CHARACTERS} characters, {found[0][:20]}...; put spaces into it"

@@ -87,8 +87,8 @@ class Metrics:
     def _begin(self) -> None:
         for _, code in STATUS.values():
             self.failures.labels(code)
-        for one in QUALITIES:
-            self.quality.labels(*quality_labels(one.has_all_samples, one.frame_step))
+        for quality in QUALITIES:
+            self.quality.labels(*quality_labels(quality.has_all_samples, quality.frame_step))
         for check in CHECKS:
             self._by_check.labels(check)
         self.begin_paths([OTHER])

@@ -47,7 +47,7 @@ def _check_hair(models: Mapping[str, Any]) -> None:
     haircut, colour = models.get("hair"), models.get("hair_color")
     if haircut is not None:
         face = str(models.get("face") or default_face(models.get("identity"), haircut))
-        known = [one.name for one in catalogue.haircuts_of(face)]
+        known = [haircut.name for haircut in catalogue.haircuts_of(face)]
         if haircut not in known:
             raise RefusedError(
                 400, "invalid_request", f"there is no haircut {haircut[:60]!r}; the haircuts are {', '.join(known)}"
@@ -67,7 +67,7 @@ async def resolve_dictionary(library: Library, key: ApiKey, fields: Mapping[str,
 def check_voice(voice: str | None) -> None:
     """Refuse voices that are not known by name."""
     if voice is not None:
-        known = tuple(one.name for one in catalogue.voices() if one.languages)
+        known = tuple(voice.name for voice in catalogue.voices() if voice.languages)
         if voice not in known:
             raise RefusedError(
                 400, "invalid_request", f"there is no voice {voice[:60]!r}; the voices are {', '.join(known)}"

@@ -25,11 +25,6 @@ def check_origin(headers: Mapping[bytes, bytes], origins: Sequence[str]) -> None
 
     A request without ``Origin`` comes from no page, unless a browser says that another site has caused it, as by a
     picture or a script of that site; only what opens a page of the service in place of the other one may come so.
-
-    Raises
-    ------
-    RefusedError
-        It is another page.
     """
     origin = _value(headers, b"origin")
     if b"origin" in headers:

@@ -93,7 +93,7 @@ class Pool:
     @property
     def oldest_waiting_s(self) -> float:
         """Age of the work that waits longest."""
-        begins = [one.begin for queue in self._waiting.values() for one in queue]
+        begins = [waiting.begin for queue in self._waiting.values() for waiting in queue]
         return time.monotonic() - min(begins) if begins else 0.0
 
     @property
@@ -191,18 +191,12 @@ class Pool:
             self._forget(key, future)
 
     def _make_room(self, key: str) -> None:
-        """Refuse the newest waiting work of the key that has most, unless that gives this key as many.
-
-        Raises
-        ------
-        BusyError
-            This key has its share of the places.
-        """
-        waits = {name: sum(not one.place.done() for one in queue) for name, queue in self._waiting.items()}
+        """Refuse the newest waiting work of the key that has most, unless that gives this key as many."""
+        waits = {name: sum(not waiting.place.done() for waiting in queue) for name, queue in self._waiting.items()}
         largest = max(waits, key=lambda name: waits[name], default=key)
         if waits.get(largest, 0) <= waits.get(key, 0) + 1:
             raise BusyError(f"{self.n_waiting} requests are waiting already; repeat the request later")
-        newest = next(one.place for one in reversed(self._waiting[largest]) if not one.place.done())
+        newest = next(waiting.place for waiting in reversed(self._waiting[largest]) if not waiting.place.done())
         newest.set_exception(BusyError("other keys need the places to wait; repeat the request later"))
         self._forget(largest, newest)
 
@@ -217,40 +211,48 @@ class Pool:
     def _place(self, cost: float, key: str, affinity: str = "") -> Place | None:
         """A place in a process for a work that begins; None if there is none."""
         has_less = self._has_less(cost, key)
-        free = [one for one in self.processes if one.is_ready and one.places.has_room(cost, has_less=has_less)]
+        free = [
+            process
+            for process in self.processes
+            if process.is_ready and process.places.has_room(cost, has_less=has_less)
+        ]
         usual = self.processes[zlib.crc32(affinity.encode()) % len(self.processes)] if affinity else None
-        process = usual if usual in free else min(free, key=lambda one: one.places.load, default=None)
+        process = usual if usual in free else min(free, key=lambda process: process.places.load, default=None)
         return None if process is None else process.places.take(cost, key, process)
 
     def _has_less(self, cost: float, key: str) -> bool:
         """Whether a key has begun fewer works of a cost than its share of the places."""
-        ready = [one.places for one in self.processes if one.is_ready]
+        ready = [process.places for process in self.processes if process.is_ready]
         return has_less_than_share(ready, cost, key, self._keys_that_wait(cost))
 
     def _keys_that_wait(self, cost: float) -> set[str]:
         waits = self._waiting.items()
-        return {key for key, queue in waits if any(one.cost == cost and not one.place.done() for one in queue)}
+        return {
+            key for key, queue in waits if any(waiting.cost == cost and not waiting.place.done() for waiting in queue)
+        }
 
     def _wake(self) -> None:
         """Give free places to waiting works, one key after the other; those of one cost do not wait for others."""
         if self.n_ready == len(self.processes):
             self.is_prepared.set()
         if self._lack:
-            for future in [one.place for queue in self._waiting.values() for one in queue if not one.place.done()]:
+            for future in [
+                waiting.place for queue in self._waiting.values() for waiting in queue if not waiting.place.done()
+            ]:
                 future.set_exception(BackendError(self._lack))
         for key in list(self._waiting):
-            firsts = {one.cost: one for one in reversed(self._waiting[key]) if not one.place.done()}
-            for cost, one in firsts.items():
+            firsts = {waiting.cost: waiting for waiting in reversed(self._waiting[key]) if not waiting.place.done()}
+            for cost, waiting in firsts.items():
                 if (place := self._place(cost, key)) is not None:
-                    one.place.set_result(place)
+                    waiting.place.set_result(place)
                     self._waiting.move_to_end(key)
-                    self._forget(key, one.place)
+                    self._forget(key, waiting.place)
                     break
 
     def _forget(self, key: str, future: "asyncio.Future[Place]") -> None:
         queue = self._waiting.get(key)
         if queue is not None:
             with suppress(StopIteration):
-                queue.remove(next(one for one in queue if one.place is future))
+                queue.remove(next(waiting for waiting in queue if waiting.place is future))
             if not queue:
                 del self._waiting[key]

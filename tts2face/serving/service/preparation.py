@@ -69,7 +69,7 @@ class Preparation:
         self._done -= {(step.name, process) for step in self._own}
         shared = list(self._shared)
         while shared:
-            step = next((one for one in shared if not self._locks[one.name].locked()), shared[0])
+            step = next((unlocked for unlocked in shared if not self._locks[unlocked.name].locked()), shared[0])
             async with self._locks[step.name]:
                 await self._make(step, call, None)
             shared.remove(step)

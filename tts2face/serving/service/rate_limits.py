@@ -85,13 +85,7 @@ class RateLimits:
         self._running[key.name, REQUESTS] -= 1
 
     def check_speech(self, key: ApiKey) -> None:
-        """Check that a key may make speech.
-
-        Raises
-        ------
-        RefusedError
-            It has made its seconds of the day; with the seconds to wait.
-        """
+        """Check that a key may make speech."""
         if key.speech_s_per_day is not None:
             left = self._bucket(key, SPEECH).refill(self.clock(), key.speech_s_per_day, DAY_S)
             if left <= 0:
@@ -137,7 +131,11 @@ class RateLimits:
 
         What `exchange` could not give, since the database is away, is given the next time; its error is raised.
         """
-        spent = [Spent(name, one.spent, one.most, one.period_s) for name, one in self._buckets.items() if one.spent]
+        spent = [
+            Spent(name, bucket.spent, bucket.most, bucket.period_s)
+            for name, bucket in self._buckets.items()
+            if bucket.spent
+        ]
         for taken in spent:
             self._buckets[taken.name].spent = 0.0
         running, self._running = dict(self._running), +self._running  # what no longer runs is given once, as 0

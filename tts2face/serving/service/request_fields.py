@@ -14,8 +14,8 @@ from tts2face.request import Request, option_fields
 from tts2face.session.named_models import Models
 
 RECORDS = (Request, Models, Picture)
-OPTIONS = {one.name: one for record in RECORDS for one in option_fields(record)}
-MODEL_FIELDS, PICTURE_FIELDS = (frozenset(one.name for one in fields(record)) for record in (Models, Picture))
+OPTIONS = {field.name: field for record in RECORDS for field in option_fields(record)}
+MODEL_FIELDS, PICTURE_FIELDS = (frozenset(field.name for field in fields(record)) for record in (Models, Picture))
 # What differs over HTTP: names of uploads and of lists in place of paths and commands, and limits for everybody's sake.
 DESCRIPTIONS: Mapping[str, str] = MappingProxyType({
     "language": "Language of the text.",
@@ -50,10 +50,10 @@ class StrictModel(BaseModel):
 def options_model(name: str, left_out: Mapping[str, str]) -> type[StrictModel]:
     """Model of all options of clips but those that are left out, each with the reason."""
     taken = {
-        one.name: _definition(one, one.type, None if record is Models else one.default)
+        field.name: _definition(field, field.type, None if record is Models else field.default)
         for record in RECORDS
-        for one in option_fields(record)
-        if one.name not in left_out
+        for field in option_fields(record)
+        if field.name not in left_out
     }
     return create_model(name, __base__=StrictModel, **taken)  # type: ignore[call-overload, no-any-return]
 
@@ -73,7 +73,7 @@ def described(name: str, description: str = "", **more: Any) -> Any:
 
 def _definition(option: "Option[Any]", kind: Any, default: Any) -> tuple[Any, Any]:
     """Type and default of a field; a model that is not named is the default one."""
-    kinds = [str if one is Path else one for one in get_args(kind) or (kind,)]
+    kinds = [str if part is Path else part for part in get_args(kind) or (kind,)]
     choices = option.metadata.get("choices")
     value: Any = Literal[choices] if choices else kinds[0]
     optional = value | None if NoneType in kinds or default is None else value

@@ -57,7 +57,7 @@ class _Task:
     def is_urgent(self) -> bool:
         """Whether something is to be ended by an input that the task has not read yet."""
         with self.call.changed:
-            return any(one.content.get("type") == CANCEL for one in self.call.inputs)
+            return any(message.content.get("type") == CANCEL for message in self.call.inputs)
 
     def order(self) -> tuple[bool, int, bool, float, bool, float]:
         """Place among the tasks that wait for a turn; the least one is first."""
@@ -154,13 +154,7 @@ class Turns:
         return future.result()
 
     def take_again(self, task: _Task) -> None:
-        """Wait for another turn of a task.
-
-        Raises
-        ------
-        StoppedError, InterruptedTaskError
-            The task has been stopped or interrupted.
-        """
+        """Wait for another turn of a task."""
         self._release(task)
         self._take(task)
         if task.is_urgent:
@@ -196,7 +190,7 @@ class Turns:
         return first is task
 
     def _first(self) -> _Task | None:
-        ready = [one for one in self._waiting if one.call.is_stopped or not one.call.is_paused]
+        ready = [task for task in self._waiting if task.call.is_stopped or not task.call.is_paused]
         return min(ready, key=_Task.order, default=None)
 
     def _release(self, task: _Task) -> None:
@@ -238,7 +232,7 @@ class OneAtATime:
         return wait_elsewhere(future, end)
 
     def _run_first(self) -> None:
-        first = min(self._waiting[:], key=lambda one: (one[0] is not None, one[0] and one[0].order()))
+        first = min(self._waiting[:], key=lambda place: (place[0] is not None, place[0] and place[0].order()))
         self._waiting.remove(first)
         task, compute, future = first
         if not future.set_running_or_notify_cancel():
@@ -270,11 +264,6 @@ def wait_elsewhere(future: Future[Result], end: Callable[[], None] = lambda: Non
     ----------
     end
         Ends it early, when it runs and the task is stopped or interrupted; nobody waits for its end.
-
-    Raises
-    ------
-    StoppedError, InterruptedTaskError
-        The task has been stopped or interrupted.
     """
     task: _Task | None = getattr(_CURRENT, "task", None)
     return future.result() if task is None else task.turns.wait_elsewhere(task, future, end)

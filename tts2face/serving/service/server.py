@@ -92,8 +92,8 @@ class DrainingServer(uvicorn.Server):
         if hasattr(signal, "SIGHUP"):
             asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, self._reload_keys)
         for server in self.servers:
-            for one in server.sockets:
-                host, port = one.getsockname()[:2]
+            for opened in server.sockets:
+                host, port = opened.getsockname()[:2]
                 url = f"http://{host}:{port}"
                 log_event("listening", url=url, studio=f"{url}{PAGES}" if self._state.settings.studio else None)
 

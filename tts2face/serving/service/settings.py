@@ -120,12 +120,12 @@ class ServiceSettings:
     def __post_init__(self) -> None:
         """Check types and limits, and that a service that others can reach has keys."""
         check_fields(self)
-        for one in fields(self):
-            if one.metadata["limits"] is not None:
-                check_limits(one.name, getattr(self, one.name), one.metadata["limits"])
-            choices, value = one.metadata["choices"], getattr(self, one.name)
+        for option in fields(self):
+            if option.metadata["limits"] is not None:
+                check_limits(option.name, getattr(self, option.name), option.metadata["limits"])
+            choices, value = option.metadata["choices"], getattr(self, option.name)
             if choices is not None and value not in choices:
-                raise InputError(f"{one.name} must be one of {', '.join(choices)}, not {value!r}")
+                raise InputError(f"{option.name} must be one of {', '.join(choices)}, not {value!r}")
         if self.keys is None and not is_loopback(self.host):
             where = self.host or "all addresses"
             raise InputError(
@@ -178,18 +178,20 @@ class ServiceSettings:
     def as_toml(self) -> str:
         """The settings as a settings file, without secrets; a comment says what each means."""
         lines = []
-        for one in fields(self):
-            if one.metadata["is_secret"]:
+        for option in fields(self):
+            if option.metadata["is_secret"]:
                 continue
-            value = getattr(self, one.name)
-            if one.name == "database":
+            value = getattr(self, option.name)
+            if option.name == "database":
                 value = _PASSWORD.sub(r"\1@", value)
-            line = f"{one.name} = {_toml(value)}" if value is not None else f'# {one.name} = ""'
-            lines.append(f"# {one.metadata['help']}\n{line}\n")
+            line = f"{option.name} = {_toml(value)}" if value is not None else f'# {option.name} = ""'
+            lines.append(f"# {option.metadata['help']}\n{line}\n")
         return "".join(lines)
 
 
-_Written: Any = make_dataclass("_Written", [(one.name, one.type, one.default) for one in fields(ServiceSettings)])
+_Written: Any = make_dataclass(
+    "_Written", [(option.name, option.type, option.default) for option in fields(ServiceSettings)]
+)
 
 
 def _is_secret(text: str) -> bool:
@@ -252,15 +254,15 @@ def _read_file(path: Path) -> dict[str, Any]:
 
 
 def _field(name: str, source: str) -> Any:
-    known = {one.name: one for one in fields(ServiceSettings)}
+    known = {option.name: option for option in fields(ServiceSettings)}
     if name not in known:
         raise InputError(f"the {source} has an unknown setting {name!r}; the settings are {', '.join(known)}")
     return known[name]
 
 
-def _parse(one: Any, text: str, source: str) -> Any:
+def _parse(option: Any, text: str, source: str) -> Any:
     """The text of an environment variable in the type of its setting."""
-    kind = _kind(one)
+    kind = _kind(option)
     if kind is tuple:
         return tuple(item.strip() for item in text.split(",") if item.strip())
     if kind is bool and text.lower() in {"true", "false", "1", "0"}:
@@ -273,10 +275,10 @@ def _parse(one: Any, text: str, source: str) -> Any:
     raise InputError(f"{source} must be {EXPECTED[kind]}, not {format_value(text)}")
 
 
-def _kind(one: Any) -> Any:
-    if one.name in {"keys", "data"}:
+def _kind(option: Any) -> Any:
+    if option.name in {"keys", "data"}:
         return Path
-    return tuple if isinstance(one.default, tuple) else type(one.default)
+    return tuple if isinstance(option.default, tuple) else type(option.default)
 
 
 def _toml(value: Any) -> str:

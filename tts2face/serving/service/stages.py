@@ -36,6 +36,6 @@ def stage(name: str) -> Iterator[None]:
 def durations(stages: Sequence[Stage], now: float) -> dict[str, float]:
     """Seconds of each name; a stage that has not ended counts up to `now`."""
     found: dict[str, float] = {}
-    for one in stages:
-        found[one.name] = found.get(one.name, 0.0) + (now if one.end is None else one.end) - one.begin
+    for spent in stages:
+        found[spent.name] = found.get(spent.name, 0.0) + (now if spent.end is None else spent.end) - spent.begin
     return found

@@ -85,33 +85,23 @@ class ServiceState:
 
     def _end_lost(self) -> int:
         """End what is open for keys that are gone or may do less; how many."""
-        losses = [(one, self.keys.loss_of(one.key)) for one in self.exchanges if one.key is not None]
-        ending = {in_background(one.revoke(loss)) for one, loss in losses if loss is not None}
+        losses = [
+            (exchange, self.keys.loss_of(exchange.key)) for exchange in self.exchanges if exchange.key is not None
+        ]
+        ending = {in_background(exchange.revoke(loss)) for exchange, loss in losses if loss is not None}
         for task in ending:
             task.add_done_callback(self._ending.discard)
         self._ending |= ending
         return len(ending)
 
     def speaking_key(self, key: ApiKey) -> ApiKey:
-        """A key as it is now, if it may have something spoken.
-
-        Raises
-        ------
-        RefusedError
-            It has been removed, lacks the scope speak, or has used its seconds of speech.
-        """
+        """A key as it is now, if it may have something spoken."""
         key = self.key_with(key, "speak")
         self.limits.check_speech(key)
         return key
 
     def key_with(self, key: ApiKey, scope: str) -> ApiKey:
-        """A key as it is now, if it has a scope.
-
-        Raises
-        ------
-        RefusedError
-            It has been removed, or lacks the scope.
-        """
+        """A key as it is now, if it has a scope."""
         key = self.keys.current(key)
         if scope not in key.scopes:
             raise RefusedError(403, "forbidden", f"the key {key.name} lacks the scope {scope}; use another key")

@@ -24,15 +24,7 @@ class Synthesis:
         self._sessions, self._tasks, self._turns = sessions, tasks, Turns()
 
     def synthesise(self, call: Call) -> Mapping[str, float]:
-        """Send the parts of the result of a ``work``; its measures.
-
-        Raises
-        ------
-        Tts2faceError
-            As the task of the work.
-        DefectError
-            The task raised another error.
-        """
+        """Send the parts of the result of a ``work``; its measures."""
         try:
             return self._turns.run(call, lambda: self._steps(call), call.content["priority"], call.content["key"])
         except Tts2faceError:

@@ -18,13 +18,7 @@ CLOSE_TIMEOUT_S = 5.0
 
 
 def is_tracing_requested(environment: Mapping[str, str]) -> bool:
-    """Whether the variables of OpenTelemetry ask for traces.
-
-    Raises
-    ------
-    InputError
-        They ask for another exporter or protocol than OTLP over HTTP.
-    """
+    """Whether the variables of OpenTelemetry ask for traces."""
     exporter = environment.get("OTEL_TRACES_EXPORTER", "").strip().lower()
     if environment.get("OTEL_SDK_DISABLED", "").lower() == "true" or exporter == "none":
         return False
@@ -39,15 +33,7 @@ def is_tracing_requested(environment: Mapping[str, str]) -> bool:
 
 
 def tracing_from_environment(environment: Mapping[str, str]) -> "Tracing | None":
-    """Tracing as the variables of OpenTelemetry say; None if they do not ask for it.
-
-    Raises
-    ------
-    InputError
-        They ask for another exporter or protocol than OTLP over HTTP.
-    BackendError
-        The libraries are not installed.
-    """
+    """Tracing as the variables of OpenTelemetry say; None if they do not ask for it."""
     if not is_tracing_requested(environment):
         return None
     try:
@@ -100,7 +86,7 @@ class Tracing:
         if request.status >= 500 or request.status == 0:
             root.set_status(StatusCode.ERROR)
         now, context = time.monotonic(), set_span_in_context(root)
-        spans = [(one.name, one.begin, now if one.end is None else one.end) for one in request.stages]
+        spans = [(stage.name, stage.begin, now if stage.end is None else stage.end) for stage in request.stages]
         if request.first_byte_s is not None:
             spans.append(("first_byte", request.began, request.began + request.first_byte_s))
         for name, begin, end in spans:

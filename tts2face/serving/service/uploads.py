@@ -87,11 +87,6 @@ class UploadFolder:
         """Folder with a saved file, checked as a talker, face, palette or dictionary (`tts2face.serving.work`).
 
         A photo, beside which is what is `stated` of it, becomes a face.
-
-        Raises
-        ------
-        RefusedError
-            It is none, or larger than `max_bytes`.
         """
         checked = self.path / "checked"
         checked.mkdir()

@@ -90,9 +90,11 @@ def _erase(project: Project, given: Edit, _: Sentences) -> Project:
 def _curve(kind: ElementKind, project: Project, given: Edit, _: Sentences) -> Project:
     """Replace the curve of a lane, or remove it if there are no keys."""
     keys = given["keys"]
-    if not all(isinstance(key, list | tuple) and len(key) == 2 and all(is_number(one) for one in key) for key in keys):
+    if not all(
+        isinstance(key, list | tuple) and len(key) == 2 and all(is_number(number) for number in key) for key in keys
+    ):
         raise InputError("keys must be a list of [seconds, value]")
-    kept = [one for one in getattr(project.timeline, kind.name) if kind.lane(one) != given[kind.owner]]
+    kept = [curve for curve in getattr(project.timeline, kind.name) if kind.lane(curve) != given[kind.owner]]
     made = [kind.record(given[kind.owner], tuple(map(tuple, keys)))] if keys else []
     return _timed(project, **{kind.name: (*kept, *made)})
 
@@ -118,7 +120,7 @@ def _place(kind: ElementKind, project: Project, given: Edit, _: Sentences) -> Pr
 
 def _remove_span(kind: ElementKind, what: str, project: Project, given: Edit, _: Sentences) -> Project:
     spans = getattr(project.timeline, kind.name)
-    kept = tuple(one for one in spans if not one.start <= given["time"] < one.end)
+    kept = tuple(span for span in spans if not span.start <= given["time"] < span.end)
     if len(kept) == len(spans):
         raise InputError(f"there is no {what} at {given['time']:.2f} s; click on one")
     return _timed(project, **{kind.name: kept})
@@ -158,24 +160,28 @@ def _edge(project: Project, given: Edit, sentences: Sentences) -> Project:
     if low > high:
         raise InputError("the two phones are too short to move the edge between them; move a neighbouring edge first")
     edges[index] = min(max(given["time"], low), high)
-    others = tuple(one for one in project.edges if (one.text, one.occurrence) != sentence)
+    others = tuple(edge for edge in project.edges if (edge.text, edge.occurrence) != sentence)
     return replace(project, edges=(*others, SentenceEdges(*sentence, phones.phones, tuple(edges))))
 
 
 def _reset_edges(project: Project, given: Edit, _: Sentences) -> Project:
     sentence = (given["text"], given["occurrence"])
-    return replace(project, edges=tuple(one for one in project.edges if (one.text, one.occurrence) != sentence))
+    return replace(project, edges=tuple(edge for edge in project.edges if (edge.text, edge.occurrence) != sentence))
 
 
 def _pronounce(project: Project, given: Edit, _: Sentences) -> Project:
     word, phones = given["word"].strip(), given["phones"].strip()
-    others = {one: written for one, written in project.pronunciations.items() if one.lower() != word.lower()}
+    others = {
+        pronunciation: written
+        for pronunciation, written in project.pronunciations.items()
+        if pronunciation.lower() != word.lower()
+    }
     return replace(project, pronunciations=others | ({word: phones} if phones else {}))
 
 
 def _exclude(project: Project, given: Edit, _: Sentences) -> Project:
     token = ExcludedToken(given["utterance"], given["start"])
-    others = tuple(one for one in project.excluded if one != token)
+    others = tuple(kept for kept in project.excluded if kept != token)
     return replace(project, excluded=(*others, token) if given["on"] else others)
 
 

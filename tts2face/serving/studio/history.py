@@ -56,7 +56,7 @@ class History:
     def revise(self, change: Callable[[Project], Project]) -> "History":
         """The history with every state changed alike: for what holds of the past, too, as the name of a style."""
         past, future = (
-            tuple(Step(change(one.project), one.topic) for one in part) for part in (self.past, self.future)
+            tuple(Step(change(step.project), step.topic) for step in part) for part in (self.past, self.future)
         )
         return History(change(self.present), past, future)
 
@@ -88,4 +88,4 @@ class History:
 
 
 def _is_equal(a: Project, b: Project) -> bool:
-    return all(getattr(a, one.name) == getattr(b, one.name) for one in fields(Project))
+    return all(getattr(a, field.name) == getattr(b, field.name) for field in fields(Project))

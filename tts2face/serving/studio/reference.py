@@ -112,7 +112,7 @@ def reference_project(reference: Reference, project: Project) -> Project:
 def reference_json(reference: Reference, folder: Path) -> dict[str, Any]:
     """JSON object of a reference; paths of its project are relative to a folder."""
     kept = None if reference.project is None else project_json(reference.project, folder)
-    values = {one.name: getattr(reference, one.name) for one in fields(Reference)}
+    values = {option.name: getattr(reference, option.name) for option in fields(Reference)}
     return {**values, "request": dict(reference.request), "models": dict(reference.models), "project": kept}
 
 
@@ -137,5 +137,7 @@ def _check_settings(request: Mapping[str, Any], models: Mapping[str, Any]) -> No
         if name not in known:
             raise InputError(f"a comparison cannot change {name[:40]!r} of the request; choose one of {sorted(known)}")
     for name in models:
-        if name not in {one.name for one in fields(Models)}:
-            raise InputError(f"there is no model {name[:40]!r}; choose one of {[one.name for one in fields(Models)]}")
+        if name not in {option.name for option in fields(Models)}:
+            raise InputError(
+                f"there is no model {name[:40]!r}; choose one of {[option.name for option in fields(Models)]}"
+            )

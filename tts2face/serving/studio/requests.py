@@ -25,7 +25,7 @@ from tts2face.session.project import Project
 from tts2face.session.project_file import parse_project, project_json
 
 FILE_OPTIONS = ("audio", "dictionary", "timeline")  # of a request
-TASKS = tuple(f"tts2face.serving.studio.{one}:TASKS" for one in ("tasks", "comparison_tasks", "style_tasks"))
+TASKS = tuple(f"tts2face.serving.studio.{module}:TASKS" for module in ("tasks", "comparison_tasks", "style_tasks"))
 OPTION_PARTS = frozenset({"request", "models", "picture"})
 
 
@@ -81,7 +81,7 @@ async def project_work(
     more
         Further fields of the work's request; ``format`` is that of the work.
     """
-    chosen = {one.name: getattr(project.models, one.name) for one in fields(Models)}
+    chosen = {field.name: getattr(project.models, field.name) for field in fields(Models)}
     try:
         models = await _resolve(state, key, chosen)
     except RefusedError as refused:
@@ -103,7 +103,7 @@ async def _resolve(state: ServiceState, key: ApiKey, models: Mapping[str, Any]) 
         return await resolve_models(state.library, key, models)
     if not own.is_file():
         raise InputError("you have no own styles; make one on the page Styles, or choose another palette")
-    others = {one: value for one, value in models.items() if one != "palette"}
+    others = {part: value for part, value in models.items() if part != "palette"}
     return {**await resolve_models(state.library, key, others), "palette": str(own)}
 
 

@@ -169,7 +169,7 @@ class Studio:
 
     def open_projects(self, key: ApiKey) -> list[Workspace]:
         """Open projects of a key."""
-        return [one for (owner, _), one in self._open.items() if owner == key.name]
+        return [workspace for (owner, _), workspace in self._open.items() if owner == key.name]
 
     async def close(self) -> None:
         """Save all projects, and end what is being made."""
@@ -177,8 +177,8 @@ class Studio:
         await self.recordings.close()
         if self._preparing is not None:
             self._preparing.cancel()
-        for one in self._open.values():
-            await one.close()
+        for workspace in self._open.values():
+            await workspace.close()
 
     def check_scope(self, key: ApiKey) -> None:
         """Refuse keys that may not make speech."""
@@ -188,11 +188,11 @@ class Studio:
     async def _close_idle(self) -> None:
         """Close the projects used least recently that no page shows."""
         idle = sorted(
-            (one for one in self._open.items() if not one[1].listeners and not one[1].preview.is_running),
-            key=lambda one: one[1].used_at,
+            (entry for entry in self._open.items() if not entry[1].listeners and not entry[1].preview.is_running),
+            key=lambda entry: entry[1].used_at,
         )
-        for name, one in idle[: max(0, len(idle) - MAX_IDLE)]:
-            await one.close()
+        for name, workspace in idle[: max(0, len(idle) - MAX_IDLE)]:
+            await workspace.close()
             del self._open[name]
 
 

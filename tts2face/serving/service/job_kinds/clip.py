@@ -28,13 +28,7 @@ async def add_clip_file(order: JobOrder, part: str, file: UploadFile, number: in
 
 
 async def prepare_clip(order: JobOrder) -> dict[str, Any]:
-    """JSON of a job of kind ``clip``.
-
-    Raises
-    ------
-    InputError, RefusedError
-        An option is wrong.
-    """
+    """JSON of a job of kind ``clip``."""
     given: dict[str, Any] = order.options.model_dump(exclude_none=True, exclude_defaults=True)
     format = given.pop("format", ClipRequest.model_fields["format"].default)
     fields = await divide_options(order.state, order.key, given)

@@ -26,7 +26,9 @@ from tts2face.serving.service.named_values import check_voice, resolve_dictionar
 from tts2face.serving.service.request_fields import options_model
 from tts2face.serving.work.subtitles_job import LINES
 
-BATCH_FIELDS = tuple(one.name for one in fields(BatchOptions) if one.name != "audio")  # which is a part of the form
+BATCH_FIELDS = tuple(
+    field.name for field in fields(BatchOptions) if field.name != "audio"
+)  # which is a part of the form
 MAX_CAST_CHARACTERS = 1_000_000
 # Options of clips that subtitles do not take, with the reason.
 NOT_IN_SUBTITLES: Mapping[str, str] = NOT_IN_CLIPS | MappingProxyType({
@@ -131,7 +133,7 @@ async def prepare_subtitles(order: JobOrder) -> dict[str, Any]:
         raise RefusedError(400, "invalid_request", "mp4 and mov have no transparency; choose webm")
     work = order.state.work(models=fields.models, request=fields.request, picture=fields.picture)
     tables = _cast_tables(cast)
-    resolved = [await _resolve_role(order, one) for one in (tables.get("default", {}), *tables.get("role", []))]
+    resolved = [await _resolve_role(order, role) for role in (tables.get("default", {}), *tables.get("role", []))]
     return {
         **{name: value for name, value in work.as_json().items() if name in {"models", "request", "picture"}},
         "options": options,
@@ -147,8 +149,8 @@ def _check_lines(table: Path, names: Sequence[str]) -> None:
         lines = read_lines(table, names)
     except DataError as wrong:
         raise RefusedError(422, "invalid_request", str(wrong).replace(str(table), "lines")) from wrong
-    for one in lines.settings.values():
-        check_voice(one.voice)
+    for settings in lines.settings.values():
+        check_voice(settings.voice)
 
 
 def _cast_tables(cast: dict[str, Any] | str) -> dict[str, Any]:

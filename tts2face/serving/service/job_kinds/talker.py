@@ -60,7 +60,7 @@ async def add_video(order: JobOrder, part: str, file: UploadFile, number: int) -
 async def add_words(order: JobOrder, part: str, file: UploadFile, number: int) -> None:
     """Check and note the transcript or the subtitles."""
     folder, files = order.upload.folder, order.upload.files
-    if number > 1 or {f"{RECORDING}.txt", *(f"{RECORDING}{one}" for one in SUBTITLE_SUFFIXES)} & set(files):
+    if number > 1 or {f"{RECORDING}.txt", *(f"{RECORDING}{suffix}" for suffix in SUBTITLE_SUFFIXES)} & set(files):
         raise RefusedError(422, "invalid_request", "there are words twice; send a transcript, or subtitles")
     if part == "transcript":
         files[f"{RECORDING}.txt"] = await folder.text(part, file, ".txt")
@@ -72,13 +72,7 @@ async def add_words(order: JobOrder, part: str, file: UploadFile, number: int) -
 
 
 async def prepare_talker(order: JobOrder) -> dict[str, Any]:
-    """JSON of a job of kind ``talker``.
-
-    Raises
-    ------
-    RefusedError
-        There is no recording or no consent, the name is taken, or the quota is used up.
-    """
+    """JSON of a job of kind ``talker``."""
     asked: TalkerRequest = order.options
     if order.upload.seconds is None:
         raise RefusedError(422, "invalid_request", "there is no recording; send it as the part `video` of a form")
@@ -106,7 +100,7 @@ async def _check_open_jobs(order: JobOrder) -> None:
 
     def count(client: JobClient) -> int:
         pages = [client.table.page(order.key.name, state, None, MAX_LOOKED_AT) for state in OPEN_STATES]
-        return sum(one.kind == TALKER for page in pages for one in page)
+        return sum(job.kind == TALKER for page in pages for job in page)
 
     n_open = await order.state.jobs.call(count)
     if n_open >= MAX_OPEN:

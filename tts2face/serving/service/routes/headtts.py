@@ -167,13 +167,7 @@ async def _speak(
 
 
 def items_to_ssml(items: Sequence[str | dict[str, Any]]) -> tuple[str, dict[str, str]]:
-    """SSML of input items, and the subtitles of the items that have any, by the names of their marks.
-
-    Raises
-    ------
-    RefusedError
-        An item is of no known type, or the text is too long.
-    """
+    """SSML of input items, and the subtitles of the items that have any, by the names of their marks."""
     parts: list[str] = []
     subtitles: dict[str, str] = {}
     for number, item in enumerate(items):

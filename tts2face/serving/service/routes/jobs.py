@@ -126,7 +126,7 @@ async def list_jobs(
     owner = _owner(request.state.key)
     found = await service_state(request).jobs.call(lambda client: client.table.page(owner, state, before, limit + 1))
     following = found[limit - 1].id if len(found) > limit else None
-    return JobPage(jobs=[job_view(one) for one in found[:limit]], next=following)
+    return JobPage(jobs=[job_view(record) for record in found[:limit]], next=following)
 
 
 @router.get("/jobs/{job_id}", response_model=JobDetail, summary="Show a job", responses=NOT_FOUND)
@@ -173,13 +173,7 @@ async def delete_job(request: HttpRequest, job_id: JobId) -> Response:
 
 
 async def _find(request: HttpRequest, job_id: str) -> JobRecord:
-    """A job of the key.
-
-    Raises
-    ------
-    RefusedError
-        There is none.
-    """
+    """A job of the key."""
     owner = _owner(request.state.key)
     if JOB_ID.fullmatch(job_id):
         found = await service_state(request).jobs.call(lambda client: client.table.get(job_id))
@@ -272,10 +266,10 @@ async def _events(request: HttpRequest, job_id: str, after: int) -> AsyncIterato
             found, may_follow = await state.jobs.call(partial(_read_events, job_id=job_id, after=after))
         except RefusedError:  # the database is away; the job waits, too
             found, may_follow = [], True
-        for one in found:
-            after = one.number
-            content = json.dumps({**one.content, "time": one.time}, ensure_ascii=False)
-            yield f"id: {after}\nevent: {one.content['type']}\ndata: {content}\n\n".encode()
+        for event in found:
+            after = event.number
+            content = json.dumps({**event.content, "time": event.time}, ensure_ascii=False)
+            yield f"id: {after}\nevent: {event.content['type']}\ndata: {content}\n\n".encode()
             sent_at = loop.time()
         if not may_follow:
             return

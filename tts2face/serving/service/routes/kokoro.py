@@ -34,7 +34,7 @@ class CaptionedSpeech(SpokenText):
 
 
 def _timestamps(words: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    return [{"word": one["word"], "start_time": one["start"], "end_time": one["end"]} for one in words]
+    return [{"word": word["word"], "start_time": word["start"], "end_time": word["end"]} for word in words]
 
 
 class _Captioned(TimedJson):

@@ -102,13 +102,7 @@ async def stream(connection: WebSocket) -> None:
 
 
 async def _first_message(connection: WebSocket, seconds: float) -> str:
-    """First message of a client.
-
-    Raises
-    ------
-    RefusedError
-        It did not come in time.
-    """
+    """First message of a client."""
     try:
         return await asyncio.wait_for(connection.receive_text(), seconds)
     except TimeoutError as late:
@@ -155,15 +149,7 @@ class _Sound:
 
 
 def _read_message(message: Any, *, is_sound: bool) -> tuple[dict[str, Any], bytes]:
-    """Content and sound of a message.
-
-    Raises
-    ------
-    RefusedError
-        It is none of the messages of the stream.
-    WebSocketDisconnect
-        The client has left.
-    """
+    """Content and sound of a message."""
     if message["type"] == "websocket.disconnect":
         raise WebSocketDisconnect
     samples = message.get("bytes")

@@ -232,7 +232,7 @@ def _model(name: str) -> dict[str, Any]:
 
 
 def _model_names(request: HttpRequest) -> list[str]:
-    own = [one.name for one in service_state(request).library.uploads(TALKER, request.state.key.name)]
+    own = [upload.name for upload in service_state(request).library.uploads(TALKER, request.state.key.name)]
     return [*shipped_names(TALKER), *own, *CLIENT_MODELS]
 
 

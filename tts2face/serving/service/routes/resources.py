@@ -60,7 +60,7 @@ CONTENTS = {
 
 
 def _add_reading(kind: str) -> None:
-    one, many, path = Resource[FACTS[kind]], ResourceList[FACTS[kind]], f"/{plural(kind)}"  # type: ignore[valid-type]
+    single, many, path = Resource[FACTS[kind]], ResourceList[FACTS[kind]], f"/{plural(kind)}"  # type: ignore[valid-type]
 
     @router.get(path, response_model=many, summary=f"List {plural(kind)}")
     async def list_resources(request: HttpRequest) -> dict[str, Any]:
@@ -68,7 +68,7 @@ def _add_reading(kind: str) -> None:
         key: ApiKey = request.state.key
         return {"data": await asyncio.to_thread(_list, request, kind, None if "admin" in key.scopes else key.name)}
 
-    @router.get(f"{path}/{{name}}", response_model=one, summary=f"Show a {kind}")
+    @router.get(f"{path}/{{name}}", response_model=single, summary=f"Show a {kind}")
     async def show_resource(request: HttpRequest, name: Name, owner: Owner = None) -> dict[str, Any]:
         """What is known about it."""
         if name in shipped_names(kind):
@@ -77,16 +77,16 @@ def _add_reading(kind: str) -> None:
 
 
 def _add_writing(kind: str) -> None:
-    one, path = Resource[FACTS[kind]], f"/{plural(kind)}"  # type: ignore[valid-type]
+    single, path = Resource[FACTS[kind]], f"/{plural(kind)}"  # type: ignore[valid-type]
 
     @router.post(
-        path, response_model=one, status_code=201, summary=f"Upload a {kind}",
+        path, response_model=single, status_code=201, summary=f"Upload a {kind}",
         openapi_extra={"requestBody": _form(kind)},
     )  # fmt: skip
     async def add_resource(request: HttpRequest) -> JSONResponse:
         """Check a file, and store it under a name; needs the scope build."""
         stored = await _store(request, kind)
-        content = one.model_validate(uploaded_resource(stored)).model_dump(mode="json")
+        content = single.model_validate(uploaded_resource(stored)).model_dump(mode="json")
         return JSONResponse(content, 201, {"Location": f"/v1/{plural(kind)}/{stored.name}"})
 
     @router.delete(f"{path}/{{name}}", status_code=204, summary=f"Delete a {kind}", response_class=Response)
@@ -205,7 +205,7 @@ async def _store(request: HttpRequest, kind: str) -> StoredResource:
 
 
 async def _read_form(form: FormData, kind: str) -> Sent:
-    more = ["mapping", *(one.name for one in fields(SentPhoto))] if kind == FACE else []
+    more = ["mapping", *(field.name for field in fields(SentPhoto))] if kind == FACE else []
     unknown = set(form) - {"file", "name", *more}
     name, file = form.get("name"), form.get("file")
     if unknown:

@@ -48,17 +48,17 @@ async def fetch_result(
         return Response(status_code=304, headers=headers)
     path = await jobs.call(lambda client: _fetch(client, found))
     if not _names_ranges(request.headers.get("range", "")):
-        request.scope["headers"] = [one for one in request.scope["headers"] if one[0] != b"range"]
+        request.scope["headers"] = [header for header in request.scope["headers"] if header[0] != b"range"]
     return FileResponse(path, headers=headers, media_type=found.media_type, filename=found.name)
 
 
 def _names_ranges(header: str) -> bool:
     """Whether a header Range has a valid form; any other one is ignored (RFC 9110, 14.2)."""
     unit, _, listed = header.partition("=")
-    ranges = [RANGE.fullmatch(one.strip()) for one in listed.split(",")]
+    ranges = [RANGE.fullmatch(part.strip()) for part in listed.split(",")]
     return unit.strip().lower() == "bytes" and all(
-        one is not None and (one["suffix"] or not one["last"] or int(one["first"]) <= int(one["last"]))
-        for one in ranges
+        match is not None and (match["suffix"] or not match["last"] or int(match["first"]) <= int(match["last"]))
+        for match in ranges
     )
 
 

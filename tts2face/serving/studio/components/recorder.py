@@ -58,7 +58,7 @@ class VisemeMap(Element, component="viseme_map.js"):
         self, prompts: Sequence[Mapping[str, Any]], running: Mapping[str, Any], visemes: Mapping[str, str]
     ) -> None:
         super().__init__()
-        units = [{"phones": one["phones"], "triphones": one["triphones"]} for one in prompts]
+        units = [{"phones": prompt["phones"], "triphones": prompt["triphones"]} for prompt in prompts]
         self._props.update(prompts=units, running=dict(running), accepted=[], visemes=dict(visemes))
 
     def set_accepted(self, accepted: Sequence[int]) -> None:

@@ -157,8 +157,8 @@ class AnimatePage:
         project = self.workspace.project
         seeds = {**dict.fromkeys(FEATURES, project.request.seed), **project.timeline.seeds}
         return [
-            {"feature": one, "muted": one in project.muted, "solo": one in project.solo, "seed": seeds[one]}
-            for one in FEATURES
+            {"feature": lane, "muted": lane in project.muted, "solo": lane in project.solo, "seed": seeds[lane]}
+            for lane in FEATURES
         ]
 
     def _shown_looks(self) -> tuple[str | None, str | None]:
@@ -234,8 +234,8 @@ class AnimatePage:
 
     def _set_enabled(self, is_enabled: bool) -> None:
         self._other_tab.set_visibility(not is_enabled)
-        for one in (self.bar, self.speech, self.inspector):
-            one.set_enabled(is_enabled)
+        for panel in (self.bar, self.speech, self.inspector):
+            panel.set_enabled(is_enabled)
         self.timeline.props(remove="inert") if is_enabled else self.timeline.props("inert")
 
     def _renew(self) -> None:

@@ -149,8 +149,8 @@ class Bar:
             found = renders.of_project(workspace.key.name, workspace.folder)
             if not found:
                 ui.label("No file has been made yet.").classes("quiet")
-            for one in reversed(found):
-                self._row(one)
+            for entry in reversed(found):
+                self._row(entry)
 
     def _row(self, render: BackgroundWork) -> None:
         renders = self._page.studio.renders

@@ -25,7 +25,9 @@ COLOURS = (
 def voices() -> dict[str, str]:
     """Voices by name with what is said of them; the empty one is the best for the language."""
     found = {
-        one.name: f"{one.name} - {one.summary}" for one in catalogue.voices() if one.languages and one.is_installed
+        voice.name: f"{voice.name} - {voice.summary}"
+        for voice in catalogue.voices()
+        if voice.languages and voice.is_installed
     }
     return {"": "best for the language", **found}
 
@@ -33,23 +35,23 @@ def voices() -> dict[str, str]:
 @lru_cache(maxsize=1)
 def languages() -> dict[str, str]:
     """Languages by code."""
-    return {one.code: f"{one.name} ({one.code})" for one in catalogue.languages()}
+    return {language.code: f"{language.name} ({language.code})" for language in catalogue.languages()}
 
 
 def _haircuts(face: str) -> dict[str, str]:
-    return {one.name: f"{one.name} - {one.summary}" for one in catalogue.haircuts_of(face)}
+    return {haircut.name: f"{haircut.name} - {haircut.summary}" for haircut in catalogue.haircuts_of(face)}
 
 
 @lru_cache(maxsize=1)
 def _hair_colours() -> dict[str, str]:
-    return {one.name: one.name for one in catalogue.hair_colors()}
+    return {color.name: color.name for color in catalogue.hair_colors()}
 
 
 async def models(library: Library, key: ApiKey, kind: str) -> list[str]:
     """Names of the shipped models of a kind and of those that a key has uploaded."""
     own = await asyncio.to_thread(library.uploads, kind, key.name)
     more = [OWN_FACE] if kind == FACE else []
-    return [*shipped_names(kind), *more, *(one.name for one in own)]
+    return [*shipped_names(kind), *more, *(uploaded.name for uploaded in own)]
 
 
 async def looks(library: Library, key: ApiKey, face: str) -> dict[str, dict[str, str]]:
@@ -83,6 +85,6 @@ async def styles(library: Library, key: ApiKey, palette: str | None) -> list[dic
     except (RefusedError, Tts2faceError):
         return []
     return [
-        {"name": one.name, "color": COLOURS[number % len(COLOURS)], "summary": one.summary}
-        for number, one in enumerate(found)
+        {"name": style.name, "color": COLOURS[number % len(COLOURS)], "summary": style.summary}
+        for number, style in enumerate(found)
     ]

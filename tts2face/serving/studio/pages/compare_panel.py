@@ -114,7 +114,7 @@ class ComparePanel:
         with shown_errors():
             found = await self._page.workspace.comparison.recordings()
             said = _words(self._page.workspace.project.request.source.text)
-            found.sort(key=lambda one: _words(one[1]) != said)  # those with the project's words first
+            found.sort(key=lambda example: _words(example[1]) != said)  # those with the project's words first
             with self._details:
                 names = {name: f"{name} - {words}" if words else name for name, words in found}
                 chosen = ui.select(names, label="Recording", with_input=True).props("dense outlined options-dense")
@@ -163,15 +163,15 @@ class ComparePanel:
 
 def measures_html(found: Mapping[str, Any]) -> str:
     """Table of the fields of `tts2face.session.comparison.MotionComparison`."""
-    rows = [(LIP_NAMES[one["name"]], one) for one in found["lips"]]
-    common = [one for one in found["channels"] if one["ratio"]]
-    rows += [(_channel_name(one["name"]), one) for one in common[:N_CHANNELS]]
+    rows = [(LIP_NAMES[measure["name"]], measure) for measure in found["lips"]]
+    common = [measure for measure in found["channels"] if measure["ratio"]]
+    rows += [(_channel_name(measure["name"]), measure) for measure in common[:N_CHANNELS]]
     n_single = len(found["channels"]) - len(common)
     single = f" Channels that move in one of both only: {n_single}." if n_single else ""
     cost = "-" if found["dtw_cost"] is None else f"{found['dtw_cost']:.2f}"
     lines = "".join(
-        f'<tr><th scope="row">{escape(name)}</th><td>{_number(one["r"])}</td><td>{_number(one["ratio"])}</td></tr>'
-        for name, one in rows
+        f'<tr><th scope="row">{escape(name)}</th><td>{_number(row["r"])}</td><td>{_number(row["ratio"])}</td></tr>'
+        for name, row in rows
     )
     return (
         '<table class="measures"><thead><tr><th scope="col">Project and A</th><th scope="col">r</th>'

@@ -72,10 +72,10 @@ class Examples:
                 self._exclude_button("Exclude", token["utterance"], token["start"], is_excluded=True)
 
     def _show_excluded(self) -> None:
-        for one in self._page.workspace.project.excluded:
+        for token in self._page.workspace.project.excluded:
             with ui.row().style("align-items: center; gap: .25rem"):
-                ui.label(f"excluded: {one.utterance} {one.start:.2f} s").classes("quiet")
-                self._exclude_button("Use again", one.utterance, one.start, is_excluded=False)
+                ui.label(f"excluded: {token.utterance} {token.start:.2f} s").classes("quiet")
+                self._exclude_button("Use again", token.utterance, token.start, is_excluded=False)
 
     def _exclude_button(self, text: str, utterance: str, start: float, *, is_excluded: bool) -> None:
         async def change() -> None:

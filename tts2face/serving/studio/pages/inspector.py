@@ -52,16 +52,16 @@ class Inspector:
     def set_styles(self, styles: Sequence[Mapping[str, str]]) -> None:
         """Offer the styles of another palette."""
         self._styles = styles
-        if all(one["name"] != self._style for one in styles):
+        if all(style["name"] != self._style for style in styles):
             self._style = styles[0]["name"] if styles else ""
         self._list.clear()
         with self._list:
-            for one in styles:
-                swatch = ui.element("button").props(f'type=button title="{escape(one["summary"])}"')
+            for style in styles:
+                swatch = ui.element("button").props(f'type=button title="{escape(style["summary"])}"')
                 with swatch:
-                    ui.element("i").style(f"background: {one['color']}").props("aria-hidden=true")
-                    ui.html(escape(one["name"]), sanitize=False, tag="span")
-                swatch.on("click", lambda name=one["name"]: self._choose("brush", name))
+                    ui.element("i").style(f"background: {style['color']}").props("aria-hidden=true")
+                    ui.html(escape(style["name"]), sanitize=False, tag="span")
+                swatch.on("click", lambda name=style["name"]: self._choose("brush", name))
         self._show_choice()
 
     def set_enabled(self, is_enabled: bool) -> None:
@@ -109,8 +109,8 @@ class Inspector:
             is_chosen = name == self._tool
             button.props(f"aria-pressed={str(is_chosen).lower()}")
             button.props(remove="outline") if is_chosen else button.props("outline")
-        for one, swatch in zip(self._styles, self._list.default_slot.children, strict=True):
-            is_chosen = self._tool == "brush" and one["name"] == self._style
+        for style, swatch in zip(self._styles, self._list.default_slot.children, strict=True):
+            is_chosen = self._tool == "brush" and style["name"] == self._style
             swatch.props(f"aria-pressed={str(is_chosen).lower()}")
 
     async def _pronounce(self, *, is_removed: bool = False) -> None:

@@ -21,7 +21,7 @@ class Cell:
 
 def common_cell(strips: Sequence[Outlines]) -> Cell:
     """Cell that holds the lips of all strips, so that they are drawn at one scale."""
-    points = [point for strip in strips for one in strip for point in one["outer"]]
+    points = [point for strip in strips for outline in strip for point in outline["outer"]]
     half = max((abs(x) for x, _ in points), default=1.0) + MARGIN_MM
     heights = [y for _, y in points] or [0.0]
     return Cell(half, min(heights) - MARGIN_MM, max(heights) + MARGIN_MM)
@@ -36,20 +36,20 @@ def strip_svg(outlines: Outlines, cell: Cell, whose: str) -> str:
         Start of the words, such as ``Lips of bbaf2n``.
     """
     width, height = 2 * cell.half_width, cell.bottom - cell.top
-    gaps = ", ".join(f"{opening_mm(one):.1f}" for one in outlines)
+    gaps = ", ".join(f"{opening_mm(outline):.1f}" for outline in outlines)
     words = escape(f"{whose}, from its beginning to its end: open by {gaps} mm", quote=True)
     lips = "".join(
         f'<g transform="translate({width * number + cell.half_width:.2f} {-cell.top:.2f})">'
-        f'<path class="lips" d="{_path(one["outer"])}"/><path class="mouth" d="{_path(one["inner"])}"/></g>'
-        for number, one in enumerate(outlines)
+        f'<path class="lips" d="{_path(outline["outer"])}"/><path class="mouth" d="{_path(outline["inner"])}"/></g>'
+        for number, outline in enumerate(outlines)
     )
     size = f"{width * len(outlines):.2f} {height:.2f}"
     return f'<svg class="lip-strip" role="img" aria-label="{words}" viewBox="0 0 {size}">{lips}</svg>'
 
 
-def opening_mm(one: Mapping[str, Sequence[Sequence[float]]]) -> float:
+def opening_mm(outline: Mapping[str, Sequence[Sequence[float]]]) -> float:
     """Vertical gap between the middles of the inner lips, mm, at least 0."""
-    return max(float(one["inner"][LOWER_MID][1] - one["inner"][UPPER_MID][1]), 0.0)
+    return max(float(outline["inner"][LOWER_MID][1] - outline["inner"][UPPER_MID][1]), 0.0)
 
 
 def _path(points: Any) -> str:

@@ -70,9 +70,9 @@ class MixPanel:
         """What the sliders say."""
         return StyleMix(
             str(self._source.value),
-            {name: float(one.value) for name, one in self._shares.items() if one.value},
-            {name: float(one.value) for name, one in self._others["expressions"].items() if one.value},
-            {name: float(one.value) for name, one in self._others["sizes"].items() if one.value != 1.0},
+            {name: float(slider.value) for name, slider in self._shares.items() if slider.value},
+            {name: float(slider.value) for name, slider in self._others["expressions"].items() if slider.value},
+            {name: float(slider.value) for name, slider in self._others["sizes"].items() if slider.value != 1.0},
             float(self._tempo.value),
         )
 

@@ -114,8 +114,8 @@ class PhotoDialog:
             self._forget()
 
     def _show_found(self, is_found: bool) -> None:
-        for one in (self._shown, self._make, self._again):
-            one.set_visibility(is_found)
+        for element in (self._shown, self._make, self._again):
+            element.set_visibility(is_found)
         self._upload.set_visibility(not is_found)
 
     def _change(self, fit: Mapping[str, Any]) -> None:
@@ -152,15 +152,15 @@ class PhotoDialog:
         controls = (self._upload, self._make, self._again, self._close)
         self._status.text = status
         self._dialog.props("persistent")
-        for one in controls:
-            one.set_enabled(False)
+        for control in controls:
+            control.set_enabled(False)
         try:
             yield
         finally:
             self._dialog.props(remove="persistent")
             self._status.text = "" if self._status.text == status else self._status.text
-            for one in controls:
-                one.set_enabled(True)
+            for control in controls:
+                control.set_enabled(True)
 
     def _forget(self) -> None:
         """Delete the picture, and show what the dialog begins with."""

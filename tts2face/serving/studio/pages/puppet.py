@@ -102,12 +102,12 @@ class PuppetPage:
         """Show what has changed."""
         entries = self._takes.store.entries(self._key.name)
         rows = []
-        for one in entries:
-            work = self._takes.work_on(self._key, one.id)
+        for entry in entries:
+            work = self._takes.work_on(self._key, entry.id)
             stage = f"{work.stage} {work.done}" if work is not None and work.is_open else ""
             error = work.message if work is not None else ""
-            film = (self._takes.store.folder(self._key.name, one.id) / FILM).is_file()
-            rows.append((one, stage, error, film))
+            film = (self._takes.store.folder(self._key.name, entry.id) / FILM).is_file()
+            rows.append((entry, stage, error, film))
         if rows == self._shown:
             return
         self._shown = rows
@@ -118,8 +118,8 @@ class PuppetPage:
                     "There is no take yet. Start the camera and record one, or upload a Live Link Face table (.csv) "
                     "or a video: the head plays it."
                 ).classes("note")
-            for one, stage, error, film in rows:
-                self._row(one, stage, error, has_film=film)
+            for row, stage, error, film in rows:
+                self._row(row, stage, error, has_film=film)
 
     def _row(self, take: TakeEntry, stage: str, error: str, *, has_film: bool) -> None:
         address, name = f"{FILES}/{take.id}", take.name

@@ -110,8 +110,8 @@ class ReportsPage:
             found = self._studio.reports.of_owner(self._key.name)
             if not found:
                 ui.label("There is no report yet. Choose what to report of which model, and make it.").classes("quiet")
-            for one in found:
-                self._row(one)
+            for report in found:
+                self._row(report)
 
     def _row(self, report: BackgroundWork) -> None:
         with ui.element("div").classes("project"):

@@ -178,7 +178,7 @@ class PalettePage:
     def _show_styles(self, version: int) -> None:
         store = self._styles.store
         listed = catalogue.styles(store.base(self._key.name))
-        own = [one for one in listed if one.name not in shipped().names]
+        own = [style for style in listed if style.name not in shipped().names]
         self._download.set_visibility(bool(own))
         self._cards.clear()
         self._pictures = {}
@@ -189,13 +189,13 @@ class PalettePage:
                     "sliders; it can then be painted on the timeline of your projects like the others."
                 ).classes("note")
             with ui.element("div").classes("swatches"):
-                for one in own:
-                    self._card(one, version, is_own=True)
+                for style in own:
+                    self._card(style, version, is_own=True)
             heading(2, "Shipped styles")
             with ui.element("div").classes("swatches"):
-                for one in listed:
-                    if one not in own:
-                        self._card(one, version, is_own=False)
+                for style in listed:
+                    if style not in own:
+                        self._card(style, version, is_own=False)
 
         self._missing = [name for name in self._pictures if not store.swatch(self._key.name, name).is_file()]
         if self._missing:

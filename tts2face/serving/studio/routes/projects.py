@@ -172,7 +172,7 @@ async def list_renders(request: HttpRequest, project: str) -> list[dict[str, Any
     """Files of a project, and their progress."""
     async with opened(request, project) as workspace:
         found = _studio(request).renders.of_project(workspace.key.name, workspace.folder)
-        return [render_state(one) for one in found]
+        return [render_state(film) for film in found]
 
 
 @router.post("/projects/{project}/renders", status_code=202)

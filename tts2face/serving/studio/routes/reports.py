@@ -36,7 +36,7 @@ def _found(request: HttpRequest, number: str) -> BackgroundWork:
 @router.get("")
 async def list_reports(request: HttpRequest) -> list[dict[str, Any]]:
     """Reports of the key, the newest first."""
-    return [report_state(one) for one in _reports(request).of_owner(request.state.key.name)]
+    return [report_state(report) for report in _reports(request).of_owner(request.state.key.name)]
 
 
 @router.post("", status_code=202)

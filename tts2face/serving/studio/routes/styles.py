@@ -32,8 +32,8 @@ async def list_styles(request: HttpRequest) -> dict[str, Any]:
     styles, key = _styles(request), request.state.key
     own = styles.store.own_names(key.name)
     listed = [
-        {"name": one.name, "source": one.source, "summary": one.summary, "is_own": one.name in own}
-        for one in catalogue.styles(styles.store.base(key.name))
+        {"name": style.name, "source": style.source, "summary": style.summary, "is_own": style.name in own}
+        for style in catalogue.styles(styles.store.base(key.name))
     ]
     return {"styles": listed, "take": asdict(styles.take_state(key))}
 

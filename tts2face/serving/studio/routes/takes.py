@@ -31,7 +31,7 @@ def _takes(request: HttpRequest) -> Takes:
 @router.get("")
 async def list_takes(request: HttpRequest) -> list[dict[str, Any]]:
     """Takes of the key, the last one first."""
-    return [asdict(one) for one in _takes(request).store.entries(request.state.key.name)]
+    return [asdict(entry) for entry in _takes(request).store.entries(request.state.key.name)]
 
 
 @router.get("/face.glb")
