@@ -7,7 +7,7 @@ import pytest
 from lexicon.errors import DataError
 from tests.serving.batch.conftest import SRT, Planner
 from tts2face.serving.batch.cast import read_cast
-from tts2face.serving.batch.distinct_faces import other_look
+from tts2face.serving.batch.distinct_faces import other_face
 from tts2face.serving.batch.report import planned_speakers
 from tts2face.session.named_models import Models
 from tts2face.sound.voice_pool import find_voice
@@ -31,7 +31,7 @@ def cast_of(tmp_path: Path, text: str) -> object:
     ],
 )
 def test_two_who_speak_at_once_share_neither_face_nor_voice(text: str, plan_of: Planner) -> None:
-    first, second = (line.look for line in plan_of(text).lines)
+    first, second = (line.casting for line in plan_of(text).lines)
     assert first.models.face != second.models.face
     assert first.request.get("voice") != second.request.get("voice")
     assert first.models == Models()
@@ -39,23 +39,23 @@ def test_two_who_speak_at_once_share_neither_face_nor_voice(text: str, plan_of: 
 
 def test_a_role_decides_for_both(plan_of: Planner, tmp_path: Path) -> None:
     cast = cast_of(tmp_path, '[[role]]\nspeaker = "*"\nface = "noor"\n')
-    assert [line.look.models.face for line in plan_of(TWO, cast=cast).lines] == ["noor", "noor"]
+    assert [line.casting.models.face for line in plan_of(TWO, cast=cast).lines] == ["noor", "noor"]
 
 
 def test_exports_of_several_cues_keep_one_face(plan_of: Planner) -> None:
     plan = plan_of(TWO, per="file", exports=("csv",))
-    first, second = (line.look for line in plan.lines)
+    first, second = (line.casting for line in plan.lines)
     assert first.models == second.models
     assert first.request.get("voice") != second.request.get("voice")
 
 
 def test_another_speaker_has_a_voice_of_the_language_and_the_other_sex() -> None:
-    models, request = other_look(Models(), {"language": "de"}, 1)
+    models, request = other_face(Models(), {"language": "de"}, 1)
     assert (request["voice"], models.face) == ("espeak-female", "mara")
-    _, request = other_look(Models(face="head", identity="ravi"), {"voice": "espeak-female"}, 1)
+    _, request = other_face(Models(face="head", identity="ravi"), {"voice": "espeak-female"}, 1)
     assert find_voice(request["voice"]).sex == "male"
-    looks = [other_look(Models(), {}, number) for number in (1, 2, 3)]
-    assert len({models.face for models, _ in looks}) == 3
+    others = [other_face(Models(), {}, number) for number in (1, 2, 3)]
+    assert len({models.face for models, _ in others}) == 3
 
 
 def test_speakers_without_a_role_are_named(plan_of: Planner, tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ def free(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
 @pytest.fixture
 def client(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
     """Client of a service whose data folder is there and whose database is elsewhere."""
-    monkeypatch.setattr(readiness, "LOOK_S", 0.0)
+    monkeypatch.setattr(readiness, "CHECK_S", 0.0)
     settings = ServiceSettings(workers=0, data=tmp_path / "data", database=str(tmp_path / "jobs.sqlite"))
     with service_client(settings, TableProcess()) as client:
         yield client
@@ -105,7 +105,7 @@ def test_what_is_still_prepared_is_named(client: TestClient) -> None:
 
 
 def test_workers_that_have_ended_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(readiness, "LOOK_S", 0.0)
+    monkeypatch.setattr(readiness, "CHECK_S", 0.0)
     monkeypatch.setattr(job_service, "SUPERVISE_S", 0.02)
     with service_client(ServiceSettings(workers=1, data=tmp_path), TableProcess()) as client:
         eventually(lambda: ready(client)[0] == 200)
@@ -133,7 +133,7 @@ def test_a_database_that_hangs_neither_stops_streams_nor_delays_a_probe(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """Probes of Kubernetes wait for a second; asked again and again, it holds one task and writes one line."""
-    monkeypatch.setattr(readiness, "LOOK_S", 0.0)
+    monkeypatch.setattr(readiness, "CHECK_S", 0.0)
     monkeypatch.setattr(readiness, "DATABASE_S", 0.01)
     with (
         service_client(ServiceSettings(workers=0, data=tmp_path), TableProcess()) as client,

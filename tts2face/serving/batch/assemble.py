@@ -67,7 +67,8 @@ class _Joined:
     """Streams of the joined file."""
 
     def __init__(self, target: Any, kind: MovieKind, fps: Fraction) -> None:
-        self._target, self._kind, self._fps = target, kind, fps
+        self._target, self._kind = target, kind
+        self._fps = fps
         self._video: Any = None
         self._audio: Any = None
         self._settings: tuple[Any, ...] = ()
@@ -130,7 +131,8 @@ class _Joined:
         import av
 
         frame = av.AudioFrame.from_ndarray(np.ascontiguousarray(samples[None, :]), format="s16", layout="mono")
-        frame.sample_rate, frame.pts, frame.time_base = SOUND_RATE, self._n_samples, Fraction(1, SOUND_RATE)
+        frame.sample_rate, frame.time_base = SOUND_RATE, Fraction(1, SOUND_RATE)
+        frame.pts = self._n_samples
         self._n_samples += len(samples)
         self._target.mux(self._audio.encode(frame))
 

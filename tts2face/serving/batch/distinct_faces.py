@@ -14,7 +14,7 @@ from tts2face.sound.voice_pool import SHIPPED_VOICES, default_voice, find_voice,
 _OTHER_FACES: Mapping[str, tuple[str, ...]] = MappingProxyType({"male": ("ben", "tomas"), "female": ("mara", "noor")})
 
 
-def other_look(
+def other_face(
     models: Models, request: Mapping[str, Any], number: int, *, keeps_face: bool = False
 ) -> tuple[Models, dict[str, Any]]:
     """Models and request of another speaker than the one that is shown with these; `number` counts such, from 1.

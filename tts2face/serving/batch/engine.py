@@ -23,7 +23,7 @@ from tts2face.serving.batch.store import Store, wait_for_store
 
 MAX_TRIES = 3  # of a segment whose process ended; then it counts as failed
 MIN_FREE_BYTES = 200 << 20  # below which work pauses
-PAUSE_S = 2.0  # between two looks at a full disk
+PAUSE_S = 2.0  # between two checks of a full disk
 
 OnMessage = Callable[[str], None]
 

@@ -1,4 +1,4 @@
-"""What a batch will take: seconds of work and bytes on disk, before anything is rendered."""
+"""Estimate of a batch: seconds of work and bytes on disk, before anything is rendered."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +23,7 @@ TRACK_BYTES_PER_S = 200_000  # of a segment for exports; an export is about half
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """What is to be done: outputs, segments, seconds of clips, seconds of one core, bytes of segments and outputs."""
+    """Extent of a batch: outputs, segments, seconds of clips, seconds of one core, bytes of segments and outputs."""
 
     n_outputs: int
     n_stale: int

@@ -93,7 +93,8 @@ def joined_clips(
     """
     from tts2face.serving.batch.audio_track import open_track
 
-    rate, at, sounding = exact_rate(fps), 0, np.zeros(0, np.float32)
+    rate, sounding = exact_rate(fps), np.zeros(0, np.float32)
+    at = 0
     parts = zip(tracks, sounds or [None] * len(tracks), lengths or [None] * len(tracks), strict=True)
     for path, sound, length in parts:
         until, later = None if length is None else at + length, [np.zeros(0, np.float32)]

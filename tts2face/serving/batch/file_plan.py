@@ -88,7 +88,7 @@ class FilePlan:
     _hashes: dict[str, Mapping[str, str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Make the looks of its speakers."""
+        """Make the castings of its speakers."""
         self.speakers = Speakers(
             self.base.cast,
             self.base.lines,
@@ -135,7 +135,7 @@ class FilePlan:
                 cue.speaker,
                 cue.text,
                 self.speakers.settings(cue, part),
-                self.speakers.look(cue, part),
+                self.speakers.casting(cue, part),
                 self.segments.get((cue.number, part)),
             )
 
@@ -166,7 +166,7 @@ class FilePlan:
 
     def _rate_of(self, cue: Cue, part: int) -> float:
         """Speaking rate of a line before it is fitted."""
-        return float(self.speakers.look(cue, part).request.get("rate", 1.0))
+        return float(self.speakers.casting(cue, part).request.get("rate", 1.0))
 
     def _moved(self, cue: Cue) -> Cue:
         """A cue at its time of the table; several speakers of one move with the first of them."""
@@ -210,21 +210,21 @@ class FilePlan:
 
     def _who(self, window: Window) -> object:
         """Equal for lines of one speaker with equal settings."""
-        look = self.speakers.look(window.cue, window.part)
-        return window.cue.speaker, look.other, look.models, repr(sorted(look.request.items()))
+        casting = self.speakers.casting(window.cue, window.part)
+        return window.cue.speaker, casting.other, casting.models, repr(sorted(casting.request.items()))
 
     def _speaks_on(self, window: Window, following: Window) -> bool:
         """Whether one speaker has both lines, the first of which may use the time up to the second."""
-        before, after = (self.speakers.look(shown.cue, shown.part) for shown in (window, following))
+        before, after = (self.speakers.casting(shown.cue, shown.part) for shown in (window, following))
         same = [
-            (segment.cue.speaker, look.other, look.models, look.request.get("voice"))
-            for segment, look in ((window, before), (following, after))
+            (segment.cue.speaker, casting.other, casting.models, casting.request.get("voice"))
+            for segment, casting in ((window, before), (following, after))
         ]
         return following.begin <= window.slot_end and same[0] == same[1]
 
     def _is_spoken_as_one(self, sentence: _Sentence) -> bool:
         """Whether a voice can speak the words of all cues together, of which each begins with a letter."""
-        request = Request(**self.speakers.look(sentence.windows[0].cue, 0).request, text=self._joined(sentence))
+        request = Request(**self.speakers.casting(sentence.windows[0].cue, 0).request, text=self._joined(sentence))
         try:
             prepared = prepare(request)
         except (InputError, DataError):
@@ -241,7 +241,7 @@ class FilePlan:
         return sentence_case(text, self._language(window), is_shouted=True) if self._is_in_capitals else text
 
     def _language(self, window: Window) -> str:
-        return str(self.speakers.look(window.cue, window.part).request.get("language", Request().language))
+        return str(self.speakers.casting(window.cue, window.part).request.get("language", Request().language))
 
     def _joined_output(self, name: str, windows: Sequence[Window], begin: int) -> Output:
         """Clip of consecutive windows with the silences between them."""
@@ -287,10 +287,10 @@ class FilePlan:
 
     def _speech(self, window: Window, *, fills: bool, is_last: bool = False) -> Segment | None:
         """Segment of a cue, which may be the last one of its output; None with a warning if it cannot be spoken."""
-        look = self.speakers.look(window.cue, window.part)
+        casting = self.speakers.casting(window.cue, window.part)
         sentence = self._sentences.get((window.cue.number, window.part))
         text = self._written(window.cue.text, window) if sentence is None else self._joined(sentence)
-        request: dict[str, Any] = {**look.request, "text": text}
+        request: dict[str, Any] = {**casting.request, "text": text}
         if self.base.options.audio is not None:
             found = self.recordings.track or self.recordings.cues.get(window.cue.number)
             if found is None:
@@ -329,10 +329,8 @@ class FilePlan:
         if sentence is None:
             return segment
         parts = tuple(
-            Part(
-                n_letters(text), window.end - window.begin, _slot(window, fills=segment.fills_slot), window.margin_begin
-            )
-            for window, text in zip(sentence.windows, sentence.texts, strict=True)
+            Part(n_letters(text), own.end - own.begin, _slot(own, fills=segment.fills_slot), own.margin_begin)
+            for own, text in zip(sentence.windows, sentence.texts, strict=True)
         )
         return replace(segment, parts=parts, part=sentence.windows.index(window))
 
@@ -340,8 +338,8 @@ class FilePlan:
         """Segments of idle animation of the speaker of a window."""
         fps = float(exact_rate(self.base.request.fps))
         longest = max(1, int(MAX_IDLE_S * fps))
-        look = self.speakers.look(window.cue, window.part)
-        settings = {name: value for name, value in look.request.items() if name not in NOT_WHEN_SILENT}
+        casting = self.speakers.casting(window.cue, window.part)
+        settings = {name: value for name, value in casting.request.items() if name not in NOT_WHEN_SILENT}
         while n_frames > 0:
             part = min(n_frames, longest)
             seed = int(settings.get("seed", 0)) + n_frames  # other motion in each part, and for other lengths
@@ -358,7 +356,7 @@ class FilePlan:
         fills: bool,
         window_frames: int | None = None,
     ) -> Segment:
-        models = self.speakers.look(window.cue, window.part).models
+        models = self.speakers.casting(window.cue, window.part).models
         n_frames = window.end - window.begin if window_frames is None else window_frames
         is_excerpt = self.recordings.track is not None and "audio" in request
         fps = exact_rate(self.base.request.fps)

@@ -144,7 +144,9 @@ class _Search:
     """Search for a rate; it begins with that of the request."""
 
     def __init__(self, text: str, limits: Limits, measure: Measure) -> None:
-        self.rate, self._text, self._limits, self._measure = limits.rate, text, limits, measure
+        self.rate = limits.rate
+        self._text, self._limits = text, limits
+        self._measure = measure
         self._n_steps = 0
         self._ends: Sequence[float] = ()
         self._speak(limits.rate)

@@ -164,4 +164,4 @@ def write_lines(path: Path, rows: Iterable[Mapping[str, Any]]) -> None:
     writer = csv.DictWriter(table, COLUMNS, restval="")
     writer.writeheader()
     writer.writerows(rows)
-    write_atomically(path, ("\ufeff" + table.getvalue()).encode())  # the mark tells spreadsheets that it is UTF-8
+    write_atomically(path, ("\ufeff" + table.getvalue()).encode())  # by this mark spreadsheets read it as UTF-8

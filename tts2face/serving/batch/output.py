@@ -10,7 +10,7 @@ from lexicon.errors import InputError
 from tts2face.serving.batch.content_address import content_address
 from tts2face.serving.batch.lines import LineSettings
 from tts2face.serving.batch.segment import Segment
-from tts2face.serving.batch.speakers import Look
+from tts2face.serving.batch.speakers import Casting
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +80,7 @@ class Output:
 
     @property
     def needed(self) -> tuple[Segment, ...]:
-        """What must be stored to make it."""
+        """Segments that must be stored to make it."""
         return (*(self.segments if self.suffix else ()), *self.tracks)
 
     @cached_property
@@ -120,7 +120,7 @@ class PlannedLine:
         Instants in its file.
     settings
         Its row of the table of lines.
-    look
+    casting
         Who speaks.
     segment
         What is rendered; None for a line that is not spoken.
@@ -134,7 +134,7 @@ class PlannedLine:
     speaker: str
     text: str
     settings: LineSettings
-    look: Look
+    casting: Casting
     segment: Segment | None
 
 

@@ -78,8 +78,8 @@ def _without_role(cast: Cast, lines: Sequence[PlannedLine]) -> list[str]:
     """A warning about the speakers whom no role of a cast matches."""
     counts: dict[str, int] = {}
     for line in lines:
-        if cast.roles and line.look.role is None and not line.look.other and line.segment is not None:
-            name = shown_name(line.speaker, line.look)
+        if cast.roles and line.casting.role is None and not line.casting.other and line.segment is not None:
+            name = shown_name(line.speaker, line.casting)
             counts[name] = counts.get(name, 0) + 1
     if not counts:
         return []

@@ -1,4 +1,4 @@
-"""What a plan will be: its speakers, and for each line the rate and what of it ends late or is not spoken."""
+"""Report of a plan: its speakers, and for each line the rate and what of it ends late or is not spoken."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from tts2face.serving.batch.lines import LineSettings, write_lines
 from tts2face.serving.batch.output import Plan, PlannedLine
 from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.segment_result import SegmentResult
-from tts2face.serving.batch.speakers import Look, shown_name
+from tts2face.serving.batch.speakers import Casting, shown_name
 from tts2face.serving.batch.store import Store
 from tts2face.session.named_models import Models
 from tts2face.sound.voice_pool import default_voice
@@ -40,7 +40,12 @@ def planned_speakers(plan: Plan) -> tuple[PlannedSpeaker, ...]:
     """Speakers of a plan, those with most lines first, also those who are silent."""
     found: dict[tuple[str, int | None, str, str], list[bool]] = {}
     for line in plan.lines:
-        key = shown_name(line.speaker, line.look), line.look.role, shown_face(line.look.models), _voice(line.look)
+        key = (
+            shown_name(line.speaker, line.casting),
+            line.casting.role,
+            shown_face(line.casting.models),
+            _voice(line.casting),
+        )
         found.setdefault(key, []).append(line.segment is not None)
     speakers = [
         PlannedSpeaker(name, sum(spoken), role, face, voice, len(spoken) - sum(spoken))
@@ -54,9 +59,10 @@ def shown_face(models: Models) -> str:
     return f"{models.face} {models.identity}" if models.identity else models.face
 
 
-def _voice(look: Look) -> str:
+def _voice(casting: Casting) -> str:
     return str(
-        look.request.get("voice") or default_voice(language_code(look.request.get("language", Request().language)))
+        casting.request.get("voice")
+        or default_voice(language_code(casting.request.get("language", Request().language)))
     )
 
 
@@ -106,7 +112,7 @@ class RateSummary:
 def summarise(plan: Plan, results: Mapping[str, SegmentResult]) -> RateSummary:
     """Numbers of the lines of a plan whose fits are known."""
     rated = [
-        (result, line.look.usual_rate, max(line.segment.max_rate, line.settings.rate or 0.0))
+        (result, line.casting.usual_rate, max(line.segment.max_rate, line.settings.rate or 0.0))
         for line, result in fitted_lines(plan, results)
         if line.segment is not None
     ]
@@ -128,10 +134,10 @@ def fitted_lines(plan: Plan, results: Mapping[str, SegmentResult]) -> Iterator[t
 
 
 def line_notes(line: PlannedLine, result: SegmentResult) -> list[str]:
-    """What is not as usual with a line: its rate, what a table sets, and warnings of its fit."""
+    """Notes of what is unusual with a line: its rate, what a table sets, and warnings of its fit."""
     is_set, offset = line.settings.rate is not None, line.settings.offset_s
     notes = [f"offset {offset:+g} s", *result.warnings] if offset else list(result.warnings)
-    if notes or is_set or abs(result.rate - line.look.usual_rate) >= CHANGED:
+    if notes or is_set or abs(result.rate - line.casting.usual_rate) >= CHANGED:
         notes.insert(0, f"rate {result.rate:.2f}" + " from the table of lines" * is_set)
     return notes
 
@@ -153,8 +159,8 @@ def line_rows(plan: Plan, results: Mapping[str, SegmentResult]) -> Iterator[dict
             "speaker": line.speaker,
             "text": line.text,
             **_set(line.settings),
-            "face": shown_face(line.look.models),
-            "used_voice": _voice(line.look),
+            "face": shown_face(line.casting.models),
+            "used_voice": _voice(line.casting),
         }
         if line.segment is not None and (result := results.get(line.segment.address)) is not None:
             fit = ("speech_s", "overflow_s", "overlap_s", "cut_s")

@@ -31,7 +31,7 @@ from tts2face.types import Progress
 
 SEGMENT_FOLDER = ".segments"  # in the folder of outputs
 MANIFEST_INTERVAL_S = 10.0  # between two writes while the batch runs
-N_LOOKS = 8  # results read at a time, as each takes some 50 ms in a bucket
+N_READ_AT_ONCE = 8  # results read at a time, as each takes some 50 ms in a bucket
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +151,7 @@ def _find_missing(
 ) -> dict[str, Segment]:
     """Segments that are to be rendered; those that are stored are noted."""
     missing = {}
-    with ThreadPoolExecutor(N_LOOKS) as pool:
+    with ThreadPoolExecutor(N_READ_AT_ONCE) as pool:
         for (address, segment), found in zip(needed.items(), pool.map(run.store.result, needed), strict=True):
             if found is None:
                 missing[address] = segment

@@ -14,7 +14,10 @@ from tts2face.session.named_models import Models
 from tts2face.types import SOUND_RATE, exact_rate, first_sample
 
 SEGMENT_SUFFIX = ".mov"
-MOVIE, ALPHA_MOVIE, TRACK = "movie", "vp9", "track"  # what a segment is stored as: H.264, VP9, or motion for exports
+# Media of stored segments: H.264, VP9, or motion for exports.
+MOVIE = "movie"
+ALPHA_MOVIE = "vp9"
+TRACK = "track"
 FILE_PREFIX = "file."  # of the medium of a whole clip in a format of `Session.stream_file`
 REQUEST_FILES = ("audio", "partner", "dictionary", "voice", "timeline")
 HAIR = ("hair", "hair_color")  # of models; not part of the addresses of segments without them
@@ -32,7 +35,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Segment:
-    """What is rendered: the words of a cue, a recording, or silence between cues.
+    """A unit of rendering: the words of a cue, a recording, or silence between cues.
 
     Parameters
     ----------

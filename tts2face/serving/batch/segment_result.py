@@ -16,7 +16,7 @@ class SegmentResult:
     rate
         Speaking rate of the fit; 1 for silence and recordings.
     speech_s
-        Seconds from its cue to the end of its last word, of an excerpt from its begin; 0 without words.
+        Seconds from its cue to the end of its last word, of an excerpt from its start; 0 without words.
     overflow_s
         Seconds by which the speech ends after its cue.
     cut_s

@@ -9,7 +9,7 @@ from lexicon.languages import language_code
 from tts2face.interchange.subtitles.cues import Cue
 from tts2face.request import DRAWN_FACE
 from tts2face.serving.batch.cast import MODEL_NAMES, REQUEST_NAMES, Cast, Role
-from tts2face.serving.batch.distinct_faces import other_look
+from tts2face.serving.batch.distinct_faces import other_face
 from tts2face.serving.batch.lines import NO_SETTINGS, Lines, LineSettings
 from tts2face.session.named_models import Models
 
@@ -17,7 +17,7 @@ UNNAMED = "(no name)"
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class Casting:
     """Models and fields of the request of a line, and the number of its role, from 1; None without a role.
 
     `usual_rate` is the speaking rate of its role, or of the command, without that of the table of lines.
@@ -32,7 +32,7 @@ class Look:
 
 @dataclass(slots=True)
 class Speakers:
-    """Looks of the lines of one subtitle file.
+    """Castings of the lines of one subtitle file.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Speakers:
     on_unknown: Callable[[Cue], None]
     used: set[int] = field(default_factory=set)
     _others: dict[tuple[int, int], int] = field(default_factory=dict)
-    _looks: dict[tuple[int, int], Look] = field(default_factory=dict)
+    _castings: dict[tuple[int, int], Casting] = field(default_factory=dict)
 
     def tell_apart(self, group: Sequence[tuple[Cue, int]]) -> None:
         """Note the lines of one instant, with their parts: several speakers without a role do not look alike."""
@@ -77,14 +77,14 @@ class Speakers:
         chosen = self.settings(cue, part).is_spoken
         return not self.cast.is_silent(cue, self.names[0]) if chosen is None else chosen
 
-    def look(self, cue: Cue, part: int) -> Look:
+    def casting(self, cue: Cue, part: int) -> Casting:
         """Models and request of a line, without its words."""
         key = (cue.number, part)
-        if key not in self._looks:
-            self._looks[key] = self._made(cue, part)
-        return self._looks[key]
+        if key not in self._castings:
+            self._castings[key] = self._made(cue, part)
+        return self._castings[key]
 
-    def _made(self, cue: Cue, part: int) -> Look:
+    def _made(self, cue: Cue, part: int) -> Casting:
         role = self.cast.role_of(cue, self.names[0])
         self.used.add(id(role))
         request = dict(self.request)
@@ -95,10 +95,10 @@ class Speakers:
         request = {name: value for name, value in request.items() if value is not None}
         models, other = self._models(role), self._others.get((cue.number, part), 0)
         if other:
-            models, request = other_look(models, request, other, keeps_face=self.keeps_face)
+            models, request = other_face(models, request, other, keeps_face=self.keeps_face)
         line, usual = self.settings(cue, part), float(request.get("rate", 1.0))
         request |= {name: value for name, value in (("rate", line.rate), ("voice", line.voice)) if value is not None}
-        return Look(models, request, None if role is None else self.cast.roles.index(role) + 1, other, usual)
+        return Casting(models, request, None if role is None else self.cast.roles.index(role) + 1, other, usual)
 
     def _language(self, cue: Cue) -> str | None:
         try:
@@ -119,8 +119,8 @@ class Speakers:
         return models
 
 
-def shown_name(speaker: str, look: Look | None) -> str:
+def shown_name(speaker: str, casting: Casting | None) -> str:
     """Name of a speaker in a plan; of people without a name in one cue, with their number."""
     if speaker:
         return speaker
-    return f"{UNNAMED} {look.other + 1}" if look is not None and look.other else UNNAMED
+    return f"{UNNAMED} {casting.other + 1}" if casting is not None and casting.other else UNNAMED

@@ -39,7 +39,7 @@ NO_TELEMETRY: TelemetryConfig = {"tracing": False, "metrics": False, "logs": Fal
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """What another room adds to a service.
+    """Parts that another room adds to a service.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What clients of OpenAI and Kokoro call voices, models and speeds, and the nearest that the service has.
+"""Names of OpenAI and Kokoro for voices, models and speeds, and the nearest that the service has.
 
 Whatever is replaced is named in the header `ADJUSTED` of the answer.
 """
@@ -48,7 +48,7 @@ MAX_SHOWN = 60  # characters of a client's name in the header
 
 @dataclass(slots=True)
 class Adjustments:
-    """What was replaced by what."""
+    """The values that were replaced, and by which."""
 
     made: list[str] = field(default_factory=list)
 

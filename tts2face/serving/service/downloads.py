@@ -1,4 +1,4 @@
-"""Links to complete files of what has been spoken: the works are kept, and made again when a link is followed."""
+"""Links to complete files of what has been spoken: the orders are kept, and made again when a link is followed."""
 
 import secrets
 from collections import Counter
@@ -18,14 +18,14 @@ class _Link:
 
 
 class Downloads:
-    """Works by the names of their links, each for the key that has asked for it."""
+    """Tasks by the names of their links, each for the key that has asked for it."""
 
     def __init__(self) -> None:
         self._links: dict[str, _Link] = {}
         self._sizes: Counter[str] = Counter()  # characters by owner
 
     def add(self, owner: str, work: Work, format: str) -> str:
-        """Name of a link to the complete file of a work in a format."""
+        """Name of a link to the complete file of a task in a format."""
         name = f"{secrets.token_hex(12)}.{format}"
         complete = replace(work, kind="file", format=format, is_complete=True, keeps_pace=False)
         size = len(str(work.request)) + len(name)

@@ -29,7 +29,8 @@ class RefusedError(HTTPException):
     """
 
     def __init__(self, status: int, code: str, message: str, headers: Mapping[str, str] | None = None) -> None:
-        self.status, self.code, self.message = status, code, message
+        self.status, self.code = status, code
+        self.message = message
         self.headers: dict[str, str]
         super().__init__(status, message, dict(headers or {}))
 

@@ -28,7 +28,9 @@ HEADERS = ((b"x-content-type-options", b"nosniff"), (b"cache-control", b"no-stor
 PROBES = frozenset({"/health", "/healthz", "/readyz", "/metrics"})  # are answered until the end, and not logged
 OTHER = "other"  # route of what no route answers
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
-CLOSE_NORMAL, CLOSE_REFUSED, CLOSE_RESTART = 1000, 1008, 1012  # WebSocket: policy violation; service restart
+CLOSE_NORMAL = 1000  # of WebSockets
+CLOSE_REFUSED = 1008  # policy violation
+CLOSE_RESTART = 1012  # service restart
 HTTP_FORM = "websocket.http.response"  # extension of ASGI: a refused WebSocket gets an HTTP answer
 DRAINING_RETRY_S = 5  # until another server, or this one again, may be asked
 CLOSE_S = 1.0  # for which a client may take to read why its answer ends early
@@ -36,6 +38,7 @@ ERROR_FIELD = "X-Tts2face-Error"  # trailer of an answer that ends before it is 
 FAIL = "end_incomplete"  # name in the state of a scope: ends an answer with trailers, `HttpConnection.fail`
 LEFT = 499  # status, in the log and the metrics only, of a request whose client left before its answer began
 Item = TypeVar("Item")
+CLIENT: ContextVar["Exchange | None"] = ContextVar("client", default=None)  # for whose request the present task works
 
 
 class Exchange:
@@ -45,7 +48,8 @@ class Exchange:
     """
 
     def __init__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        self.scope, self._receive, self._send = scope, receive, send
+        self.scope = scope
+        self._receive, self._send = receive, send
         self.headers: dict[bytes, bytes] = dict(scope["headers"])
         self._method = str(scope.get("method", "WS"))
         if self._method == "HEAD":  # is answered as GET is, without the body
@@ -226,7 +230,7 @@ class Exchange:
             self._task.cancel()
 
     async def revoke(self, refused: RefusedError) -> None:
-        """End the request now, since its key is no longer what it was; the client of a WebSocket is told why."""
+        """End the request now, since its key is no longer what it was; the client of a WebSocket gets the reason."""
         with suppress(TimeoutError):
             async with asyncio.timeout(CLOSE_S):
                 await self.announce_end(refused)
@@ -253,9 +257,6 @@ def draining(advice: str = "repeat the request") -> RefusedError:
     """Refusal of a service that shuts down."""
     headers = {"Retry-After": str(DRAINING_RETRY_S), "Connection": "close"}
     return RefusedError(503, "draining", f"the service is shutting down; {advice}", headers)
-
-
-CLIENT: ContextVar[Exchange | None] = ContextVar("client", default=None)  # for whose request the present task works
 
 
 def while_client_stays() -> AbstractContextManager[None]:

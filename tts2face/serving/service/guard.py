@@ -109,7 +109,8 @@ class Guard:
 
     def _check_head(self, request: "Exchange") -> None:
         """Refuse heads that are too large, and bodies with two lengths, which proxies may divide differently."""
-        settings, scope, given = self._state.settings, request.scope, request.scope["headers"]
+        settings, scope = self._state.settings, request.scope
+        given = scope["headers"]
         size = sum(len(name) + len(value) for name, value in given)
         size += len(scope.get("raw_path") or b"") + len(scope["query_string"])
         if len(given) > settings.headers or size > 1024 * settings.head_kb:

@@ -1,4 +1,4 @@
-"""What a client sends, read ahead of the application within limits of size and time."""
+"""Messages of a client, read ahead of the application within limits of size and time."""
 
 import asyncio
 import time
@@ -13,14 +13,15 @@ READ_AHEAD_BYTES = 256 << 10  # of a client that wait for the application; then 
 
 
 class Incoming:
-    """What a client sends, read ahead of the application, so that its leaving is noticed at once.
+    """Messages of a client, read ahead of the application, so that its leaving is noticed at once.
 
     A body has limits of size and time; it is read from the first time that the application asks for it, so that a
     client which waits for ``100 Continue`` sends nothing that is refused. Everything else is read from the start.
     """
 
     def __init__(self, request: Exchange, receive: Receive, max_bytes: float, max_s: float) -> None:
-        self._request, self._receive, self._max_bytes = request, receive, max_bytes
+        self._request, self._receive = request, receive
+        self._max_bytes = max_bytes
         self._max_s, self._deadline = max_s, time.monotonic() + max_s
         self._n_bytes, self._has_body = 0, False
         self._messages: deque[MutableMapping[str, Any]] = deque()

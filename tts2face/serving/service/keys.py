@@ -26,7 +26,10 @@ NAME = re.compile(r"[A-Za-z0-9._-]{1,64}")
 HASH = re.compile(r"[0-9a-f]{64}")
 NO_SECRET = hashlib.sha256(b"").hexdigest()  # what a request without a key would match
 MINUTE_S, DAY_S = 60.0, 86_400.0
-REQUESTS, SPEECH, PHOTOS = "requests", "speech_s", "photos"  # names of quantities
+# Names of quantities.
+REQUESTS = "requests"
+SPEECH = "speech_s"
+PHOTOS = "photos"
 
 
 @dataclass(frozen=True, slots=True)

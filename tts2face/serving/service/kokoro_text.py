@@ -50,7 +50,8 @@ def _paused(match: "re.Match[str]") -> str:
 
 def _given(match: "re.Match[str]") -> str:
     """A word with its phones."""
-    shown, word, ipa = match[0][:MAX_SHOWN], match[1].strip(), kokoro_ipa(match[2].strip())
+    shown, word = match[0][:MAX_SHOWN], match[1].strip()
+    ipa = kokoro_ipa(match[2].strip())
     if not word:
         raise InputError(f"{shown} has phones and no word; write the word in the square brackets, as {FORM}")
     try:

@@ -185,11 +185,11 @@ class Library:
         return self._table.remove_unused(old, self._blobs.delete) if old else 0
 
     def usage(self, key: ApiKey) -> Usage:
-        """What a key stores."""
+        """Files and bytes that a key stores."""
         return self._table.usage(key.name)
 
     def limits(self, key: ApiKey) -> Usage:
-        """What a key may store."""
+        """Files and bytes that a key may store."""
         settings = self._settings
         most = settings.resources if key.resources is None else key.resources
         most_mb = settings.resources_mb if key.resources_mb is None else key.resources_mb

@@ -45,7 +45,8 @@ class Pace:
     """Slows a sender of sound down to real time once it is `MAX_AHEAD_S` ahead."""
 
     def __init__(self, bytes_per_s: float) -> None:
-        self._bytes_per_s, self._seconds, self._began = bytes_per_s, 0.0, time.monotonic()
+        self._bytes_per_s = bytes_per_s
+        self._seconds, self._began = 0.0, time.monotonic()
 
     async def add(self, n_bytes: int) -> None:
         """Wait after so many more bytes, if they are too far ahead."""
@@ -81,7 +82,8 @@ class LiveText:
         self._most, self._most_a_minute = limits
         self._n_characters, self._minute = 0, Bucket()
         self._sentences: deque[str] = deque()
-        self._n_given, self._n_cancels, self._is_ended = 0, 0, False
+        self._n_given, self._n_cancels = 0, 0
+        self._is_ended = False
         self._heard, self._block = (
             bytearray(),
             0.0,

@@ -1,4 +1,4 @@
-"""Works of a synthesis process, and the parts of their results."""
+"""Tasks of a synthesis process, and the parts of their results."""
 
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
@@ -28,7 +28,7 @@ class DefectError(BackendError):
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What a task makes; all values are JSON.
+    """The result that a task is to make; all values are JSON.
 
     Parameters
     ----------

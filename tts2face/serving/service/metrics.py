@@ -100,9 +100,9 @@ class Metrics:
             for status in STATUSES:
                 self.requests.labels(path, str(status))
 
-    async def look(self) -> None:
-        """Look at what `/readyz` checks."""
-        for check, reason in (await self._readiness.look()).items():
+    async def check(self) -> None:
+        """Take over the checks of `/readyz`."""
+        for check, reason in (await self._readiness.check()).items():
             self._by_check.labels(check).set(not reason)
 
     def as_text(self) -> bytes:

@@ -27,7 +27,7 @@ STREAM_PRIORITY = 0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Waiting:
-    """A work that waits for a place."""
+    """A task that waits for a place."""
 
     cost: float
     begin: float
@@ -87,7 +87,7 @@ class Pool:
 
     @property
     def n_waiting(self) -> int:
-        """Number of works that wait for a process."""
+        """Number of tasks that wait for a process."""
         return sum(len(queue) for queue in self._waiting.values())
 
     @property
@@ -98,7 +98,7 @@ class Pool:
 
     @property
     def load(self) -> float:
-        """Cost of all running works."""
+        """Cost of all running tasks."""
         return sum(process.places.load for process in self.processes)
 
     @property
@@ -137,14 +137,14 @@ class Pool:
         priority: int = STREAM_PRIORITY,
         inputs: InputQueue | None = None,
     ) -> AsyncIterator[Message]:
-        """Messages of a work up to its result; leaving the iteration cancels it. `inputs` as for `WarmProcess.stream`.
+        """Messages of a task up to its result; leaving the iteration cancels it. `inputs` as for `WarmProcess.stream`.
 
         Raises
         ------
         InputError, DataError, BackendError
             As the work.
         BusyError
-            Too many works wait.
+            Too many tasks wait.
         BackendError
             No process can become ready.
         """
@@ -209,7 +209,7 @@ class Pool:
         self._wake()
 
     def _place(self, cost: float, key: str, affinity: str = "") -> Place | None:
-        """A place in a process for a work that begins; None if there is none."""
+        """A place in a process for a task that begins; None if there is none."""
         has_less = self._has_less(cost, key)
         free = [
             process
@@ -221,7 +221,7 @@ class Pool:
         return None if process is None else process.places.take(cost, key, process)
 
     def _has_less(self, cost: float, key: str) -> bool:
-        """Whether a key has begun fewer works of a cost than its share of the places."""
+        """Whether a key has begun fewer tasks of a cost than its share of the places."""
         ready = [process.places for process in self.processes if process.is_ready]
         return has_less_than_share(ready, cost, key, self._keys_that_wait(cost))
 
@@ -232,7 +232,7 @@ class Pool:
         }
 
     def _wake(self) -> None:
-        """Give free places to waiting works, one key after the other; those of one cost do not wait for others."""
+        """Give free places to waiting tasks, one key after the other; those of one cost do not wait for others."""
         if self.n_ready == len(self.processes):
             self.is_prepared.set()
         if self._lack:

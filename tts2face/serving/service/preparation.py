@@ -1,4 +1,4 @@
-"""What synthesis processes do before they are ready, and how much of it is done."""
+"""Preparation of synthesis processes until they are ready, and how much of it is done."""
 
 import asyncio
 from collections import Counter

@@ -16,7 +16,7 @@ Exchange = Callable[[list[Spent], dict[Name, int]], Awaitable[SharedUsage]]  # a
 
 @dataclass(slots=True)
 class Bucket:
-    """What is left of a period's most; it comes back evenly over the period, and is full at first."""
+    """The part of a period's most that is left; it comes back evenly over the period, and is full at first."""
 
     left: float = 0.0
     at: float | None = None
@@ -25,9 +25,10 @@ class Bucket:
     spent: float = 0.0  # of which the other servers do not know yet
 
     def refill(self, now: float, most: float, period_s: float) -> float:
-        """What is left now."""
+        """The part that is left now."""
         self.left = most if self.at is None else min(most, self.left + (now - self.at) * most / period_s)
-        self.at, self.most, self.period_s = now, most, period_s
+        self.at = now
+        self.most, self.period_s = most, period_s
         return self.left
 
     def take(self, amount: float) -> None:

@@ -1,4 +1,4 @@
-"""What the service needs in order to serve, and what of it is missing now."""
+"""Parts that the service needs in order to serve, and those that are missing now."""
 
 import asyncio
 import logging
@@ -14,30 +14,31 @@ from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.pool import Pool
 from tts2face.serving.service.settings import ServiceSettings
 
-LOOK_S = 1.0  # for which what was found is repeated, however often anybody asks
-DATABASE_S = 0.3  # for which a look waits for it; Kubernetes' probes wait for 1 s
+CHECK_S = 1.0  # for which what was found is repeated, however often anybody asks
+DATABASE_S = 0.3  # for which a check waits for it; Kubernetes' probes wait for 1 s
 FOR_STREAMS = ("models", "data", "temporary")
 CHECKS = (*FOR_STREAMS, "database", "workers")
 
 
 class Readiness:
-    """Looks at processes, folders, database and workers; at most one look in `LOOK_S`."""
+    """Checks of processes, folders, database and workers; at most one in `CHECK_S`."""
 
     def __init__(self, pool: Pool, jobs: JobService, settings: ServiceSettings) -> None:
-        self._pool, self._jobs, self._settings = pool, jobs, settings
-        self._looking = asyncio.Lock()
+        self._pool, self._jobs = pool, jobs
+        self._settings = settings
+        self._checking = asyncio.Lock()
         self._asking: asyncio.Task[bool] | None = None  # the database
         self._found: dict[str, str] = {}
-        self._at = -LOOK_S
+        self._at = -CHECK_S
 
-    async def look(self) -> dict[str, str]:
+    async def check(self) -> dict[str, str]:
         """Each of `CHECKS`, with the reason where it is missing and an empty text where it is there.
 
         Streams need those of `FOR_STREAMS`, jobs all. A change is written to the log.
         """
-        async with self._looking:
-            if time.monotonic() >= self._at + LOOK_S:
-                before, self._found = self._found, await self._look()
+        async with self._checking:
+            if time.monotonic() >= self._at + CHECK_S:
+                before, self._found = self._found, await self._check()
                 self._at = time.monotonic()
                 if _missing(before) != _missing(self._found) or not before:
                     level = logging.WARNING if any(self._found.values()) else logging.INFO
@@ -46,7 +47,7 @@ class Readiness:
                     )
         return dict(self._found)
 
-    async def _look(self) -> dict[str, str]:
+    async def _check(self) -> dict[str, str]:
         pool, settings = self._pool, self._settings
         is_reachable = await self._is_reachable()
         preparing = pool.preparation.lack or f"{pool.preparation}; wait, or see the log"

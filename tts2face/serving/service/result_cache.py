@@ -31,7 +31,7 @@ FILE_FIELDS = (
 
 
 def work_hash(work: Work) -> str:
-    """SHA-256 of a work with the contents of its files, of the version of the program, and of the format of entries."""
+    """SHA-256 of a task with the contents of its files, of the version of the program, and of the format of entries."""
     described = work.as_json()
     del described["keeps_pace"]  # what is kept has the full quality
     described["request"] = _with_contents(work.request)
@@ -79,7 +79,7 @@ class ResultCache:
         self.n_bytes = self._store.prune(max_bytes=max_bytes)  # size of all entries
 
     async def messages(self, work: Work, made: AsyncIterator[Message]) -> AsyncIterator[Message]:
-        """Messages of the entry of a work; without one those of `made`, which become an entry in the end."""
+        """Messages of the entry of a task; without one those of `made`, which become an entry in the end."""
         name = await asyncio.to_thread(work_hash, work)
         entry = self._open(name)
         if entry is not None:
@@ -124,7 +124,8 @@ class _Draft:
     """An entry that is being written; given up when it becomes too large or the disk is full."""
 
     def __init__(self, store: FolderStore, max_bytes: int) -> None:
-        self._store, self._max_bytes, self._n_bytes = store, max_bytes, 0
+        self._store, self._max_bytes = store, max_bytes
+        self._n_bytes = 0
         self._temporary: Temporary | None = None
         with suppress(OSError):
             self._temporary = store.draft()

@@ -21,12 +21,12 @@ CREDIT_S = 1.0  # of computing that a key which has been idle is ahead of the ot
 
 
 class InterruptedTaskError(Exception):
-    """What the task waited for is no longer needed; the task goes on."""
+    """The result for which a task waited is no longer needed; the task goes on."""
 
 
 @dataclass(slots=True, eq=False)
 class _Share:
-    """What the calls of one key have computed, in seconds; of a key that was idle, nearly as much as the others."""
+    """Seconds that the calls of one key have computed; of a key that was idle, nearly as much as the others."""
 
     used: float = 0.0
 

@@ -18,14 +18,18 @@ from tts2face.serving.work.resource_check import CHARACTER, CONTENT, FACE, N_MAG
 from tts2face.serving.work.resources import StoredResource
 from tts2face.storage.tensors import read_metadata
 
-MAX_NAME, MAX_CONSENT, MAX_FIT, MAX_MAPPING = 40, 1000, 100_000, 100_000
+# Characters of texts.
+MAX_NAME = 40
+MAX_CONSENT = 1000
+MAX_FIT = 100_000
+MAX_MAPPING = 100_000
 SPEAKING_PICTURE, AVATAR = "picture", "avatar"  # what is made of a photo
 NO_PHOTOS = "this service has no faces of photos; its operator allows them with the setting photos"
 
 
 @dataclass(frozen=True, slots=True)
 class SentPhoto:
-    """What comes with a photo: the statement of the person shown, what it makes, and the choices of each.
+    """Statements with a photo: the statement of the person shown, what it makes, and the choices of each.
 
     A picture that speaks takes the JSON of a ``fit``, a head the colour of its eyes and whether wrinkles stay.
     """

@@ -11,7 +11,7 @@ MAX_STAGES = 200  # of a request that are kept; a WebSocket may have any number
 
 @dataclass(slots=True)
 class Stage:
-    """A part of the time of a request; begin and end in seconds of the monotonic clock."""
+    """A part of the time of a request; its bounds in seconds of the monotonic clock."""
 
     name: str
     begin: float

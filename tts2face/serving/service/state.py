@@ -1,4 +1,4 @@
-"""What all parts of a running service share."""
+"""Parts that all of a running service share: settings, keys, pool, limits, jobs and metrics."""
 
 import asyncio
 import logging
@@ -112,18 +112,18 @@ class ServiceState:
         self.limits.count(self.speaking_key(key))
 
     def work(self, *, models: dict[str, Any] | None = None, **fields: Any) -> Work:
-        """A work with the models of the settings unless it names others."""
+        """A task with the models of the settings unless it names others."""
         defaults = {"talker": self.settings.talker, "face": self.settings.face, "palette": self.settings.palette}
         return Work(models=defaults | (models or {}), owner=self.common_owner, **fields)
 
     def _steps(self) -> tuple[Step, ...]:
-        """What synthesis processes prepare: the longest compilation first, then the voice and the models of a movie."""
-        works = {"voice": self.work(kind="speech", request={"text": WARM_TEXT}),
+        """Steps of synthesis processes: the longest compilation first, then the voice and the models of a movie."""
+        first = {"voice": self.work(kind="speech", request={"text": WARM_TEXT}),
                  "models": self.work(format="mp4", request={"text": WARM_TEXT})}  # fmt: skip
         kernels = {f"kernels of {part}": f"compile_{part}" for part in ("pictures", "motion", "gestures", "sound")}
         return (
-            *(Step(name, call, works["models"].models, is_shared=True) for name, call in kernels.items()),
-            *(Step(name, SYNTHESISE, work_call(work)) for name, work in works.items()),
+            *(Step(name, call, first["models"].models, is_shared=True) for name, call in kernels.items()),
+            *(Step(name, SYNTHESISE, work_call(work)) for name, work in first.items()),
         )
 
     @property
@@ -140,14 +140,14 @@ class ServiceState:
     async def messages(
         self, work: Work, key: ApiKey, inputs: InputQueue | None = None, priority: int = STREAM_PRIORITY
     ) -> AsyncIterator[Message]:
-        """Messages of a work, without the last one; counted in the metrics.
+        """Messages of a task, without the last one; counted in the metrics.
 
-        A work of a higher `priority` runs in its process when no other one can.
+        A task of a higher `priority` runs in its process when no other one can.
 
         Raises
         ------
         RefusedError
-            The work failed, or too many works wait.
+            The task failed, or too many tasks wait.
         ClientDisconnect
             The client of the present request has left; the work no longer waits, or has been stopped.
         """
@@ -187,7 +187,7 @@ class ServiceState:
             log_event("quality", samples=samples, frames=frames)
 
     def _stream(self, work: Work, key: ApiKey, inputs: InputQueue | None, priority: int) -> AsyncIterator[Message]:
-        """Messages of a work from the cache, or from a process."""
+        """Messages of a task from the cache, or from a process."""
         made = self.pool.stream(work, key.name, priority, inputs)
         if self.cache is None or work.kind not in CACHED_KINDS:
             return made
@@ -220,7 +220,7 @@ class ServiceState:
 
 
 def _folders(work: Work) -> set[Path]:
-    """Folders of the files that a work reads, uploads among them."""
+    """Folders of the files that a task reads, uploads among them."""
     values = [value for fields in (work.models, work.request, work.picture) for value in fields.values()]
     return {Path(value).parent for value in values if isinstance(value, str | Path) and Path(value).is_absolute()}
 

@@ -18,10 +18,11 @@ from tts2face.sound.voice_pool import VoicePool
 
 
 class Synthesis:
-    """Handlers that share sessions and take turns; `tasks` by the kinds of their works."""
+    """Handlers that share sessions and take turns; `tasks` by the kinds of their tasks."""
 
     def __init__(self, sessions: SessionCache, tasks: Mapping[str, Task] = TASKS) -> None:
-        self._sessions, self._tasks, self._turns = sessions, tasks, Turns()
+        self._sessions, self._tasks = sessions, tasks
+        self._turns = Turns()
 
     def synthesise(self, call: Call) -> Mapping[str, float]:
         """Send the parts of the result of a ``work``; its measures."""

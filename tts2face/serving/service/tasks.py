@@ -36,7 +36,7 @@ def stream_file(session: "Session", work: Work, _: Inputs) -> Iterator[Event | C
 def timed_speech(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk]:
     """For each sentence an event with its words, phones and visemes in seconds of the whole, then its sound.
 
-    The format of a work without one is PCM. The sound of a complete file comes after all events.
+    The format of a task without one is PCM. The sound of a complete file comes after all events.
     """
     from tts2face.picture.sound_stream import encode_sound
     from tts2face.session.encoded_stream import encode_complete

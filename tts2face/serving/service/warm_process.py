@@ -27,7 +27,7 @@ def synthesis_program(settings: Mapping[str, Any], *, at_once: int = 1, niceness
 
 
 def work_call(work: Work, priority: int = 0, key: str = "") -> dict[str, Any]:
-    """Content of the call `SYNTHESISE` for a work of the present request; keys share the turns of a process."""
+    """Content of the call `SYNTHESISE` for a task of the present request; keys share the turns of a process."""
     return {"work": work.as_json(), "priority": priority, "key": key, "id": REQUEST_ID.get()}
 
 

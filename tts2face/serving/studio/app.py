@@ -51,13 +51,7 @@ STUDIO = Mount(mount_studio, TASKS)
 
 
 def _recording_owner(request: HttpRequest) -> str:
-    """Name of the key of a request that may build talkers.
-
-    Raises
-    ------
-    InputError
-        It may not.
-    """
+    """Name of the key of a request that may build talkers."""
     key = request.state.key
     if "build" not in key.scopes:
         raise InputError(

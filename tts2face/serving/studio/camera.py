@@ -23,7 +23,8 @@ PROGRAM = Program("tts2face.serving.studio.camera_process:HANDLERS", LIMITS)
 TIME = struct.Struct("<d")  # before each JPEG of a client
 MAX_PICTURE_BYTES = 1 << 20
 MAX_LIVE_S = 3600.0
-ENDING_S, LOOK_S = 3.0, 0.05  # for which the end of an earlier connection is waited for, and between looks
+ENDING_S = 3.0  # for which the end of an earlier connection is waited for
+POLL_S = 0.05  # between two checks of it
 REFUSED = 1008  # close code of WebSockets
 
 
@@ -54,10 +55,10 @@ async def follow_camera(connection: WebSocket, key: ApiKey, live: set[str]) -> N
 
 async def _is_free(owner: str, live: set[str]) -> bool:
     """Whether no camera of an owner is live; one that is ending, as of a page that is loaded anew, is waited for."""
-    for _ in range(round(ENDING_S / LOOK_S)):
+    for _ in range(round(ENDING_S / POLL_S)):
         if owner not in live:
             return True
-        await asyncio.sleep(LOOK_S)
+        await asyncio.sleep(POLL_S)
     return owner not in live
 
 

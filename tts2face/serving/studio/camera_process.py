@@ -22,7 +22,9 @@ LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=7200, file_bytes=0, n_files=1
 MAX_SIDE_PX = 1280
 FPS = 20.0  # about; of the averages over time
 DIGITS = 4  # of weights and angles
-CALIBRATING, LIVE, NO_FACE = "calibrating", "live", "no face"
+CALIBRATING = "calibrating"
+LIVE = "live"
+NO_FACE = "no face"
 
 
 class Pictures:
@@ -43,13 +45,7 @@ class Pictures:
 
 
 def decode_picture(content: bytes) -> np.ndarray[Any, np.dtype[np.uint8]]:
-    """(H, W, 3) RGB pixels of a JPEG.
-
-    Raises
-    ------
-    DataError
-        It cannot be decoded or is too large.
-    """
+    """(H, W, 3) RGB pixels of a JPEG."""
     import io
 
     from PIL import Image

@@ -33,7 +33,7 @@ NOT_READY = "the comparison is not made yet; wait a moment"
 
 
 class OpenProject(Protocol):
-    """What a comparison needs of the project that it belongs to (`tts2face.serving.studio.workspace.Workspace`)."""
+    """The project of a comparison (`tts2face.serving.studio.workspace.Workspace`)."""
 
     key: ApiKey
     folder: Path
@@ -44,11 +44,11 @@ class OpenProject(Protocol):
         """The project as it is now."""
 
     async def work(self, kind: str, **more: Any) -> Work:
-        """A work of the project."""
+        """A task of the project."""
 
 
 class ComparedProject:
-    """What a project is compared with, its preview, and measures. All methods belong to the event loop.
+    """The other side of a project, its preview, and measures. All methods belong to the event loop.
 
     Parameters
     ----------
@@ -59,7 +59,8 @@ class ComparedProject:
     def __init__(
         self, state: ServiceState, workspace: OpenProject, memory: PieceMemory, on_change: Callable[[], None]
     ) -> None:
-        self._state, self._workspace, self._on_change = state, workspace, on_change
+        self._state, self._workspace = state, workspace
+        self._on_change = on_change
         self._folder = workspace.folder / FOLDER
         self.preview = ProjectPreview(
             lambda work: state.messages(work, workspace.key),
@@ -84,13 +85,7 @@ class ComparedProject:
         await self._set(Reference("kept", label, project=self._workspace.project))
 
     async def choose(self, content: Any) -> None:
-        """Compare with settings, a recording or a take of a client.
-
-        Raises
-        ------
-        InputError, DataError
-            It is none of them, or names what does not exist.
-        """
+        """Compare with settings, a recording or a take of a client."""
         found = parse_reference(content, self._workspace.folder)
         if found.project is not None:
             raise InputError("a project is kept as it is now; give the kind kept without a project")
@@ -105,13 +100,7 @@ class ComparedProject:
         await self._set(found)
 
     async def import_take(self, source: Path, name: str) -> None:
-        """Keep a Live Link file, and compare with it.
-
-        Raises
-        ------
-        InputError
-            It is no such file, or too large.
-        """
+        """Keep a Live Link file, and compare with it."""
         if Path(name).suffix.lower() != ".csv" or source.stat().st_size > MAX_TAKE_BYTES:
             raise InputError(
                 f"{name[-40:]!r} is no take; give a .csv file of Live Link Face of at most {MAX_TAKE_BYTES / 1e6:g} MB"
@@ -123,7 +112,8 @@ class ComparedProject:
     async def clear(self) -> None:
         """Compare with nothing."""
         self.preview.cancel()
-        self.reference, self.is_ready, self._made_of, self._measured = None, False, "", None
+        self.reference, self._measured = None, None
+        self.is_ready, self._made_of = False, ""
         with translate_disk_errors(self._folder), suppress(FileNotFoundError):
             await asyncio.to_thread(shutil.rmtree, self._folder)
         self._on_change()
@@ -137,7 +127,8 @@ class ComparedProject:
         except Tts2faceError as wrong:
             self._refuse(str(wrong))
             return
-        folder, key, more = self._workspace.folder, self._workspace.key, self._source(self.reference)
+        folder, key = self._workspace.folder, self._workspace.key
+        more = self._source(self.reference)
         made_of = json.dumps([project_json(project, folder), more], sort_keys=True, default=str)
         if made_of == self._made_of and (self.is_ready or self.preview.is_running):
             return
@@ -198,7 +189,8 @@ class ComparedProject:
         with translate_disk_errors(self._folder):
             self._folder.mkdir(exist_ok=True)
         await asyncio.to_thread(write_atomically, self._folder / FILE, content.encode())
-        self.reference, self.is_ready, self._measured = reference, False, None
+        self.reference, self._measured = reference, None
+        self.is_ready = False
         self._on_change()
         self.follow()
 

@@ -1,4 +1,4 @@
-"""Edits of a project, as a page sends them. Pure: no files, no clock, no pages.
+"""Edits of a project, as a page sends them: pure, without files, clock and pages.
 
 An edit is a JSON object with a ``kind`` and the fields of `EDITS`, from which ``components/protocol.js`` is made.
 A new kind of edit:

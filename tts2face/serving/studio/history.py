@@ -1,4 +1,4 @@
-"""The history of a project: what was before, what was undone. Pure."""
+"""The history of a project: its earlier and its undone states (pure)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
@@ -61,26 +61,14 @@ class History:
         return History(change(self.present), past, future)
 
     def undo(self) -> "History":
-        """The state before the last edit.
-
-        Raises
-        ------
-        InputError
-            There is none.
-        """
+        """The state before the last edit."""
         if not self.past:
             raise InputError("there is nothing to undo")
         last = self.past[-1]
         return History(last.project, self.past[:-1], (*self.future, Step(self.present, last.topic)))
 
     def redo(self) -> "History":
-        """The state that was undone last.
-
-        Raises
-        ------
-        InputError
-            There is none.
-        """
+        """The state that was undone last."""
         if not self.future:
             raise InputError("there is nothing to redo")
         last = self.future[-1]

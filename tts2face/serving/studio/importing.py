@@ -59,11 +59,6 @@ async def import_file(studio: StudioHost, key: ApiKey, path: Path, name: str, tr
         Its name at the client.
     transcript
         Words of a recording, if they are known.
-
-    Raises
-    ------
-    InputError, DataError
-        It is none of the kinds, damaged or too large.
     """
     suffix, title = Path(name).suffix.lower(), _title(Path(name).stem)
     if suffix == ".json":

@@ -1,4 +1,4 @@
-"""What a project is compared with: itself as it was kept, itself with other settings, or recorded motion. Pure."""
+"""The other side of a comparison: the project as it was kept, or with other settings, or recorded motion (pure)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -14,7 +14,10 @@ from tts2face.session.project import Project
 from tts2face.session.project_file import parse_project, project_json
 from tts2face.source import Recorded, Spoken
 
-KEPT, SETTINGS, RECORDING, TAKE = "kept", "settings", "recording", "take"
+KEPT = "kept"
+SETTINGS = "settings"
+RECORDING = "recording"
+TAKE = "take"
 KINDS = (KEPT, SETTINGS, RECORDING, TAKE)
 NOT_SETTINGS = frozenset(
     {"text", "audio", "idle", "listen", "partner", "timeline", "dictionary"}
@@ -36,11 +39,6 @@ class Reference:
         What it is, for people.
     offset
         Second of the recorded motion at which the project's sound begins.
-
-    Raises
-    ------
-    InputError
-        The kind is unknown, or what it needs is missing.
     """
 
     kind: str
@@ -83,13 +81,7 @@ class _Written:
 
 
 def reference_project(reference: Reference, project: Project) -> Project:
-    """The project whose clip is the A, given the project as it is now; for recorded motion, what that depends on.
-
-    Raises
-    ------
-    InputError
-        The settings do not fit the project.
-    """
+    """The project whose clip is the A, given the project as it is now; for recorded motion, what that depends on."""
     if reference.kind == KEPT:
         assert reference.project is not None
         return reference.project
@@ -117,13 +109,7 @@ def reference_json(reference: Reference, folder: Path) -> dict[str, Any]:
 
 
 def parse_reference(content: Any, folder: Path) -> Reference:
-    """Reference of `reference_json`.
-
-    Raises
-    ------
-    InputError, DataError
-        It is none, or damaged.
-    """
+    """Reference of `reference_json`."""
     given = checked(_Written, content, "the comparison", InputError)
     kept = None if given.project is None else parse_project(given.project, "the kept project", folder)
     return Reference(given.kind, given.label, kept, given.request, given.models, given.recording, given.offset)

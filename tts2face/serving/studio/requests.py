@@ -1,4 +1,4 @@
-"""Works of a project for the synthesis processes, and what a client may write into a project.
+"""Tasks of a project for the synthesis processes, and what a client may write into a project.
 
 A client names models, voices and assets; no path of a client reaches the file system.
 """
@@ -58,13 +58,7 @@ async def check_options(state: ServiceState, key: ApiKey, folder: Path, part: st
 
 
 async def check_project(state: ServiceState, key: ApiKey, folder: Path, content: Any) -> Project:
-    """Project of a client's JSON, whose models, voices and assets exist for the key.
-
-    Raises
-    ------
-    InputError, DataError
-        It is no project, or names what does not exist.
-    """
+    """Project of a client's JSON, whose models, voices and assets exist for the key."""
     if not isinstance(content, dict):
         raise DataError("the file is not a project; choose a file written by the studio")
     checked = {part: await check_options(state, key, folder, part, content.get(part, {})) for part in OPTION_PARTS}
@@ -132,7 +126,7 @@ def studio_folder(state: ServiceState) -> Path:
 
 
 async def data_of(state: ServiceState, key: ApiKey, work: Work) -> bytes:
-    """All bytes of a work's result."""
+    """All bytes of a task's result."""
     content = bytearray()
     async with aclosing(state.messages(work, key)) as messages:  # type: ignore[type-var]
         async for message in messages:

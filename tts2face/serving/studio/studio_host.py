@@ -1,4 +1,4 @@
-"""What the parts of a studio need of it, without an import circle."""
+"""The studio as its parts need it, without an import circle."""
 
 from pathlib import Path
 from typing import Protocol

@@ -40,7 +40,7 @@ class Upload:
 
 @dataclass(frozen=True, slots=True)
 class JobOrder:
-    """What a client has asked for, before it is a job."""
+    """A job that a client asks for, before it is queued."""
 
     state: ServiceState
     key: ApiKey

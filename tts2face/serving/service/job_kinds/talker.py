@@ -15,7 +15,7 @@ from tts2face.serving.work.client import JobClient
 from tts2face.serving.work.job_record import OPEN_STATES
 from tts2face.serving.work.resource_check import TALKER
 
-MAX_OPEN, MAX_LOOKED_AT = 4, 1000  # talkers in work of a key; its newest jobs that are looked at
+MAX_OPEN, MAX_COUNTED = 4, 1000  # talkers in work of a key; its newest jobs that are counted
 RECORDING = "recording"  # of the files of the job, which differ in their endings
 SUBTITLE_SUFFIXES = (".srt", ".vtt")
 
@@ -99,7 +99,7 @@ async def _check_open_jobs(order: JobOrder) -> None:
     """Refuse a recording of a key with many that wait: each keeps its file until it is built."""
 
     def count(client: JobClient) -> int:
-        pages = [client.table.page(order.key.name, state, None, MAX_LOOKED_AT) for state in OPEN_STATES]
+        pages = [client.table.page(order.key.name, state, None, MAX_COUNTED) for state in OPEN_STATES]
         return sum(job.kind == TALKER for page in pages for job in page)
 
     n_open = await order.state.jobs.call(count)

@@ -36,7 +36,7 @@ async def readyz(request: HttpRequest) -> JSONResponse:
     """
     state = service_state(request)
     draining = "the service is shutting down; ask another server" if state.is_draining else ""
-    found = await state.readiness.look() | {ACCEPTING: draining}
+    found = await state.readiness.check() | {ACCEPTING: draining}
     is_ready = not any(found[name] for name in (*FOR_STREAMS, ACCEPTING))
     content = {
         "status": "ready" if is_ready else "not ready", "checks": {name: not reason for name, reason in found.items()},
@@ -51,5 +51,5 @@ async def metrics(request: HttpRequest) -> Response:
     if "admin" not in request.state.key.scopes:
         raise RefusedError(403, "forbidden", "the metrics need a key with the scope admin")
     found = service_state(request).metrics
-    await found.look()
+    await found.check()
     return Response(await asyncio.to_thread(found.as_text), media_type="text/plain; version=0.0.4")

@@ -1,4 +1,4 @@
-"""What Kokoro-FastAPI has beyond OpenAI's interface: captioned speech, phones, download links, combined voices."""
+"""Routes of Kokoro-FastAPI beyond OpenAI's interface: captioned speech, phones, download links, combined voices."""
 
 import asyncio
 import base64

@@ -60,7 +60,8 @@ CONTENTS = {
 
 
 def _add_reading(kind: str) -> None:
-    single, many, path = Resource[FACTS[kind]], ResourceList[FACTS[kind]], f"/{plural(kind)}"  # type: ignore[valid-type]
+    single, many = Resource[FACTS[kind]], ResourceList[FACTS[kind]]  # type: ignore[valid-type]
+    path = f"/{plural(kind)}"
 
     @router.get(path, response_model=many, summary=f"List {plural(kind)}")
     async def list_resources(request: HttpRequest) -> dict[str, Any]:

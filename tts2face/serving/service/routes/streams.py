@@ -68,7 +68,7 @@ class Converter(Protocol):
         ...
 
     def failed(self, content: dict[str, Any]) -> bytes:
-        """What follows the bytes so far when the result ends with an error; empty: their form has no place for it."""
+        """Bytes that follow those so far when the result ends with an error; empty: their form has no place for it."""
         ...
 
 
@@ -100,7 +100,7 @@ def json_line(content: Any) -> bytes:
 
 
 async def timed_speech(request: HttpRequest | WebSocket, work: Work) -> tuple[list[dict[str, Any]], bytes]:
-    """All events of a work of kind ``speech``, and its sound as 16-bit PCM."""
+    """All events of a task of kind ``speech``, and its sound as 16-bit PCM."""
     events: list[dict[str, Any]] = []
     sound = bytearray()
     state = service_state(request)

@@ -1,4 +1,4 @@
-"""What a person can choose from in a project: voices, languages, models, styles with their colours."""
+"""Choices of a person in a project: voices, languages, models, styles with their colours."""
 
 import asyncio
 import os

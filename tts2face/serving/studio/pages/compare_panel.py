@@ -17,7 +17,10 @@ from tts2face.serving.studio.reference import RECORDING, SETTINGS, TAKE
 from tts2face.serving.work.resource_check import TALKER
 from tts2face.types import HEAD_CHANNELS
 
-RECORDINGS, LIVE_LINK, SEED, TALKERS = "a recording of the talker", "a Live Link take", "another seed", "talker "
+RECORDINGS = "a recording of the talker"
+LIVE_LINK = "a Live Link take"
+SEED = "another seed"
+TALKERS = "talker "
 SETTINGS_OFFERED: Mapping[str, Mapping[str, Any]] = {
     "gestures from fields": {"gestures": "fields"},
     "gestures from noise": {"gestures": "noise"},
@@ -33,7 +36,7 @@ KNOWN = "The talker is made of this recording too: its lips are closer to it tha
 
 
 class ComparePanel:
-    """What the project is compared with, and measures of both."""
+    """Choice of the other side of a comparison, and measures of both."""
 
     def __init__(self, page: OpenPage) -> None:
         self._page = page

@@ -1,4 +1,4 @@
-"""What all pages share: style, dark mode, icons with names, and errors that are shown."""
+"""The frame of all pages: style, dark mode, icons with names, and errors that are shown."""
 
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager

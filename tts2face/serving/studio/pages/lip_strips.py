@@ -1,4 +1,4 @@
-"""Strips of lips as SVG: outlines of `tts2face.serving.studio.tasks.explain` at the instants of a phone. Pure."""
+"""Strips of lips as SVG: outlines of `tts2face.serving.studio.tasks.explain` at the instants of a phone (pure)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

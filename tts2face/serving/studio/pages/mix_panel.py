@@ -67,7 +67,7 @@ class MixPanel:
         self._source.set_options(list(palette.styles), value=chosen)
 
     def mix(self) -> StyleMix:
-        """What the sliders say."""
+        """The values of the sliders."""
         return StyleMix(
             str(self._source.value),
             {name: float(slider.value) for name, slider in self._shares.items() if slider.value},

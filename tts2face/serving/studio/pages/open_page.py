@@ -1,4 +1,4 @@
-"""What the panels of the page "animate" need of it."""
+"""The page "animate" as its panels need it."""
 
 from typing import Any, Protocol
 

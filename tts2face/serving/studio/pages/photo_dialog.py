@@ -168,8 +168,9 @@ class PhotoDialog:
         self._upload.reset()
         self._places.hide()
         self._show_found(False)
-        self._name.value, self._consent.value, self._status.text = "", "", ""
-        self._makes.value, self._eyes.value, self._age_keep.value = SPEAKING_PICTURE, "", False
+        self._name.value = self._consent.value = self._status.text = ""
+        self._makes.value = SPEAKING_PICTURE
+        self._eyes.value, self._age_keep.value = "", False
         self._show_choice()
 
     def _delete_picture(self) -> None:

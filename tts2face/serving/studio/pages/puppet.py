@@ -39,7 +39,8 @@ class PuppetPage:
     """The camera and the takes of a key."""
 
     def __init__(self, studio: Studio, key: ApiKey) -> None:
-        self._studio, self._key, self._takes = studio, key, studio.takes
+        self._studio, self._key = studio, key
+        self._takes = studio.takes
         self._shown: object = None
         self._sound_of = ""  # take that gets the next uploaded sound
 

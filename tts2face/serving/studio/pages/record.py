@@ -140,7 +140,8 @@ class _RecordingPage:
     """The page of one recording."""
 
     def __init__(self, recordings: Recordings, number: str, folder: Path) -> None:
-        self._recordings, self._number, self._folder = recordings, number, folder
+        self._recordings = recordings
+        self._number, self._folder = number, folder
         self._content = recordings.store.prompts(number)
         self._shown: object = None
 

@@ -82,7 +82,8 @@ class SpeechPanel:
 
     async def _models(self) -> dict[str, dict[str, str]]:
         """Shown names of talkers, faces and palettes, by kind and value."""
-        library, key, styles = self._page.studio.state.library, self._page.workspace.key, self._page.studio.styles
+        library, styles = self._page.studio.state.library, self._page.studio.styles
+        key = self._page.workspace.key
         found = {
             kind: {name: _model_name(name) for name in await models(library, key, kind)}
             for kind in (TALKER, FACE, PALETTE)

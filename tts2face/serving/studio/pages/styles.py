@@ -51,7 +51,8 @@ class PalettePage:
     """The styles of a key."""
 
     def __init__(self, studio: Studio, key: ApiKey) -> None:
-        self._studio, self._key, self._styles = studio, key, studio.styles
+        self._studio, self._key = studio, key
+        self._styles = studio.styles
         self._shown: object = None
         self._pictures: dict[str, ui.element] = {}  # of the styles
         self._missing: list[str] = []  # styles whose picture is not made yet
@@ -264,5 +265,5 @@ class PalettePage:
             self._refresh()
 
         used = await self._styles.users(self._key, name)
-        told = f" It is removed from {named(used)}, where the default style takes its place." if used else ""
-        await confirm(f"Delete the style {name!r}?{told} This cannot be undone.", "Delete", delete)
+        consequence = f" It is removed from {named(used)}, where the default style takes its place." if used else ""
+        await confirm(f"Delete the style {name!r}?{consequence} This cannot be undone.", "Delete", delete)

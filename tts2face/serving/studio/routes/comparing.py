@@ -19,7 +19,7 @@ router = APIRouter(prefix=f"{API}/projects/{{project}}", include_in_schema=False
 
 @router.get("/comparison")
 async def show_comparison(request: HttpRequest, project: str) -> dict[str, Any]:
-    """What the project is compared with."""
+    """The other side of the comparison."""
     async with opened(request, project) as workspace:
         return comparison_state(workspace.comparison)
 

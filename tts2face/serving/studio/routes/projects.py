@@ -1,4 +1,4 @@
-"""What a page fetches, and what a program may ask of the studio (docs/studio.md). Errors as those of the service."""
+"""Projects as a page fetches them and a program may ask for them (docs/studio.md), with the errors of the service."""
 
 import asyncio
 import tempfile
@@ -130,7 +130,7 @@ async def redo(request: HttpRequest, project: str) -> dict[str, Any]:
 async def preview(
     request: HttpRequest, project: str, have: int | None = None, wait: float = Query(default=0.0, ge=0, le=WAIT_S)
 ) -> Response:
-    """What has changed of the preview since revision `have`; after up to `wait` seconds, complete."""
+    """Changes of the preview since revision `have`; after up to `wait` seconds, complete."""
     async with opened(request, project) as workspace:
         workspace.show()
         if wait or not workspace.preview.current.pieces:

@@ -70,13 +70,7 @@ def recording_router(recordings: Recordings, owner: Owner) -> APIRouter:
 
 @asynccontextmanager
 async def uploaded_take(request: Request) -> AsyncIterator[tuple[Path, str]]:
-    """File of a take that a request holds, and its suffix: a video, or a Live Link Face table.
-
-    Raises
-    ------
-    InputError
-        It is of another kind.
-    """
+    """File of a take that a request holds, and its suffix: a video, or a Live Link Face table."""
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     suffix = {**SUFFIXES, "text/csv": ".csv"}.get(kind)
     if suffix is None:
@@ -88,13 +82,7 @@ async def uploaded_take(request: Request) -> AsyncIterator[tuple[Path, str]]:
 
 
 async def receive_take(parts: AsyncIterator[bytes], target: Path) -> None:
-    """Write an uploaded take to a file.
-
-    Raises
-    ------
-    InputError
-        It is empty or too large.
-    """
+    """Write an uploaded take to a file."""
     n_bytes = 0
     with target.open("xb") as file:
         async for part in parts:
