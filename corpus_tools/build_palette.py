@@ -48,7 +48,8 @@ from tts2face.lips.performer import CLOSED_FRAME_SHARE
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import eye_aperture, inner_lip_gaps
-from tts2face.models.palette import Palette, write_palette
+from tts2face.models.palette import Palette
+from tts2face.models.palette_file import write_palette
 from tts2face.models.talker import NOT_STATED
 from tts2face.types import Progress
 

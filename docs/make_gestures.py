@@ -11,7 +11,8 @@ from corpus_tools.studies.gestures.analysis import StudyOptions, StyleStudy, Tra
 from corpus_tools.studies.gestures.gaze import GazeStudy, study_gaze
 from corpus_tools.studies.gestures.moods import MoodOptions, MoodStudy, mood_rows, study_moods
 from corpus_tools.studies.gestures.page import gaze_panels, panels_png
-from tts2face.models.palette import MEASURED_STYLE, load_palette
+from tts2face.models.palette import MEASURED_STYLE
+from tts2face.models.palette_file import load_palette
 from tts2face.session.session import Session
 
 PAGE = Path(__file__).with_name("gestures.md")

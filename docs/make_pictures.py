@@ -22,7 +22,7 @@ from lexicon.phones import ipa_to_arpabet
 from lexicon.sequence import SILENCE
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
-from tts2face.models.palette import load_palette
+from tts2face.models.palette_file import load_palette
 from tts2face.models.talker_file import load_talker
 from tts2face.photo.face_from_photo import face_from_photo
 from tts2face.picture.options import Picture

@@ -42,9 +42,8 @@ from tts2face.models.palette import (
     FeatureChange,
     Palette,
     Style,
-    read_palette,
-    write_palette,
 )
+from tts2face.models.palette_file import read_palette, write_palette
 from tts2face.models.talker import ShapeModel, Talker, Utterance
 from tts2face.models.talker_file import read_talker, write_talker
 from tts2face.plugins import declared

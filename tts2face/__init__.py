@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from tts2face.models.face import Face as Face
     from tts2face.models.face_loading import load_face as load_face
     from tts2face.models.palette import Palette as Palette
-    from tts2face.models.palette import load_palette as load_palette
+    from tts2face.models.palette_file import load_palette as load_palette
     from tts2face.models.talker import Talker as Talker
     from tts2face.models.talker_file import load_talker as load_talker
     from tts2face.photo.face_from_photo import face_from_photo as face_from_photo
@@ -171,7 +171,8 @@ _MODULES = {
     "tts2face.interchange.characters.importing": ("ImportReport", "ImportedFace", "import_face", "save_face"),
     "tts2face.models.face": ("Face",),
     "tts2face.models.face_loading": ("load_face",),
-    "tts2face.models.palette": ("Palette", "load_palette"),
+    "tts2face.models.palette": ("Palette",),
+    "tts2face.models.palette_file": ("load_palette",),
     "tts2face.models.talker": ("Talker",),
     "tts2face.models.talker_file": ("load_talker",),
     "tts2face.photo.face_from_photo": ("face_from_photo",),

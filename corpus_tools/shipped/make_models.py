@@ -127,7 +127,7 @@ def make_palette(making: Making) -> None:
 def derive_styles(making: Making) -> None:
     """The derived styles of the palette that is there, after a change of their table alone."""
     from corpus_tools.decomposition.decompose import read_derived_styles
-    from tts2face.models.palette import load_palette, write_palette
+    from tts2face.models.palette_file import load_palette, write_palette
 
     path = making.out / "starter.palette"
     palette = load_palette(str(path))

@@ -54,7 +54,7 @@ def gesture_report(model: str, name: str, on_progress: Progress) -> str:
     """Page that compares a palette's gestures with motion from its fields, noise and published fields."""
     from corpus_tools.studies.gestures.analysis import StudyOptions, study_gestures
     from corpus_tools.studies.gestures.page import gestures_page
-    from tts2face.models.palette import load_palette
+    from tts2face.models.palette_file import load_palette
 
     return gestures_page(study_gestures(name, load_palette(model), StudyOptions(), on_progress))
 

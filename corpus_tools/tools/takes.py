@@ -19,7 +19,7 @@ from corpus_tools.decomposition.recordings import check_gesture_take
 from corpus_tools.dense.avatar import build_avatar
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError
-from tts2face.models.palette import load_palette
+from tts2face.models.palette_file import load_palette
 from tts2face.processes.child import Call, Handler
 from tts2face.serving.work.resource_check import FACE, RefusedFileError, check_resource, read_statement
 

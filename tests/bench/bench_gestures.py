@@ -15,7 +15,8 @@ from corpus_tools.studies.gestures.clips import replace_style, select_recordings
 from corpus_tools.studies.gestures.measures import split_recordings
 from tts2face.gestures.field import Field, FieldState, initial_state, sample_field
 from tts2face.gestures.stream import GestureFields
-from tts2face.models.palette import GESTURE_FPS, Palette, Style, load_palette
+from tts2face.models.palette import GESTURE_FPS, Palette, Style
+from tts2face.models.palette_file import load_palette
 
 SECONDS = 120
 PARTS = (0.1, 1 / 3, 1.0)

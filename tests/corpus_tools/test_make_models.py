@@ -11,7 +11,7 @@ from corpus_tools.shipped import make_models
 from corpus_tools.shipped.drawn.build_drawn import CAST
 from corpus_tools.shipped.drawn.worn import HAIRCUTS
 from tts2face.models.face_names import OF_FACE
-from tts2face.models.palette import load_palette
+from tts2face.models.palette_file import load_palette
 from tts2face.models.talker_file import load_talker
 from tts2face.storage.shipped import SHIPPED_FOLDER
 

@@ -12,7 +12,7 @@ from lexicon.errors import InputError
 from tests.photo.pictures import still
 from tests.processes.answered import ordered
 from tts2face.models.face_file import read_face
-from tts2face.models.palette import load_palette, read_palette
+from tts2face.models.palette_file import load_palette, read_palette
 from tts2face.serving.work.resource_check import CONTENT, STATEMENT
 from tts2face.serving.work.tools import TAKES
 

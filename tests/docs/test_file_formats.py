@@ -11,7 +11,8 @@ from lexicon.text_marks import parse_marks
 from tests.docs.blocks import DOCS, code_blocks
 from tts2face.gestures.timeline import parse_style
 from tts2face.gestures.timeline_file import parse_timeline
-from tts2face.models.palette import Palette, load_palette
+from tts2face.models.palette import Palette
+from tts2face.models.palette_file import load_palette
 from tts2face.models.talker_file import load_talker
 from tts2face.request import Request
 from tts2face.session.prepared import prepare

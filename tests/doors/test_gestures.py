@@ -15,7 +15,8 @@ from tts2face.face.deformation import moved_landmarks
 from tts2face.face.gestures import gesture_face
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
-from tts2face.models.palette import FEATURES, load_palette, write_palette
+from tts2face.models.palette import FEATURES
+from tts2face.models.palette_file import load_palette, write_palette
 from tts2face.request import GAZES, Request
 from tts2face.session.session import Session
 from tts2face.storage.shipped import SHIPPED_FOLDER

@@ -14,7 +14,7 @@ from lexicon.errors import InputError
 from lexicon.languages import language_code
 from tts2face import __version__
 from tts2face.models.face_loading import load_face
-from tts2face.models.palette import load_palette
+from tts2face.models.palette_file import load_palette
 from tts2face.models.talker_file import load_talker
 from tts2face.request import OWN_FACE
 from tts2face.session import catalogue

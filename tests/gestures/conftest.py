@@ -6,7 +6,8 @@ from dataclasses import replace
 import pytest
 
 from tests.world import World, made_style
-from tts2face.models.palette import Derivation, FeatureChange, Palette, load_palette
+from tts2face.models.palette import Derivation, FeatureChange, Palette
+from tts2face.models.palette_file import load_palette
 
 LENGTHS = (90,) * 20  # frames
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.models.palette import KIND, Derivation, Palette, Style, load_palette, read_palette, write_palette
+from tts2face.models.palette import Derivation, Palette, Style
+from tts2face.models.palette_file import KIND, load_palette, read_palette, write_palette
 from tts2face.storage.tensors import read_tensors, write_tensors
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.models.palette import FeatureChange, Palette, load_palette, read_palette, write_palette
+from tts2face.models.palette import FeatureChange, Palette
 from tts2face.models.palette_editing import (
     StyleMix,
     add_derivation,
@@ -15,6 +15,7 @@ from tts2face.models.palette_editing import (
     remove_style,
     rename_style,
 )
+from tts2face.models.palette_file import load_palette, read_palette, write_palette
 
 
 def test_one_style_in_full_is_that_style():

@@ -14,7 +14,8 @@ from tts2face.gestures.presentation import LowPass, filtered_spread
 from tts2face.gestures.prosody import prosody_features, speech_intensity
 from tts2face.gestures.stream import GestureFields, GestureStream
 from tts2face.gestures.timeline import Timeline
-from tts2face.models.palette import FEATURES, GESTURE_FPS, Palette, load_palette
+from tts2face.models.palette import FEATURES, GESTURE_FPS, Palette
+from tts2face.models.palette_file import load_palette
 from tts2face.types import Waveform
 
 RATE = 8_000

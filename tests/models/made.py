@@ -12,7 +12,7 @@ from tests.picture.tiny_face import tiny_face
 from tests.picture.tiny_talker import own_talker
 from tts2face.models.audio_map import FEATURE_SIZES, AudioMap
 from tts2face.models.face_file import Identity, write_face
-from tts2face.models.palette import write_palette
+from tts2face.models.palette_file import write_palette
 from tts2face.models.phone_network import N_PHONES_SEEN, N_PLACE, PhoneNetwork
 from tts2face.models.talker import Talker, Utterance
 from tts2face.models.talker_file import write_talker

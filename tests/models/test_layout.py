@@ -16,7 +16,7 @@ from tests.models.made import write_made_face, write_made_palette, write_made_ta
 from tests.picture.tiny_talker import own_talker
 from tts2face.models.audio_map import FEATURE_SIZES
 from tts2face.models.face_file import read_face
-from tts2face.models.palette import read_palette
+from tts2face.models.palette_file import read_palette
 from tts2face.models.talker_file import read_talker
 from tts2face.numeric.least_squares import bounded_least_squares
 from tts2face.picture.options import Picture

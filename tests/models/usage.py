@@ -33,7 +33,7 @@ from tts2face.lips.exemplar import (
 from tts2face.lips.retargeting import build_retargeter
 from tts2face.models.face_file import read_face
 from tts2face.models.face_loading import load_face
-from tts2face.models.palette import read_palette
+from tts2face.models.palette_file import read_palette
 from tts2face.models.talker import speech_channels
 from tts2face.models.talker_file import load_talker, read_talker
 from tts2face.picture.options import Picture

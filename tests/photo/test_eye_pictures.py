@@ -10,7 +10,7 @@ from tts2face.models.face import Face
 from tts2face.photo.eyes import IRISES
 from tts2face.photo.found_face import FoundFace
 from tts2face.photo.photograph import Photograph
-from tts2face.photo.shapes import EYES
+from tts2face.photo.surface import EYES
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import MeshRenderer, mesh_renderer
 

@@ -20,7 +20,7 @@ from tts2face.models.landmarks import inner_lip_gaps, lip_opening
 from tts2face.models.light import Photographed
 from tts2face.photo.found_face import FoundFace
 from tts2face.photo.photograph import Photograph, split_number
-from tts2face.photo.shapes import EYES, LIDS, SKIN
+from tts2face.photo.surface import EYES, LIDS, SKIN
 from tts2face.picture.baked.scene import BEHIND_SHARE
 from tts2face.picture.baked.surface import NEAR, TRIANGLE_MASK, nearest_triangles, project
 from tts2face.picture.options import Picture

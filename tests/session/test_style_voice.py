@@ -5,8 +5,9 @@ import pytest
 from lexicon.sentences import Sentence, split_sentences
 from lexicon.text_marks import parse_marks
 from tests.world import World
-from tts2face.models.palette import PLAIN, Delivery, load_palette
+from tts2face.models.palette import PLAIN, Delivery
 from tts2face.models.palette_editing import StyleMix, add_derivation, mix_styles
+from tts2face.models.palette_file import load_palette
 from tts2face.request import Request
 from tts2face.session.speech import delivery_of, sentence_sound, speak_sentence
 from tts2face.sound.voice_pool import VoicePool

@@ -5,8 +5,9 @@ The recipe for a model:
 1. derive its dataclass from `StoredModel`, and annotate each array with its `Tensor`, or with `Stored` where the file
    holds another form of it: ``mean: Annotated[NDArray[np.float32], Tensor("float32", ("features",))]``;
 2. annotate what is in the metadata with `InHeader`, a tuple of arrays with `Numbered`, a model within it with `Part`;
-3. name sizes that several arrays share; ``{own}`` in such a name is that of the part, ``{prefix}`` that of all its
-   arrays; ``{last}``, ``{at}`` and ``{next}`` are numbers of `Numbered` arrays;
+3. name sizes that several arrays share. ``{prefix}`` in such a name is that of all arrays of the model, ``{own}`` the
+   prefix after its first word, ``{around}`` and ``{name}`` all of this but its last word, and that word; ``{last}``,
+   ``{at}`` and ``{next}`` are numbers of `Numbered` arrays;
 4. say in `prepare_check` what follows for sizes from the rest of the file, and refuse in `check_stored` what no single
    array shows.
 """
@@ -170,7 +171,9 @@ def header_checks(model: type[StoredModel]) -> dict[str, Check]:
 
 def stored_tensors(model: type[StoredModel], prefix: str, arrays: Arrays) -> dict[str, Tensor]:
     """Requirements of the arrays of a model itself, without its parts; of `Numbered` ones those in a file's arrays."""
-    known = {"prefix": prefix, "own": prefix.rpartition(".")[2]}
+    own = prefix.partition(".")[2]
+    around, _, name = own.rpartition(".")
+    known = {"prefix": prefix, "own": own, "around": around, "name": name}
     before: dict[str, Tensor] = {}
     layers: dict[int, dict[str, Tensor]] = {}
     after: dict[str, Tensor] = {}
@@ -179,11 +182,12 @@ def stored_tensors(model: type[StoredModel], prefix: str, arrays: Arrays) -> dic
             found = after if layers else before
             found[_joined(prefix, _name(field, note))] = _sized(note.tensor, known)
         elif isinstance(note, Numbered):
-            for at, (name, stored) in enumerate(note.listed(field, note.count_in(arrays, prefix))):
+            for at, (layer, stored) in enumerate(note.listed(field, note.count_in(arrays, prefix))):
                 numbers = {"last": str(at - 1), "at": str(at), "next": str(at + 1)}
-                layers.setdefault(at, {})[_joined(prefix, name)] = _sized(stored.tensor, known | numbers)
+                layers.setdefault(at, {})[_joined(prefix, layer)] = _sized(stored.tensor, known | numbers)
     # All arrays of a layer come before those of the next one, which has as many inputs.
-    return before | {name: tensor for layer in layers.values() for name, tensor in layer.items()} | after
+    ordered = {name: tensor for at in sorted(layers) for name, tensor in layers[at].items()}
+    return before | ordered | after
 
 
 def _sized(tensor: Tensor, known: Mapping[str, str]) -> Tensor:

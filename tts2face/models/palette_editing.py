@@ -7,16 +7,8 @@ import numpy as np
 
 from lexicon.errors import InputError
 from lexicon.values.fields import check_fields
-from tts2face.models.palette import (
-    EXPRESSIONS,
-    FEATURES,
-    LEVEL_DB,
-    RATE_FACTORS,
-    Delivery,
-    Derivation,
-    FeatureChange,
-    Palette,
-)
+from tts2face.models.palette import EXPRESSIONS, FEATURES, Delivery, Derivation, FeatureChange, Palette
+from tts2face.models.palette_file import LEVEL_DB, RATE_FACTORS
 
 MAX_NAME = 40
 FORBIDDEN = frozenset(",=@;:#[]<>\"'/\\")  # have a meaning in marks, flags, timelines or paths

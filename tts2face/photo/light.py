@@ -31,7 +31,8 @@ from tts2face.numeric.arrays import LUMINANCE, decode_srgb, smoothstep, vertex_n
 from tts2face.photo.lines import LEAST_BLUR_PX, colours_at, grey_at
 from tts2face.photo.mesh import PhotoMesh
 from tts2face.photo.mouth import PICTURED
-from tts2face.photo.shapes import EYES, LIDS, SKIN, PhotoPerson
+from tts2face.photo.shapes import PhotoPerson
+from tts2face.photo.surface import EYES, LIDS, SKIN
 from tts2face.picture.baked.response import MOVE_MM
 
 Floats = NDArray[np.float64]

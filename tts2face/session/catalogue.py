@@ -230,7 +230,8 @@ def hair_colors() -> tuple[HairColorEntry, ...]:
 
 def styles(palette: str = "starter") -> tuple[StyleEntry, ...]:
     """The styles of a palette, given by name or as the path of a ``.palette`` file; raises as `load_palette`."""
-    from tts2face.models.palette import MEASURED_STYLE, load_palette
+    from tts2face.models.palette import MEASURED_STYLE
+    from tts2face.models.palette_file import load_palette
 
     found = load_palette(palette)
     derived = (

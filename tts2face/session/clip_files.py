@@ -12,7 +12,7 @@ from tts2face.interchange.exports.writer import ExportWriter, mesh_of, plan_expo
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_names import default_face
-from tts2face.models.palette import load_palette
+from tts2face.models.palette_file import load_palette
 from tts2face.picture.film import write_clips
 from tts2face.picture.options import Picture
 from tts2face.session.animated_face import AnimatedFace

@@ -15,8 +15,9 @@ from tts2face.lips.options import ExcludedToken
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_names import default_face
-from tts2face.models.palette import Derivation, Palette, load_palette
+from tts2face.models.palette import Derivation, Palette
 from tts2face.models.palette_editing import add_derivation
+from tts2face.models.palette_file import load_palette
 from tts2face.models.talker import Talker
 from tts2face.models.talker_file import load_talker
 from tts2face.picture.options import Picture

@@ -132,7 +132,7 @@ def compile_gestures() -> None:
     """Compile the kernels of gestures by three frames of them."""
     from tts2face.gestures.stream import GestureFields, GestureStream
     from tts2face.gestures.timeline import Timeline
-    from tts2face.models.palette import load_palette
+    from tts2face.models.palette_file import load_palette
     from tts2face.types import Waveform
 
     gestures = GestureStream(GestureFields(load_palette("starter")), style="grid_s1", seed=0, fps=30.0)

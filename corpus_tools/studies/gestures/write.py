@@ -25,7 +25,7 @@ from corpus_tools.studies.gestures.analysis import (
 from corpus_tools.studies.gestures.clips import VISITED_AFTER
 from corpus_tools.studies.gestures.page import gestures_page, panels_png, summary_panels, target_result
 from corpus_tools.studies.pages import report_writer
-from tts2face.models.palette import load_palette
+from tts2face.models.palette_file import load_palette
 from tts2face.storage.files import write_atomically
 from tts2face.types import Progress
 

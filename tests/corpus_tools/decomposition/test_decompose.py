@@ -25,7 +25,8 @@ from tts2face.face.deformation import axis_ratios, moved_landmarks, rest_landmar
 from tts2face.face.expressions import expression_landmarks
 from tts2face.models.face import Face
 from tts2face.models.landmarks import EYELID_LANDMARKS, MOUTH_REGION
-from tts2face.models.palette import EXPRESSIONS, PLAIN, REGION_FEATURES, Delivery, load_palette
+from tts2face.models.palette import EXPRESSIONS, PLAIN, REGION_FEATURES, Delivery
+from tts2face.models.palette_file import load_palette
 from tts2face.types import Trajectory, Waveform
 
 FPS, SECONDS = 30.0, 12.0

@@ -17,7 +17,8 @@ from tts2face.face.deformation import moved_landmarks
 from tts2face.face.expressions import add_expression_shapes, expression_weights
 from tts2face.face.mouth import build_lip_constraints
 from tts2face.models.face import Face
-from tts2face.models.palette import EXPRESSIONS, load_palette, read_palette
+from tts2face.models.palette import EXPRESSIONS
+from tts2face.models.palette_file import load_palette, read_palette
 from tts2face.types import Trajectory
 
 

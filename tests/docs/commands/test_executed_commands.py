@@ -26,7 +26,8 @@ from tests.docs.blocks import (
 from tests.interchange.characters.made import write_character_file, write_landmarks
 from tests.photo.pictures import SMILE, still
 from tts2face import Picture, Project, Request, export, import_face, save_face, save_project
-from tts2face.models.palette import Palette, load_palette, write_palette
+from tts2face.models.palette import Palette
+from tts2face.models.palette_file import load_palette, write_palette
 from tts2face.photo import face_from_photo
 from tts2face.serving.work.database import prepare_database
 from tts2face.session import session

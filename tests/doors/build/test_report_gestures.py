@@ -15,7 +15,7 @@ from corpus_tools.studies.plots import SERIES
 from tests.corpus_tools.gesture_study.made_gaze import write_people
 from tests.corpus_tools.gesture_study.made_palette import made_palette
 from tts2face.models.gaze import STATES
-from tts2face.models.palette import write_palette
+from tts2face.models.palette_file import write_palette
 
 pytestmark = pytest.mark.needs("matplotlib")
 N_RECORDINGS = 20  # three seconds each

@@ -10,7 +10,7 @@ from tts2face.face.deformation import REST_HEAD
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LID_RINGS
-from tts2face.models.palette import load_palette
+from tts2face.models.palette_file import load_palette
 from tts2face.picture.baked.scene import LitScene
 from tts2face.picture.baked.surface import N_COLUMNS, TRIANGLE_MASK, nearest_triangles, project
 from tts2face.picture.camera import camera_matrices

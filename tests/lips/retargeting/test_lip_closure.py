@@ -15,7 +15,8 @@ from tts2face.lips.options import SynthesisOptions
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import inner_lip_gaps
-from tts2face.models.palette import EXPRESSIONS, load_palette
+from tts2face.models.palette import EXPRESSIONS
+from tts2face.models.palette_file import load_palette
 from tts2face.models.talker import Talker
 from tts2face.session.animated_face import mesh_face
 from tts2face.types import Trajectory

@@ -7,7 +7,7 @@ from typing import Any
 from lexicon.errors import InputError
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_names import BALD
-from tts2face.models.palette import load_palette
+from tts2face.models.palette_file import load_palette
 from tts2face.request import OWN_FACE
 from tts2face.session.catalogue import identities
 from tts2face.session.named_models import Models

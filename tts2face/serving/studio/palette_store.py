@@ -14,7 +14,8 @@ from pathlib import Path
 
 from lexicon.errors import InputError
 from tts2face import __version__
-from tts2face.models.palette import Palette, load_palette, write_palette
+from tts2face.models.palette import Palette
+from tts2face.models.palette_file import load_palette, write_palette
 from tts2face.session.named_models import Models
 from tts2face.storage.files import translate_disk_errors
 

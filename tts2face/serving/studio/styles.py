@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import InputError, Tts2faceError
-from tts2face.models.palette import Palette, read_palette
+from tts2face.models.palette import Palette
 from tts2face.models.palette_editing import (
     StyleMix,
     add_derivation,
@@ -17,6 +17,7 @@ from tts2face.models.palette_editing import (
     remove_style,
     rename_style,
 )
+from tts2face.models.palette_file import read_palette
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.studio.palette_store import CACHE, MADE, SHIPPED, TAKE, PaletteStore, is_own_palette
 from tts2face.serving.studio.project_store import ProjectEntry

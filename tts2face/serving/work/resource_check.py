@@ -261,10 +261,10 @@ def find_places(source: Path, folder: Path) -> None:
 
 
 def _check_palette(source: Path, out: Path) -> dict[str, Any]:
-    from tts2face.models import palette
+    from tts2face.models.palette_file import FORMAT_VERSION
     from tts2face.session.catalogue import styles
 
-    _rewrite(source, out, PALETTE, palette.FORMAT_VERSION)
+    _rewrite(source, out, PALETTE, FORMAT_VERSION)
     return {"styles": [{"name": style.name, "summary": style.summary} for style in styles(str(out))]}
 
 

@@ -12,7 +12,7 @@ from corpus_tools.studies.gestures.analysis import (
     study_gestures,
 )
 from tests.kept import kept
-from tts2face.models.palette import load_palette
+from tts2face.models.palette_file import load_palette
 
 NO_JITTER = 1.3  # times the recorded power above 6 Hz
 

@@ -27,7 +27,7 @@ from tts2face.lips.retargeting import build_retargeter
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
 from tts2face.models.landmarks import LIP_LANDMARKS
-from tts2face.models.palette import load_palette
+from tts2face.models.palette_file import load_palette
 from tts2face.models.talker_file import load_talker
 from tts2face.types import Trajectory
 

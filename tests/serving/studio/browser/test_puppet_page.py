@@ -7,7 +7,7 @@ import pytest
 
 from tests.running import RunningService, eventually
 from tests.serving.studio.chromium import Browser
-from tts2face.models.palette import read_palette
+from tts2face.models.palette_file import read_palette
 
 TAKE_S = 4.0
 POSE = """import("tts2face-studio/preview.js").then(({preview}) => {

@@ -16,7 +16,7 @@ from PIL import Image
 from tests.corpus_tools.test_takes_tool import write_table
 from tests.running import eventually
 from tests.serving.studio.server.test_projects_http import create, edit, preview
-from tts2face.models.palette import load_palette, read_palette
+from tts2face.models.palette_file import load_palette, read_palette
 from tts2face.serving.studio.style_tasks import N_TILES, TILE_PX
 from tts2face.session.project_file import load_project
 from tts2face.session.session import Session
