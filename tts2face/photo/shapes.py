@@ -1,17 +1,11 @@
-"""Shapes of a photographed face: those of the shipped head, carried to its mesh by their common landmarks.
-
-Vertices, shapes and triangles of a photographed face, gathered part by part, and the pages of its pictures.
-
-Lids that appear between the fold above an eye and the band that moves down with the lid's margin.
-"""
+"""Shapes of a photographed face: those of the shipped head, carried to its mesh by their common landmarks."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.models.baked_light import LEAST_SIDE
 from tts2face.models.landmarks import (
     CHIN,
     FACE_OVAL,
@@ -24,11 +18,9 @@ from tts2face.models.landmarks import (
 )
 from tts2face.numeric.arrays import smoothstep
 from tts2face.photo.camera import PhotoCamera
-from tts2face.photo.eyes import EyePatch
 from tts2face.photo.lines import LID_MARGINS, N_LID, InnerLips, spline_weights
 from tts2face.photo.lines import N_POINTS as N_LIP
-from tts2face.photo.mesh import LIP_RINGS, PhotoMesh, Spreading, grid_triangles
-from tts2face.photo.teeth import OwnTeeth
+from tts2face.photo.mesh import LIP_RINGS, PhotoMesh, Spreading
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -273,144 +265,3 @@ def depths(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson, camera: P
     found = spreading.near(np.concatenate([mesh.known, far]), values, pulls)
     bounded: Floats = np.maximum(found, behind - BEYOND_DEPTH * scale)
     return bounded
-
-
-SKIN, LIDS, EYES = "skin", "lids", "eyes"  # parts, of which the first two show the picture itself
-PAGE_MARGIN = 1 / 64  # of a page, beyond what it shows: the places nearest to its edges are not read
-BETWEEN_PX = 4  # of patches on their page
-MOVED = 1e-3  # mm, or share of the head's motion, from which a vertex moves
-UNSEEN = 128.0  # colour of vertices whose colour is a picture's
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Vertices:
-    """Places (V, 3), mm, shapes (K, V, 3), and share of the head's motion (V,) of vertices."""
-
-    places: Floats
-    shapes: Floats
-    follow: Floats
-
-    def between(self, others: "Vertices", share: float) -> "Vertices":
-        """Vertices on the way to others (V, 3)."""
-        mixed = (
-            (1 - share) * own + share * other
-            for own, other in zip(
-                (self.places, self.shapes, self.follow), (others.places, others.shapes, others.follow), strict=True
-            )
-        )
-        return Vertices(*mixed)
-
-    def at(self, numbers: Ints) -> "Vertices":
-        """Those of some numbers (N,)."""
-        return Vertices(self.places[numbers], self.shapes[:, numbers], self.follow[numbers])
-
-
-@dataclass(slots=True, eq=False)
-class PhotoSurface:
-    """Parts that are added one after the other."""
-
-    vertices: list[Vertices] = field(default_factory=list)
-    uv: list[Floats] = field(default_factory=list)
-    colours: list[Floats] = field(default_factory=list)
-    parts: list[tuple[str, Ints]] = field(default_factory=list)
-
-    @property
-    def count(self) -> int:
-        """Number of vertices."""
-        return sum(len(one.places) for one in self.vertices)
-
-    def add(self, vertices: Vertices, *, uv: Floats | None = None, colours: Floats | None = None) -> Ints:
-        """Numbers (N,) of added vertices, with places in their page (N, 2) or colours (N, 3)."""
-        n = len(vertices.places)
-        first = self.count
-        self.vertices.append(vertices)
-        self.uv.append(np.zeros((n, 2)) if uv is None else uv)
-        self.colours.append(np.full((n, 3), UNSEEN) if colours is None else colours)
-        return first + np.arange(n)
-
-    @property
-    def places(self) -> Floats:
-        """Places (V, 3) of all vertices, mm."""
-        return np.concatenate([one.places for one in self.vertices])
-
-    def every(self) -> Vertices:
-        """All vertices."""
-        return Vertices(
-            self.places,
-            np.concatenate([one.shapes for one in self.vertices], axis=1),
-            np.concatenate([one.follow for one in self.vertices]),
-        )
-
-
-def moves(vertices: Vertices) -> NDArray[np.bool_]:
-    """(V,) whether vertices move with a shape or with the head."""
-    return np.asarray((np.abs(vertices.shapes).max(axis=(0, 2)) > MOVED) | (vertices.follow > MOVED))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PhotoPages:
-    """Pages (2, H, W, 3): what moves of a picture, and patches such as its eyes without lids.
-
-    ``corner`` (2,) and ``patch_corners`` are the pixels of the picture that would lie at the left top of the pages.
-    """
-
-    pages: NDArray[np.uint8]
-    corner: Floats
-    patch_corners: Sequence[Floats]
-
-    def uv(self, places: Floats, corner: Floats | None = None) -> Floats:
-        """(N, 2) places in a page of pixels (N, 2) of the picture."""
-        size = np.array(self.pages.shape[2:0:-1], np.float64)
-        found: Floats = (places - (self.corner if corner is None else corner) + 0.5) / size
-        return found.clip(0, 1)
-
-
-def lay_pages(
-    pixels: NDArray[np.uint8], mesh: PhotoMesh, is_moving: NDArray[np.bool_], patches: Sequence[EyePatch | OwnTeeth]
-) -> PhotoPages:
-    """Pages of a picture (H, W, 3) whose vertices (V,) move, and of patches."""
-    shown = mesh.places[mesh.triangles[is_moving[mesh.triangles].any(axis=1)]].reshape(-1, 2)
-    low = np.clip(np.floor(shown.min(axis=0)).astype(int) - 2, 0, None)
-    high = np.minimum(np.ceil(shown.max(axis=0)).astype(int) + 3, pixels.shape[1::-1])
-    sizes = [np.array(patch.picture.shape[1::-1]) for patch in patches]
-    beside = (sum(int(size[0]) + BETWEEN_PX for size in sizes), max(int(size[1]) for size in sizes))
-    wide, tall = (_page_side(int(side)) for side in np.maximum(high - low, beside))
-    left, top = round(PAGE_MARGIN * wide), round(PAGE_MARGIN * tall)
-    right, below = wide - left - high[0] + low[0], tall - top - high[1] + low[1]
-    around = ((top, below), (left, right), (0, 0))
-    first = np.pad(pixels[low[1] : high[1], low[0] : high[0]], around, mode="edge")
-    second, at, corners = np.zeros_like(first), left, []
-    for patch in patches:
-        h, w = patch.picture.shape[:2]
-        second[top : top + h, at : at + w] = patch.picture
-        corners.append(np.array(patch.corner, np.float64) - (at, top))
-        at += w + BETWEEN_PX
-    return PhotoPages(np.stack([first, second]), (low - (left, top)).astype(np.float64), corners)
-
-
-def _page_side(least: int) -> int:
-    side = LEAST_SIDE
-    while side * (1 - 2 * PAGE_MARGIN) < least:
-        side *= 2
-    return side
-
-
-N_LID_ROWS = 5  # of vertices, from the fold to the band
-SHOWN_ABOVE = 0.018  # of the eye distance above the fold, whose skin a lid shows on its way there and back
-
-
-def add_lids(surface: PhotoSurface, mesh: PhotoMesh, pages: PhotoPages, scale: float) -> None:
-    """Add the lids, whose skin is that above the fold, mirrored: it fits at both ends."""
-    skin = surface.vertices[0]
-    bow = np.sin(np.linspace(0, np.pi, N_LID))[:, None] ** 0.5
-    for fold, band, margin in zip(mesh.folds, mesh.bands, mesh.upper_lids, strict=True):
-        moving = np.concatenate([fold[:1], band[-1], fold[-1:]])
-        up = mesh.places[fold] - mesh.places[margin]
-        way = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-6) * (SHOWN_ABOVE * scale) * bow
-        rows = []
-        for share in np.linspace(0, 1, N_LID_ROWS):
-            shown = mesh.places[fold] + way * (1 - abs(2 * share - 1))
-            rows.append(surface.add(skin.at(fold).between(skin.at(moving), float(share)), uv=pages.uv(shown)))
-        triangles = grid_triangles(np.stack(rows))
-        is_mirrored = mesh.places[fold[0], 0] > mesh.places[fold[-1], 0]
-        surface.parts.append((LIDS, triangles[:, ::-1] if is_mirrored else triangles))

@@ -1,8 +1,11 @@
-"""A face that speaks in a photograph: a mesh with the shapes of the shipped head, in the light of the picture."""
+"""A face that speaks in a photograph: a mesh with the shapes of the shipped head, in the light of the picture.
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+`speaking_photo` is a column of steps. Each takes the face as the one before it left it, and returns it with more parts.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +22,7 @@ from tts2face.photo.fit import NOTHING_GIVEN, PhotoFit, PhotoPlaces, place_landm
 from tts2face.photo.found_face import PhotographedFace
 from tts2face.photo.lids import add_lids
 from tts2face.photo.light import SMILING, MouthRows, picture_light, wrinkles
-from tts2face.photo.lines import InnerLips, darken_lip_edges, find_lid_lines, find_lip_line
+from tts2face.photo.lines import InnerLips, LidLines, darken_lip_edges, find_lid_lines, find_lip_line
 from tts2face.photo.mesh import PhotoMesh, Spreading, build_mesh
 from tts2face.photo.mouth import MouthInside, MouthPlace, cheek_light, mouth_light, mouth_walls
 from tts2face.photo.photograph import OPAQUE, Photograph
@@ -56,6 +59,72 @@ class _Model:
         return dict(zip(self.head.shape_names, np.moveaxis(spread, -1, 0), strict=True))
 
 
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Traced:
+    """A face in a picture after the first step: its camera, landmarks, lips and lids, corrected where a person did so.
+
+    ``landmarks`` (478, 3) and ``pivot`` (3,) are pixels and depths.
+    """
+
+    model: _Model
+    seen: PhotographedFace
+    camera: PhotoCamera
+    landmarks: Floats
+    given: PhotoPlaces
+    person: PhotoPerson
+    lids: LidLines
+    pivot: Floats
+
+    @property
+    def pixels(self) -> NDArray[np.uint8]:
+        """(H, W, 3) of the picture."""
+        return self.seen.picture.pixels
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Skinned(Traced):
+    """The face with its skin: a mesh over the picture, pixels and depths (V, 3) of it, its motion and its creases."""
+
+    mesh: PhotoMesh
+    photo: Floats
+    skin: Vertices
+    creases: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Pictured(Skinned):
+    """The face with pictures of what lies behind its skin: patches of both eyes, and the person's own teeth."""
+
+    patches: Sequence[Sequence[EyePatch]]
+    teeth: OwnTeeth | None
+    pages: PhotoPages
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Laid(Pictured):
+    """The face with a surface of skin, lids and eyes, which the mouth is added to; landmarks lie on its corners."""
+
+    surface: PhotoSurface
+    corners: NDArray[np.int32]
+    weights: NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Filled(Laid):
+    """The face with a mouth, and the place (3,) of the edge of its upper teeth."""
+
+    mouth: MouthRows
+    teeth_edge: Floats
+
+
+Step = TypeVar("Step", bound=Traced)
+
+
+def _and(step: type[Step], before: Traced, **parts: Any) -> Step:
+    """The face after a step, with what the step adds."""
+    return step(**{field.name: getattr(before, field.name) for field in fields(before)}, **parts)
+
+
 def speaking_photo(
     seen: PhotographedFace,
     head: Face,
@@ -80,54 +149,106 @@ def speaking_photo(
     DataError
         The fit is not that of this picture and face.
     """
+    traced = _trace(seen, head, fit)
+    skinned = _cover_with_skin(traced)
+    pictured = _picture_eyes_and_teeth(skinned, teeth)
+    laid = _lay_surface(pictured)
+    filled = _fill_mouth(laid)
+    return _face(filled, metadata)
+
+
+def _trace(seen: PhotographedFace, head: Face, fit: PhotoFit) -> Traced:
+    """The camera that took the picture, and lines of the face in it."""
     model, picture, found = _Model.of(head), seen.picture, seen.found
-    pixels = picture.pixels
+    pixels, scale = picture.pixels, found.eye_distance_px
     camera = find_camera(found, model.landmarks)
-    landmarks, scale = camera.depths_of(found.landmarks), found.eye_distance_px
+    landmarks = camera.depths_of(found.landmarks)
     line = find_lip_line(pixels, found)
     given = PhotoPlaces(fit, (pixels.shape[1], pixels.shape[0]), picture.reduced_by, scale)
     lips = given.lips(InnerLips(camera.depths_of(line.upper), camera.depths_of(line.lower), line.gap))
-    person = PhotoPerson(given.size, landmarks, lips, seen.mean_score(SMILING), scale)
-    lids = given.lids(find_lid_lines(pixels, landmarks, scale))
-    pivot = given.point("pivot", camera.to_pixels(head.pivot[None].astype(np.float64))[0])
-    mesh = build_mesh(person.size, landmarks, lips, lids, scale)
-    photo, skin = _skin(mesh, person, camera, model)
-    creases = wrinkles(pixels, mesh, dict(zip(model.names, skin.shapes, strict=True)), person)
-    patches = eye_patches(pixels, landmarks, lids, scale)
-    teeth = find_teeth(pixels, found, lips, camera, head) if teeth is None else teeth
-    teeth = None if teeth is None else teeth.in_light_of(cheek_light(pixels, landmarks))
-    pictures: list[EyePatch | OwnTeeth] = [*patches[0], *patches[1], *([] if teeth is None else [teeth])]
-    pages = lay_pages(darken_lip_edges(pixels, lips, scale), mesh, moves(skin), pictures)
-    surface = PhotoSurface()
-    surface.add(skin, uv=pages.uv(_shown_places(mesh, person)))
+    return Traced(
+        model=model,
+        seen=seen,
+        camera=camera,
+        landmarks=landmarks,
+        given=given,
+        person=PhotoPerson(given.size, landmarks, lips, seen.mean_score(SMILING), scale),
+        lids=given.lids(find_lid_lines(pixels, landmarks, scale)),
+        pivot=given.point("pivot", camera.to_pixels(head.pivot[None].astype(np.float64))[0]),
+    )
+
+
+def _cover_with_skin(face: Traced) -> Skinned:
+    """A mesh over the picture that moves as the head does."""
+    person, model = face.person, face.model
+    mesh = build_mesh(person.size, face.landmarks, person.lips, face.lids, person.scale)
+    photo, skin = _skin(mesh, person, face.camera, model)
+    creases = wrinkles(face.pixels, mesh, dict(zip(model.names, skin.shapes, strict=True)), person)
+    return _and(Skinned, face, mesh=mesh, photo=photo, skin=skin, creases=creases)
+
+
+def _picture_eyes_and_teeth(face: Skinned, teeth: OwnTeeth | None) -> Pictured:
+    """Pictures of what opens behind lids and lips, on pages beside the picture of what moves."""
+    pixels, person = face.pixels, face.person
+    patches = eye_patches(pixels, face.landmarks, face.lids, person.scale)
+    if teeth is None:
+        teeth = find_teeth(pixels, face.seen.found, person.lips, face.camera, face.model.head)
+    if teeth is not None:
+        teeth = teeth.in_light_of(cheek_light(pixels, face.landmarks))
+    pictures: list[EyePatch | OwnTeeth] = [*patches[0], *patches[1]]
+    if teeth is not None:
+        pictures.append(teeth)
+    darkened = darken_lip_edges(pixels, person.lips, person.scale)
+    pages = lay_pages(darkened, face.mesh, moves(face.skin), pictures)
+    return _and(Pictured, face, patches=patches, teeth=teeth, pages=pages)
+
+
+def _lay_surface(face: Pictured) -> Laid:
+    """The parts in the order in which they are drawn, those of the skin first."""
+    mesh, pages, surface = face.mesh, face.pages, PhotoSurface()
+    surface.add(face.skin, uv=pages.uv(_shown_places(mesh, face.person)))
     surface.parts.append((SKIN, mesh.triangles))
-    add_lids(surface, mesh, pages, scale)
+    add_lids(surface, mesh, pages, face.person.scale)
     eyes, corners_of = [], iter(pages.patch_corners)
-    for eye, parts in enumerate(patches):
+    for eye, parts in enumerate(face.patches):
         for patch in parts:
-            rows = surface.add(
-                _eye_vertices(patch, eye, photo, camera, model), uv=pages.uv(patch.places, next(corners_of))
-            )
-            surface.parts.append((EYES, rows[_before_person(patch, picture)]))
-            eyes += [(patch, rows)] if patch is parts[0] else []
-    corners, weights = place_landmarks(mesh, landmarks, eyes)
-    light = mouth_light(pixels, landmarks, np.mean([parts[0].white for parts in patches], axis=0))
-    at_rest = np.einsum("lc,lcx->lx", weights, surface.places[corners])
-    inside = teeth_and_tongue(head, MouthPlace.of(model.landmarks, at_rest, is_parted=person.is_parted), light, teeth)
-    edge = given.point("teeth", camera.to_pixels(inside[0].teeth_edge[None])[0])
+            vertices = _eye_vertices(patch, eye, face.photo, face.camera, face.model)
+            rows = surface.add(vertices, uv=pages.uv(patch.places, next(corners_of)))
+            surface.parts.append((EYES, rows[_before_person(patch, face.seen.picture)]))
+            if patch is parts[0]:  # the others are catchlights before it
+                eyes.append((patch, rows))
+    corners, weights = place_landmarks(mesh, face.landmarks, eyes)
+    return _and(Laid, face, surface=surface, corners=corners, weights=weights)
+
+
+def _fill_mouth(face: Laid) -> Filled:
+    """Teeth, gums, tongue and walls behind the lips."""
+    model, camera, surface, pages = face.model, face.camera, face.surface, face.pages
+    light = mouth_light(face.pixels, face.landmarks, np.mean([parts[0].white for parts in face.patches], axis=0))
+    at_rest = np.einsum("lc,lcx->lx", face.weights, surface.places[face.corners])
+    place = MouthPlace.of(model.landmarks, at_rest, is_parted=face.person.is_parted)
+    inside = teeth_and_tongue(model.head, place, light, face.teeth)
+    edge = face.given.point("teeth", camera.to_pixels(inside[0].teeth_edge[None])[0])
     way = camera.to_head(edge[None])[0] - inside[0].teeth_edge
-    inside = [one.moved(way) for one in inside]
-    walls = mouth_walls(mesh, skin.places, skin.shapes, light)
+    inside = [part.moved(way) for part in inside]
+    walls = mouth_walls(face.mesh, face.skin.places, face.skin.shapes, light)
     mouth = MouthRows(
-        pictured=[_add_inside(surface, one, pages) for one in inside if one.texels is not None],
-        lit=[_add_inside(surface, one, pages) for one in inside if one.texels is None],
+        pictured=[_add_inside(surface, part, pages) for part in inside if part.texels is not None],
+        lit=[_add_inside(surface, part, pages) for part in inside if part.texels is None],
         walls=[_add_inside(surface, walls, pages)],
         dark=light.dark,
     )
+    return _and(Filled, face, mouth=mouth, teeth_edge=edge)
+
+
+def _face(face: Filled, metadata: Mapping[str, Any]) -> Face:
+    """The face in its file, with the places that were used."""
+    model, surface, head = face.model, face.surface, face.model.head
     every = surface.every()
     triangles = np.concatenate([part for _, part in surface.parts])
     drawn = np.flatnonzero(moves(every)[triangles].any(axis=1))
-    colours = np.rint(np.concatenate(surface.colours)).clip(0, 255).astype(np.uint8)
+    skin = (face.mesh, face.skin.places, face.creases)
+    used = face.given.used(face.person.lips, face.lids, {"teeth": face.teeth_edge, "pivot": face.pivot})
     return Face(
         vertices=every.places.astype(np.float32),
         triangles=triangles.astype(np.int32),
@@ -136,18 +257,18 @@ def speaking_photo(
         shapes=every.shapes.astype(np.float32),
         limits=np.concatenate([head.limits, [[0.0, 1.0]]]).astype(np.float32),
         eyes=(),
-        colours=colours,
+        colours=np.rint(np.concatenate(surface.colours)).clip(0, 255).astype(np.uint8),
         uv=np.concatenate(surface.uv).astype(np.float32),
         textures=(),
         landmarks=np.arange(N_LANDMARKS, dtype=np.int32),
-        landmark_vertices=corners,
-        landmark_weights=weights,
-        pivot=camera.to_head(pivot[None])[0].astype(np.float32),
-        metadata={**metadata, "fit": given.used(lips, lids, {"teeth": edge, "pivot": pivot}).as_json()},
+        landmark_vertices=face.corners,
+        landmark_weights=face.weights,
+        pivot=face.camera.to_head(face.pivot[None])[0].astype(np.float32),
+        metadata={**metadata, "fit": used.as_json()},
         scores=head.scores,
         light=Photographed(
-            picture_light(pixels, pages.pages, (mesh, skin.places, creases), drawn, mouth),
-            _view(picture, camera, every.follow, pages),
+            picture_light(face.pixels, face.pages.pages, skin, drawn, face.mouth),
+            _view(face.seen.picture, face.camera, every.follow, face.pages),
         ),
     )
 
