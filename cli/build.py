@@ -49,7 +49,7 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
     from corpus_tools.decomposition.markers import DEFAULT_MARKER_TABLE
     from corpus_tools.decomposition.recordings import MarkerOptions
     from corpus_tools.run_options import ignore_stage
-    from tts2face.models.palette import load_palette
+    from tts2face.models.palette_file import load_palette
 
     named_stills = parse_stills(still or [])
     inputs = {"the recordings": recordings, "--stills": stills, "--markers": markers, "--neutral": neutral}
