@@ -44,7 +44,7 @@ CHANGES = {
 
 @pytest.fixture(scope="module")
 def session(world: World) -> Session:
-    """It keeps finished sentences: an option that the keys of `SentenceMemory` lack would change nothing."""
+    """It keeps finished sentences: an option that the keys of `ResultMemory` lack would change nothing."""
     return world.session(memory_mb=100)
 
 

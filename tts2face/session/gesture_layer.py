@@ -20,13 +20,13 @@ from tts2face.gestures.noise import NoiseStream
 from tts2face.gestures.stream import GestureFields, GestureStream, GestureValues
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import Palette
-from tts2face.processes.memory import NO_MEMORY, SentenceMemory
 from tts2face.request import FIELDS
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.edits import ChannelEdits
 from tts2face.session.prepared import PreparedRequest
 from tts2face.session.speech_stream import Piece
 from tts2face.session.text_marks import marked_styles
+from tts2face.storage.memory import NO_MEMORY, ResultMemory
 from tts2face.types import Clip, Waveform, YieldTurn, keep_on
 
 DEFAULT_STYLE = "neutral"
@@ -71,7 +71,7 @@ class GestureLayer:
         fields: GestureFields,
         face: AnimatedFace,
         yield_turn: YieldTurn = keep_on,
-        memory: SentenceMemory = NO_MEMORY,
+        memory: ResultMemory = NO_MEMORY,
     ) -> None:
         self._requested = Timeline(style=face.default_styles).merge(prepared.timeline)
         self._face = face

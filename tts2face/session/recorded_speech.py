@@ -4,7 +4,6 @@ from collections.abc import Hashable, Iterator
 from dataclasses import replace
 
 from tts2face.models.talker import Talker
-from tts2face.processes.memory import SentenceMemory
 from tts2face.session.corrections import RECORDING, correct_phones
 from tts2face.session.prepared import HEARING_STEPS, RECORDING_STEPS, PreparedRequest
 from tts2face.session.recording import (
@@ -18,13 +17,14 @@ from tts2face.session.recording import (
 from tts2face.session.speech import resolve_recording_marks
 from tts2face.session.speech_stream import Piece
 from tts2face.source import FromSound, Recorded
+from tts2face.storage.memory import ResultMemory
 from tts2face.types import Progress, frame_count
 
 TRANSCRIPT_BYTES = 10_000  # of a transcript besides its phones
 
 
 def hear(
-    prepared: PreparedRequest, source: Recorded, talker: Talker, memory: SentenceMemory, on_heard: Progress | None
+    prepared: PreparedRequest, source: Recorded, talker: Talker, memory: ResultMemory, on_heard: Progress | None
 ) -> TimedTranscript:
     """Phones and words of a recording with their times; a single silence if lips follow its sound.
 

@@ -12,7 +12,6 @@ from tts2face.models.talker import Talker
 from tts2face.picture.options import Picture
 from tts2face.picture.pace import Pace
 from tts2face.picture.renderer import FrameRenderer
-from tts2face.processes.memory import SentenceMemory
 from tts2face.request import Request
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.encoded_stream import StreamFormat, encode_stream
@@ -31,6 +30,7 @@ from tts2face.session.shared_models import SessionModels, shown_face
 from tts2face.session.speech_stream import Piece, SpeechSpan, measure_speech, timed_speech
 from tts2face.sound.features import FEATURE_RATE
 from tts2face.sound.voice_pool import VoicePool
+from tts2face.storage.memory import ResultMemory
 from tts2face.types import Chunk, Clip, Progress, concatenate_clips
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ class Session:
     ) -> None:
         if photo is not None:
             face = _face_of(photo, consent, smile, (face, identity, hair, hair_color))
-        memory = SentenceMemory(round(memory_mb * 1e6))
+        memory = ResultMemory(round(memory_mb * 1e6))
         self._models = SessionModels(talker, shown_face(face, identity, hair, hair_color), palette, voices, memory)
 
     @property

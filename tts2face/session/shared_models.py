@@ -22,7 +22,6 @@ from tts2face.models.talker import Talker
 from tts2face.models.talker_file import load_talker
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import FrameRenderer
-from tts2face.processes.memory import NO_MEMORY, SentenceMemory
 from tts2face.request import FIELDS, OWN_FACE, Request
 from tts2face.session.animated_face import AnimatedFace, mesh_face, own_appearance_face
 from tts2face.session.gesture_layer import GestureLayer
@@ -34,6 +33,7 @@ from tts2face.session.steps import pieces
 from tts2face.session.text_marks import marked_styles
 from tts2face.sound.voice import Voice
 from tts2face.sound.voice_pool import VoicePool
+from tts2face.storage.memory import NO_MEMORY, ResultMemory
 from tts2face.types import Progress
 
 MAX_RENDERERS = 2  # renderers in memory, one for each picture; about 30 MB each
@@ -89,7 +89,7 @@ class SessionModels:
         mesh: Face | None,
         palette: str | Path | Palette | None,
         voices: VoicePool | None = None,
-        memory: SentenceMemory = NO_MEMORY,
+        memory: ResultMemory = NO_MEMORY,
     ) -> None:
         self.talker: Talker = talker if isinstance(talker, Talker) else load_talker(str(talker))
         self._mesh, self._memory = mesh, memory

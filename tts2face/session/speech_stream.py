@@ -15,7 +15,6 @@ from lexicon.sentence_length import n_letters
 from lexicon.sentences import Sentence, text_prefix
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.gestures.timeline import Timeline
-from tts2face.processes.memory import NO_MEMORY, SentenceMemory
 from tts2face.request import CONVERSATION
 from tts2face.session.corrections import correct_phones
 from tts2face.session.joining import Excerpt, excerpt_of_speech, shift_start, silent_speech, word_bounds
@@ -36,6 +35,7 @@ from tts2face.session.speech import (
 from tts2face.sound.pauses import speech_onset
 from tts2face.sound.voice_pool import require_installed
 from tts2face.source import TURN_S, Idle, Listening, Recorded, Spoken
+from tts2face.storage.memory import NO_MEMORY, ResultMemory
 from tts2face.types import (
     Clip,
     Speech,
@@ -121,7 +121,7 @@ class SpeechModels:
 
     voice: Voices
     yield_turn: YieldTurn = keep_on
-    memory: SentenceMemory = NO_MEMORY
+    memory: ResultMemory = NO_MEMORY
     deliveries: Deliveries = field(default_factory=lambda: NO_DELIVERIES)
 
 

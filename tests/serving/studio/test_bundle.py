@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tts2face.serving.studio.preview_bundle import PieceMemory, Preview, bundle, read_bundle
+from tts2face.serving.studio.preview_bundle import Preview, bundle, read_bundle
+from tts2face.storage.memory import ResultMemory
 
 CHANNELS, RATE, FPS = ["jawOpen", "tongueOut"], 300, 30.0
 
 
 def piece(
-    memory: PieceMemory, number: int, *, n_frames: int = 3, motion: float = 0.0, sound: int = 0
+    memory: ResultMemory, number: int, *, n_frames: int = 3, motion: float = 0.0, sound: int = 0
 ) -> dict[str, Any]:
     """A piece of `n_frames` frames whose arrays hold one value each."""
     arrays = (
@@ -22,7 +23,8 @@ def piece(
     )
     digest = f"{number}-{n_frames}-{motion}".ljust(24, ".") + f"{number}-{n_frames}".ljust(24, ".")
     digest += f"{n_frames}-{sound}".ljust(24, ".")
-    memory.put(digest, b"".join(one.tobytes() for one in arrays))
+    content = b"".join(array.tobytes() for array in arrays)
+    memory.put(digest, content, len(content))
     return {
         "number": number, "text": f"T{number}", "occurrence": 0, "begin": 0.0, "seconds": n_frames / FPS, "rate": RATE,
         "n_frames": n_frames, "n_samples": 10 * n_frames, "digest": digest, "phones": ["sil", "a"],
@@ -39,17 +41,17 @@ def preview(revision: int, *pieces: dict[str, Any]) -> Preview:
 
 
 @pytest.fixture
-def memory() -> PieceMemory:
-    return PieceMemory(1_000_000)
+def memory() -> ResultMemory:
+    return ResultMemory(1_000_000)
 
 
-def read(preview: Preview, memory: PieceMemory, earlier: Preview | None = None) -> Any:
+def read(preview: Preview, memory: ResultMemory, earlier: Preview | None = None) -> Any:
     content = bundle(preview, memory, earlier)
     assert content is not None
     return read_bundle(content)
 
 
-def test_a_first_bundle_has_all(memory: PieceMemory) -> None:
+def test_a_first_bundle_has_all(memory: ResultMemory) -> None:
     shown = preview(4, piece(memory, 0, motion=0.5, sound=7), piece(memory, 1, n_frames=2, sound=8))
     header, motion, head, sound = read(shown, memory)
     assert (header["revision"], header["n_frames"], header["first_frame"], header["n"]) == (4, 5, 0, 5)
@@ -62,7 +64,7 @@ def test_a_first_bundle_has_all(memory: PieceMemory) -> None:
     assert header["words"][1] == ["w", 0.14, 0.166667, 1, False]
 
 
-def test_only_changed_frames_and_samples_follow(memory: PieceMemory) -> None:
+def test_only_changed_frames_and_samples_follow(memory: ResultMemory) -> None:
     same, other, last = piece(memory, 0), piece(memory, 1), piece(memory, 2)
     before, after = preview(1, same, other, last), preview(2, same, piece(memory, 1, motion=0.9), last)
     header, motion, _, sound = read(after, memory, before)
@@ -71,7 +73,7 @@ def test_only_changed_frames_and_samples_follow(memory: PieceMemory) -> None:
     assert len(sound) == 0
 
 
-def test_changed_sound_comes_without_frames(memory: PieceMemory) -> None:
+def test_changed_sound_comes_without_frames(memory: ResultMemory) -> None:
     before, after = (
         preview(1, piece(memory, 0), piece(memory, 1)),
         preview(2, piece(memory, 0), piece(memory, 1, sound=5)),
@@ -81,7 +83,7 @@ def test_changed_sound_comes_without_frames(memory: PieceMemory) -> None:
     assert sound.tolist() == [5] * 30
 
 
-def test_a_longer_piece_moves_all_that_follows(memory: PieceMemory) -> None:
+def test_a_longer_piece_moves_all_that_follows(memory: ResultMemory) -> None:
     last = piece(memory, 2)
     before = preview(1, piece(memory, 0), piece(memory, 1), last)
     header, motion, _, sound = read(preview(2, piece(memory, 0), piece(memory, 1, n_frames=4), last), memory, before)
@@ -89,7 +91,7 @@ def test_a_longer_piece_moves_all_that_follows(memory: PieceMemory) -> None:
     assert len(motion) == 7
 
 
-def test_merging_differences_gives_the_whole(memory: PieceMemory) -> None:
+def test_merging_differences_gives_the_whole(memory: ResultMemory) -> None:
     states = [
         preview(1, piece(memory, 0), piece(memory, 1)),
         preview(2, piece(memory, 0, motion=0.3), piece(memory, 1)),
@@ -109,7 +111,7 @@ def test_merging_differences_gives_the_whole(memory: PieceMemory) -> None:
 
 
 @pytest.mark.parametrize("change", [{"fps": 25.0}, {"channels": ["jawOpen", "other"]}])
-def test_another_clock_or_other_channels_send_all_frames(memory: PieceMemory, change: dict[str, Any]) -> None:
+def test_another_clock_or_other_channels_send_all_frames(memory: ResultMemory, change: dict[str, Any]) -> None:
     before = preview(1, piece(memory, 0))
     after = replace(before, revision=2, fps=change.get("fps", FPS))
     if "channels" in change:
@@ -118,7 +120,7 @@ def test_another_clock_or_other_channels_send_all_frames(memory: PieceMemory, ch
     assert (header["first_frame"], header["n"], len(sound)) == (0, 3, 0)
 
 
-def test_a_recording_is_one_sentence(memory: PieceMemory) -> None:
+def test_a_recording_is_one_sentence(memory: ResultMemory) -> None:
     transcript = {"phones": ["sil", "a", "sil"], "edges": [0.0, 0.05, 0.15, 0.2]}
     pieces = [piece(memory, 0) | {"text": "", "transcript": transcript}, piece(memory, 1) | {"text": ""}]
     shown = preview(1, *pieces)
@@ -130,7 +132,7 @@ def test_a_recording_is_one_sentence(memory: PieceMemory) -> None:
 
 
 def test_memory_is_bounded_and_what_is_missing_is_said() -> None:
-    small = PieceMemory(500)
+    small = ResultMemory(500)
     shown = preview(1, *(piece(small, number) for number in range(5)))
     assert small.n_bytes <= 500
     assert bundle(shown, small, None) is None

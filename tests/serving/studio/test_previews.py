@@ -9,8 +9,9 @@ from tts2face.processes.message import EVENT, Message
 from tts2face.processes.parent import ChildEndedError
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.messages import Work
-from tts2face.serving.studio.preview_bundle import PieceMemory, Preview
+from tts2face.serving.studio.preview_bundle import Preview
 from tts2face.serving.studio.previews import PARTIAL_S, ProjectPreview
+from tts2face.storage.memory import ResultMemory
 
 Stream = Callable[[Work], AsyncIterator[Message]]
 
@@ -23,7 +24,7 @@ def pieces_of(text: str) -> list[tuple[dict[str, Any], bytes]]:
     """A piece for each letter, whose motion is the letter's number."""
     found = []
     for number, letter in enumerate(text):
-        memory = PieceMemory(10_000)
+        memory = ResultMemory(10_000)
         made = piece(memory, number, motion=float(ord(letter))) | {"type": "piece", "notes": [], "text": letter}
         found.append((made, memory.get(made["digest"]) or b""))
     return found
@@ -63,7 +64,7 @@ def make(works: Works) -> tuple[ProjectPreview, list[Preview], list[float]]:
     states: list[Preview] = []
     speech: list[float] = []
     shown = ProjectPreview(
-        works.stream, PieceMemory(1_000_000), on_change=lambda: states.append(shown.current),
+        works.stream, ResultMemory(1_000_000), on_change=lambda: states.append(shown.current),
         on_fit=lambda *_: [], on_speech=speech.append,
     )  # fmt: skip
     return shown, states, speech

@@ -15,10 +15,10 @@ from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.studio import workspace as opened
 from tts2face.serving.studio.history import History
-from tts2face.serving.studio.preview_bundle import PieceMemory
 from tts2face.serving.studio.project_store import ProjectStore
 from tts2face.serving.studio.workspace import Listener, Workspace
 from tts2face.session.project import Project
+from tts2face.storage.memory import ResultMemory
 
 
 class FullDisk(ProjectStore):
@@ -45,7 +45,7 @@ def rename(store: FullDisk, number: str, *, n_refused: int, closes_at_once: bool
 
     async def run() -> list[str]:
         workspace = Workspace(
-            ServiceState(ServiceSettings(processes=1)), store, LOCAL_KEY, number, PieceMemory(1000)
+            ServiceState(ServiceSettings(processes=1)), store, LOCAL_KEY, number, ResultMemory(1000)
         )  # fmt: skip
         told = list[str]()
         workspace.listeners.add(lambda what: told.append(f"{what} {workspace.save_error}".strip()))
@@ -97,7 +97,7 @@ def test_the_preview_ends_with_the_last_page_and_begins_again_with_the_next(stor
     async def run() -> None:
         state, pool = ServiceState(ServiceSettings(processes=1)), HangingPool()
         state.pool = pool  # type: ignore[assignment]
-        workspace = Workspace(state, store, LOCAL_KEY, number, PieceMemory(1000))
+        workspace = Workspace(state, store, LOCAL_KEY, number, ResultMemory(1000))
 
         async def expect(n_begun: int, n_running: int) -> None:
             async with asyncio.timeout(30):

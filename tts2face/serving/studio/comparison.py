@@ -18,13 +18,14 @@ from lexicon.values.json_text import LARGEST_JSON_BYTES, parse_json
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.state import ServiceState
-from tts2face.serving.studio.preview_bundle import PieceMemory, Preview, read_bundle
+from tts2face.serving.studio.preview_bundle import Preview, read_bundle
 from tts2face.serving.studio.previews import ProjectPreview
 from tts2face.serving.studio.reference import TAKE, Reference, parse_reference, reference_json, reference_project
 from tts2face.serving.studio.requests import check_options, events_of, project_work
 from tts2face.session.project import Project
 from tts2face.session.project_file import project_json
 from tts2face.storage.files import translate_disk_errors, write_atomically
+from tts2face.storage.memory import ResultMemory
 
 FOLDER = "compare"  # in the folder of a project
 FILE, TAKE_FILE = "reference.json", "take.csv"
@@ -57,7 +58,7 @@ class ComparedProject:
     """
 
     def __init__(
-        self, state: ServiceState, workspace: OpenProject, memory: PieceMemory, on_change: Callable[[], None]
+        self, state: ServiceState, workspace: OpenProject, memory: ResultMemory, on_change: Callable[[], None]
     ) -> None:
         self._state, self._workspace = state, workspace
         self._on_change = on_change

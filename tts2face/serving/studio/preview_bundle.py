@@ -6,7 +6,6 @@
 
 import json
 import struct
-from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -14,36 +13,12 @@ from typing import Any
 import numpy as np
 
 from lexicon.sequence import PhoneSequence
+from tts2face.storage.memory import ResultMemory
 from tts2face.types import HEAD_CHANNELS
 
 FLOAT_BYTES, SAMPLE_BYTES = 4, 2
 N_HEAD = len(HEAD_CHANNELS)
 DIGEST_LENGTH = 24  # characters of each of the three digests of a piece: motion, head, sound
-
-
-class PieceMemory:
-    """Contents of pieces by their digests, for all projects; those used last stay within a number of bytes."""
-
-    def __init__(self, max_bytes: int) -> None:
-        self._max_bytes = max_bytes
-        self._contents: OrderedDict[str, bytes] = OrderedDict()
-        self.n_bytes = 0
-
-    def get(self, digest: str) -> bytes | None:
-        """Content of a digest; None if it is not kept."""
-        content = self._contents.get(digest)
-        if content is not None:
-            self._contents.move_to_end(digest)
-        return content
-
-    def put(self, digest: str, content: bytes) -> None:
-        """Keep a content."""
-        if digest not in self._contents:
-            self.n_bytes += len(content)
-        self._contents[digest] = content
-        self._contents.move_to_end(digest)
-        while self.n_bytes > self._max_bytes and len(self._contents) > 1:
-            self.n_bytes -= len(self._contents.popitem(last=False)[1])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,7 +68,7 @@ class Preview:
         return found
 
 
-def bundle(preview: Preview, memory: PieceMemory, earlier: Preview | None) -> bytes | None:
+def bundle(preview: Preview, memory: ResultMemory, earlier: Preview | None) -> bytes | None:
     """Bytes with what has changed since an earlier preview; None if a content is no longer kept.
 
     Without an earlier one, or with one of another clock or other channels, all comes.

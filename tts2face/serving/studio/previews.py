@@ -12,8 +12,9 @@ from tts2face.processes.parent import ChildEndedError
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.exchange import in_background
 from tts2face.serving.service.messages import Work
-from tts2face.serving.studio.preview_bundle import DIGEST_LENGTH, PieceMemory, Preview, bundle
+from tts2face.serving.studio.preview_bundle import DIGEST_LENGTH, Preview, bundle
 from tts2face.serving.studio.requests import events_of
+from tts2face.storage.memory import ResultMemory
 
 MAX_REVISIONS = 30  # that a page may have and is sent the difference to
 MAX_TRIES = 3  # of a preview whose process ended
@@ -43,7 +44,7 @@ class ProjectPreview:
     def __init__(
         self,
         stream: Stream,
-        memory: PieceMemory,
+        memory: ResultMemory,
         *,
         on_change: Callable[[], None],
         on_fit: Callable[[Preview, list[tuple[str, int]], float | None], list[str]],
@@ -118,7 +119,7 @@ class ProjectPreview:
                     pieces, fps = [], event["fps"]
                 elif event["type"] == "piece":
                     if content:
-                        self._memory.put(event["digest"], content)
+                        self._memory.put(event["digest"], content, len(content))
                     pieces.append(event)
                     if loop.time() > shown_at + PARTIAL_S:
                         self._show_part(before, pieces, fps)

@@ -16,7 +16,6 @@ from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.state import ServiceState
-from tts2face.serving.studio.preview_bundle import PieceMemory
 from tts2face.serving.studio.project_store import ProjectEntry, ProjectStore
 from tts2face.serving.studio.recording_work import Recordings
 from tts2face.serving.studio.renders import Renders
@@ -28,6 +27,7 @@ from tts2face.serving.studio.work import WorkList
 from tts2face.serving.studio.workspace import Workspace
 from tts2face.session.project import Project
 from tts2face.storage.files import translate_disk_errors, write_atomically
+from tts2face.storage.memory import ResultMemory
 
 MB = 1_000_000
 MAX_IDLE = 10  # open projects that no page shows
@@ -41,7 +41,7 @@ class Studio:
         self.state = state
         self._folder: Path = studio_folder(state)
         self.store = ProjectStore(self._folder)
-        self.memory = PieceMemory(state.settings.previews_mb * MB)
+        self.memory = ResultMemory(state.settings.previews_mb * MB)
         self.work = WorkList(self._folder)
         self.renders = Renders(state, self.work)
         self.styles = Styles(self)

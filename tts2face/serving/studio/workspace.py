@@ -15,11 +15,12 @@ from tts2face.serving.service.state import ServiceState
 from tts2face.serving.studio.comparison import ComparedProject
 from tts2face.serving.studio.editing import Edit, apply
 from tts2face.serving.studio.history import History
-from tts2face.serving.studio.preview_bundle import PieceMemory, Preview
+from tts2face.serving.studio.preview_bundle import Preview
 from tts2face.serving.studio.previews import ProjectPreview
 from tts2face.serving.studio.project_store import ProjectStore
 from tts2face.serving.studio.requests import OPTION_PARTS, check_options, project_work
 from tts2face.session.project import Project, cut_timeline, without_edges
+from tts2face.storage.memory import ResultMemory
 
 SAVE_S = 0.5  # between an edit and the time at which it is on disk
 SAVE_AGAIN_S = 5.0  # after a failure, such as a full disk
@@ -36,7 +37,9 @@ Listener = Callable[[str], None]
 class Workspace:
     """An open project of a key. All methods belong to the event loop."""
 
-    def __init__(self, state: ServiceState, store: ProjectStore, key: ApiKey, number: str, memory: PieceMemory) -> None:
+    def __init__(
+        self, state: ServiceState, store: ProjectStore, key: ApiKey, number: str, memory: ResultMemory
+    ) -> None:
         self.id, self.key = number, key
         self._state, self._store = state, store
         self.folder: Path = store.folder(number, key.name)
