@@ -42,16 +42,6 @@ def _check_kind(path: Path, mode: int) -> None:
         raise DataError(f"{path} is {kind}, not a file; remove it or use a file")
 
 
-def is_file(path: Path) -> bool:
-    """Whether there is a file of a name, which may be longer than any file's."""
-    try:
-        return path.is_file()
-    except OSError as refused:
-        if refused.errno != errno.ENAMETOOLONG:
-            raise
-        return False
-
-
 def is_there(path: Path, is_kind: Callable[[int], bool] = lambda _: True) -> bool:
     """Whether there is a file of a kind, as `stat.S_ISDIR`; an OSError where that cannot be read.
 
@@ -60,6 +50,16 @@ def is_there(path: Path, is_kind: Callable[[int], bool] = lambda _: True) -> boo
     try:
         return is_kind(path.stat().st_mode)
     except (FileNotFoundError, NotADirectoryError):
+        return False
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is a file of a name, which may be none: longer than any file's, a circle of links, with U+0000."""
+    try:
+        return is_there(path, stat.S_ISREG)
+    except (OSError, ValueError) as refused:
+        if isinstance(refused, OSError) and refused.errno not in {errno.ENAMETOOLONG, errno.ELOOP}:
+            raise
         return False
 
 
