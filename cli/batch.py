@@ -10,7 +10,8 @@ from cyclopts import Parameter
 
 from cli.batch_plan import print_plan
 from cli.flags import Face, Hair, HairColor, add_option_flags, options_from_flags, switch, whole_number
-from cli.process import WhatRemains, progress_bar, write_message
+from cli.process import WhatRemains, write_message
+from cli.progress import progress_bar
 from lexicon.errors import DataError, InputError
 from tts2face.picture.options import Picture
 from tts2face.request import Request

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli.process import progress_bar
+from cli.progress import progress_bar
 
 if TYPE_CHECKING:
     from tts2face.serving.batch.output import Plan

@@ -7,7 +7,8 @@ from cyclopts import Parameter
 
 from cli.corpus import Provenance, check_suffix
 from cli.flags import switch
-from cli.process import stage_bar, write_message
+from cli.process import write_message
+from cli.progress import stage_bar
 from cli.tool_flags import DEFAULTS, ToolFlags
 from tts2face.storage.output_paths import refuse_overwriting
 

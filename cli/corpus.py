@@ -11,7 +11,8 @@ from cyclopts import App, Parameter
 
 from cli.flags import Cache, Model, switch, whole_number
 from cli.photo import Yes
-from cli.process import ask, progress_bar, stage_bar, write_message
+from cli.process import ask, write_message
+from cli.progress import progress_bar, stage_bar
 from cli.tool_flags import DEFAULTS, ToolFlags
 from lexicon.errors import InputError
 from tts2face.storage.files import write_atomically

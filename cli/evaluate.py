@@ -11,7 +11,8 @@ from cyclopts import Parameter
 from cli.evaluation_flags import ComparisonFlags, SplitFlags
 from cli.learning_curve import run_learning_curve
 from cli.people import DEFAULT_TALKER, run_people_evaluation
-from cli.process import progress_bar, write_message
+from cli.process import write_message
+from cli.progress import progress_bar
 from cli.tool_flags import DEFAULTS, ToolFlags
 from lexicon.errors import InputError
 from tts2face.storage.output_paths import check_file_name, refuse_overwriting

@@ -8,7 +8,8 @@ from cyclopts import App, Parameter
 
 from cli.flags import Hair, HairColor, Model, add_option_flags, options_from_flags, switch
 from cli.photo import Consent, Fit, Smile, Yes, agreed, make_face, warner
-from cli.process import progress_bar, write_message
+from cli.process import write_message
+from cli.progress import progress_bar
 from lexicon.errors import InputError
 from tts2face.picture.options import Picture
 from tts2face.storage.output_paths import check_file_name, refuse_overwriting
@@ -57,8 +58,9 @@ def import_character(  # noqa: PLR0913 - one parameter a flag
         {"--out": out, "--preview": preview, "--write-landmarks": write_landmarks, "--write-mapping": write_mapping},
         {"the character": character, "--mapping": mapping, "--landmarks": landmarks, "--model": model},
     )
-    from tts2face.interchange.characters.importing import import_face, save_face
+    from tts2face.interchange.characters.importing import import_face
     from tts2face.interchange.characters.landmark_table import landmark_table
+    from tts2face.interchange.characters.saving import save_face
     from tts2face.interchange.characters.shapes import mapping_table
     from tts2face.storage.files import write_atomically
 
@@ -98,7 +100,7 @@ def picture(  # noqa: PLR0913 - one parameter a flag
         {"--out": out, "--preview": preview, "--write-fit": write_fit},
         {"the photo": split_number(photo)[0], "--fit": fit, "--smile": smile, "--model": model},
     )
-    from tts2face.interchange.characters.importing import save_face
+    from tts2face.interchange.characters.saving import save_face
     from tts2face.photo.fit import write_fit as write_fit_file
 
     made = make_face(photo, consent, name=name, fit=fit, smile=smile, model=model, quiet=quiet)
@@ -184,7 +186,7 @@ def relink(
 ) -> None:
     """Write the new place of a moved character into the face that was imported from it, for exports to its file."""
     check_file_name(name, "a face", (".face",))
-    from tts2face.interchange.characters.importing import relink_face
+    from tts2face.interchange.characters.saving import relink_face
 
     place = relink_face(name, character)
     if not quiet:

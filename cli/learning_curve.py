@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from cli.evaluation_flags import ComparisonFlags, SplitFlags
-from cli.process import progress_bar, stage_bar, write_message
+from cli.process import write_message
+from cli.progress import progress_bar, stage_bar
 from cli.tool_flags import ToolFlags
 from lexicon.errors import InputError
 

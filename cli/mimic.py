@@ -8,7 +8,8 @@ from cyclopts import Parameter
 
 from cli.flags import Exports, Face, Hair, HairColor, Model, Out, switch
 from cli.photo import Yes
-from cli.process import stage_bar, write_message
+from cli.process import write_message
+from cli.progress import stage_bar
 from lexicon.errors import InputError
 from tts2face.interchange.exports.table import is_export, split_format
 from tts2face.request import OWN_FACE
@@ -101,7 +102,7 @@ def _run_live_window(source: str, models: "Models", picture: "Picture", model: P
     from tts2face.picture.display import require_display
     from tts2face.picture.window import LiveWindow
     from tts2face.session.live import CALIBRATION_S, LiveCapture
-    from tts2face.video.streaming import CaptureDevice
+    from tts2face.video.camera import CaptureDevice
 
     require_display("--camera")
     head = load_face(models.face, models.identity, hair=models.hair, hair_color=models.hair_color)

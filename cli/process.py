@@ -1,7 +1,4 @@
-"""A command as a process: exit codes, standard streams, signals and memory.
-
-Progress bars on standard error, and messages of what delays a first run.
-"""
+"""A command as a process: exit codes, standard streams, signals and memory."""
 
 import codecs
 import contextlib
@@ -15,8 +12,7 @@ import threading
 import time
 import traceback
 import weakref
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from io import TextIOWrapper
 from types import FrameType
 from typing import TextIO
@@ -271,58 +267,3 @@ def use_one_thread_of_blas() -> None:
     The products of a clip are small: OpenBLAS's other threads turn in circles between them, a 25th of its time.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-
-@contextmanager
-def progress_bar(description: str, quiet: bool = False) -> Iterator[Progress | None]:
-    """Progress bar updated by ``on_progress(done, of)``; None if quiet or if standard error is no terminal."""
-    with stage_bar(quiet) as stages:
-        yield stages(description) if stages else None
-
-
-@contextmanager
-def compilation_messages(quiet: bool = False) -> Iterator[None]:
-    """Say, unless quiet, that kernels are compiled and how many have been."""
-    import logging
-
-    log = logging.getLogger(COMPILATION)
-    if quiet or log.handlers:  # an outer context says it
-        yield
-        return
-    handler = logging.Handler()
-    handler.emit = lambda record: write_message(record.getMessage())  # type: ignore[method-assign]
-    log.addHandler(handler)
-    log.setLevel(logging.INFO)
-    try:
-        yield
-    finally:
-        log.removeHandler(handler)
-
-
-@contextmanager
-def stage_bar(quiet: bool = False) -> Iterator[Callable[[str], Progress] | None]:
-    """Progress bar that restarts with each named stage; None if quiet or if standard error is no terminal."""
-    with compilation_messages(quiet):
-        if quiet or not sys.stderr.isatty():
-            yield None
-            return
-        with _bar() as begin_stage:
-            yield begin_stage
-
-
-@contextmanager
-def _bar() -> Iterator[Callable[[str], Progress]]:
-    from rich.console import Console
-    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
-    from rich.progress import Progress as Bar
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
-
-        def begin_stage(description: str) -> Progress:
-            for task in bar.task_ids:
-                bar.remove_task(task)
-            task = bar.add_task(description, total=None)
-            return lambda done, of: bar.update(task, completed=done, total=of)
-
-        yield begin_stage

@@ -7,7 +7,8 @@ from cyclopts import App, Parameter
 
 from cli.flags import Face, whole_number
 from cli.photo import Yes
-from cli.process import progress_bar, stage_bar, write_message
+from cli.process import write_message
+from cli.progress import progress_bar, stage_bar
 from cli.tool_flags import DEFAULTS, ToolFlags
 from lexicon.errors import InputError
 from tts2face.storage.output_paths import refuse_overwriting

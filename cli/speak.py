@@ -7,7 +7,8 @@ from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli.process import compilation_messages, progress_bar, return_large_blocks, write_message
+from cli.process import return_large_blocks, write_message
+from cli.progress import compilation_messages, progress_bar
 from lexicon.errors import InputError
 from tts2face.picture.options import Picture
 from tts2face.processes.collection import resume_collection

@@ -1,7 +1,4 @@
-"""Pronounce text: words with phones, stress and syllables.
-
-Spoken form of a text, the input of a voice, in every language.
-"""
+"""Pronounce text: words with phones, stress and syllables."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -14,21 +11,14 @@ from lexicon.dictionary import Dictionary
 from lexicon.english import fold_to_arpabet
 from lexicon.english_text import english_segments
 from lexicon.errors import InputError, SilentTextError
-from lexicon.foreign_letters import name_foreign_letters
 from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word, phonemize, segments_by_rules
-from lexicon.german_dates import read_german_dates
 from lexicon.ipa import IpaPhone
-from lexicon.japanese import has_kanji, to_kana
 from lexicon.languages import language_code
-from lexicon.normalize import MARKS, normalize, split_tokens
-from lexicon.number_words import MAX_CARDINAL_DIGITS
+from lexicon.normalize import MARKS, split_tokens
 from lexicon.phones import PHONES, ipa_to_arpabet
 from lexicon.scripts import check_script
+from lexicon.spoken_form import spoken_form
 
-# espeak-ng omits what follows the first 160 letters of a word; the longest in use have 85. From U+0900 on, scripts
-# without spaces between words begin.
-_LONG_WORD = re.compile(r"[^\W\d_\u0900-\U0010ffff]{100}(?=[^\W\d_\u0900-\U0010ffff])")
-_LONG_NUMBER = re.compile(rf"[0-9]{{{MAX_CARDINAL_DIGITS + 1},}}")
 NOTHING = "there is nothing to say in the text; add at least one word or number"
 PAUSES_S = MappingProxyType({"": 0.0, ",": 0.2, ";": 0.3, ":": 0.3, ".": 0.5, "!": 0.5, "?": 0.5})  # s, nominal
 _MARKS_BY_STRENGTH = tuple(PAUSES_S)  # of two adjacent marks the later one of this order is kept
@@ -47,28 +37,6 @@ _SONORITY = MappingProxyType({
     "stop": 0, "click": 0, "affricate": 0, "fricative": 1, "nasal": 2, "lateral": 3, "tap": 3, "trill": 3,
     "approximant": 4,
 })  # fmt: skip
-
-
-def spoken_form(text: str, language: str) -> str:
-    """Spoken form of a text.
-
-    English is normalised, days of German dates are written as words, Japanese with Chinese characters is converted to
-    kana, and single letters of other writing systems are replaced by their names. A word of more than 100 letters is
-    divided, and the digits of a longer number than English names are separated.
-
-    Raises
-    ------
-    BackendError
-        The text is Japanese with Chinese characters, and the library that reads them is not installed.
-    """
-    if language.startswith("en"):
-        return _LONG_WORD.sub(r"\g<0> ", normalize(text))
-    if language == "ja" and has_kanji(text):
-        text = to_kana(text)
-    if language.partition("-")[0] == "de":
-        text = read_german_dates(text)
-    text = _LONG_NUMBER.sub(lambda number: " ".join(number.group()), name_foreign_letters(text, language))
-    return _LONG_WORD.sub(r"\g<0> ", text)
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from tts2face.interchange.characters.importing import ImportedFace as ImportedFace
     from tts2face.interchange.characters.importing import ImportReport as ImportReport
     from tts2face.interchange.characters.importing import import_face as import_face
-    from tts2face.interchange.characters.importing import save_face as save_face
+    from tts2face.interchange.characters.saving import save_face as save_face
     from tts2face.interchange.subtitles.cues import Cue as Cue
     from tts2face.interchange.subtitles.cues import Subtitles as Subtitles
     from tts2face.interchange.subtitles.reader import read_subtitles as read_subtitles
@@ -168,7 +168,8 @@ _MODULES = {
         "voices",
     ),
     "tts2face.interchange.characters.animation": ("WrittenCharacter", "write_character"),
-    "tts2face.interchange.characters.importing": ("ImportReport", "ImportedFace", "import_face", "save_face"),
+    "tts2face.interchange.characters.importing": ("ImportReport", "ImportedFace", "import_face"),
+    "tts2face.interchange.characters.saving": ("save_face",),
     "tts2face.models.face": ("Face",),
     "tts2face.models.face_loading": ("load_face",),
     "tts2face.models.palette": ("Palette",),

@@ -15,7 +15,7 @@ With this file beside it, alone in a folder:
 """
 
 from lexicon.phones import look_up_phone
-from tts2face.interchange.exports.parts import PhoneLabels
+from tts2face.interchange.exports.labels import PhoneLabels
 from tts2face.interchange.exports.table import FormatInfo
 
 SHAPES = {"silence": "rest", "lateral": "L", "bilabial": "MBP", "labiodental": "FV", "labial-velar": "WQ"}

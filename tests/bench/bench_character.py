@@ -29,7 +29,8 @@ def make(folder: Path) -> None:
 
 def measure(folder: Path, case: str, is_profiled: bool) -> None:
     """Import one case and print its figures."""
-    from tts2face.interchange.characters.importing import import_face, save_face
+    from tts2face.interchange.characters.importing import import_face
+    from tts2face.interchange.characters.saving import save_face
 
     character = folder / ("dense.glb" if case.startswith("58") else "head.glb")
     landmarks = folder / "landmarks.tsv" if case.endswith("given") else None

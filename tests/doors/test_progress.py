@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from cli.process import progress_bar, stage_bar
+from cli.progress import progress_bar, stage_bar
 
 
 def test_a_bar_starts_again_with_each_stage(

@@ -106,7 +106,8 @@ def character(folder: Path) -> Fingerprint:
     """A character of another program: imported, saved, drawn, and animated in its own file."""
     from tests.interchange.characters.made import Variant, head_without_mouth, write_character_file, write_landmarks
     from tts2face.interchange.characters.animation import write_character
-    from tts2face.interchange.characters.importing import import_face, save_face
+    from tts2face.interchange.characters.importing import import_face
+    from tts2face.interchange.characters.saving import save_face
 
     variant = Variant(is_skinned=True, is_dense=True, dropped=DROPPED)
     made = write_character_file(folder / "made.glb", variant, head_without_mouth())

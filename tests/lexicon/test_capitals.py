@@ -5,9 +5,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lexicon.capitals import is_in_capitals, sentence_case
+from lexicon.growing_text import GrowingText
 from lexicon.pronounce import pronounce
 from lexicon.sentences import split_sentences
-from lexicon.spoken_words import GrowingText, pronounce_marked
+from lexicon.spoken_words import pronounce_marked
 from lexicon.text_marks import parse_marks
 
 

@@ -2,7 +2,8 @@
 
 import pytest
 
-from lexicon.pronounce import pronounce, spoken_form
+from lexicon.pronounce import pronounce
+from lexicon.spoken_form import spoken_form
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,8 @@ import numpy as np
 import pytest
 from numba.core.errors import NumbaError
 
-from cli.process import COMPILATION, compilation_messages, progress_bar
+from cli.process import COMPILATION
+from cli.progress import compilation_messages, progress_bar
 from lexicon.errors import BackendError
 from tests.picture.film.lit_face import lit_tiny_face
 from tests.processes.answered import answered

@@ -7,7 +7,7 @@ import pytest
 
 from lexicon.errors import InputError
 from tests.packages import needs
-from tts2face.video.streaming import CaptureDevice
+from tts2face.video.camera import CaptureDevice
 
 needs("cv2")
 

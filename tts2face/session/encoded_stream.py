@@ -10,7 +10,8 @@ from types import MappingProxyType
 
 from lexicon.errors import InputError
 from lexicon.values.fields import check_fields
-from tts2face.interchange.exports.parts import FormatWriter, FrameGrid
+from tts2face.interchange.exports.frame_grid import FrameGrid
+from tts2face.interchange.exports.parts import FormatWriter
 from tts2face.interchange.exports.table import FormatInfo, all_formats
 from tts2face.interchange.exports.writer import ExportFile, ExportWriter, make_target, mesh_of, plan_exports
 from tts2face.models.face import Face

@@ -166,7 +166,7 @@ def test_a_gltf_file_with_files_beside_it(tmp_path: Path) -> None:
 
 
 def test_a_picture_of_many_pixels_is_refused(tmp_path: Path) -> None:
-    from tts2face.interchange.characters.meshes import decode_image
+    from tts2face.interchange.characters.materials import decode_image
 
     width = (100_000).to_bytes(4, "big")
     import zlib

@@ -10,7 +10,7 @@ from lexicon.sequence import PhoneSequence, WordSpan
 from tests.interchange.exports.made import RATE, made_clip, made_stream, silent_clip
 from tests.packages import package
 from tts2face.interchange.exports.captions import MAX_CUE_CHARACTERS, MAX_CUE_S, MAX_LINE_CHARACTERS, sentence_cues
-from tts2face.interchange.exports.parts import Label
+from tts2face.interchange.exports.labels import Label
 from tts2face.types import Clip, Speech, Trajectory, Waveform, resting_head
 
 pysubs2 = package("pysubs2")

@@ -18,7 +18,7 @@ from lexicon.sequence import PhoneSequence
 from tests.interchange.exports.made import PHONES as MADE_PHONES
 from tests.interchange.exports.made import WORDS, made_clip, made_stream, silent_clip
 from tests.packages import package
-from tts2face.interchange.exports.parts import Label
+from tts2face.interchange.exports.labels import Label
 from tts2face.interchange.exports.visemes import INVENTORIES, OCULUS, viseme_labels, viseme_table
 from tts2face.types import Clip, Speech, concatenate_clips
 

@@ -12,7 +12,7 @@ import tts2face
 from lexicon.errors import BackendError, InputError
 from tests.interchange.exports.made import FACE, RATE, format_parameter, made_clip, made_stream, silent_clip
 from tts2face.interchange.exports.arkit import ARKIT_SHAPES
-from tts2face.interchange.exports.parts import FrameGrid
+from tts2face.interchange.exports.frame_grid import FrameGrid
 from tts2face.interchange.exports.table import FORMATS
 from tts2face.picture.film import write_clips
 from tts2face.picture.movie import MOVIE_KINDS, encode_movie
@@ -153,7 +153,7 @@ def test_a_folder_that_cannot_be_written_is_reported(tmp_path, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("tts2face.interchange.exports.motion.NpzWriter.finish", full)
+    monkeypatch.setattr("tts2face.interchange.exports.npz.NpzWriter.finish", full)
     with pytest.raises(BackendError, match=r"a.npz: No space left on device; free some space"):
         tts2face.export(made_clip(), tmp_path / "a.npz")
     assert not list(tmp_path.iterdir())

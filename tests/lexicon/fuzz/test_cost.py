@@ -9,14 +9,14 @@ import pytest
 from lexicon.chunks import split_chunks, split_phrase
 from lexicon.dictionary import parse_dictionary, word_set
 from lexicon.errors import DataError, InputError
+from lexicon.growing_text import GrowingText
 from lexicon.ipa import parse_ipa
 from lexicon.normalize import normalize
 from lexicon.pronounce import pronounce
 from lexicon.scripts import check_script
 from lexicon.sentences import split_sentences
-from lexicon.spoken_words import GrowingText
 from lexicon.text_marks import parse_marks
-from tts2face.interchange.subtitles.cues import spoken_text
+from tts2face.interchange.subtitles.spoken_text import spoken_text
 
 UNITS = (
     *word_set(". ! !? … a. ( ) ' [ < & 1 1, 1. 1: 1/ - a- — 1– ~ ^ ^1 * _ / @ a@ a@b. w. http:// $ $1 5' 1e + # #a"),

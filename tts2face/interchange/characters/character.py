@@ -1,28 +1,16 @@
-"""Character: meshes, materials, named shapes and bones of an imported file, in the file's own units.
+"""Character: meshes, materials, named shapes and bones of an imported file, in the file's own units."""
 
-What a face keeps about the character that it was imported from, to write animation back onto its file.
-"""
-
-import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
-from hashlib import sha256
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-
-from lexicon.errors import DataError, InputError
-from tts2face.interchange.characters.shapes import ShapeMapping, ShapeSource
-from tts2face.models.face import Face
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 OPAQUE = "OPAQUE"
 MASK = "MASK"
 BLEND = "BLEND"
-KEY = "character"  # of the face's metadata
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,103 +128,3 @@ def linear(points: FloatArray, matrix: FloatArray) -> FloatArray:
         return moved
     moved = points @ matrix[:3, :3].T
     return moved
-
-
-@dataclass(frozen=True, slots=True)
-class CharacterBinding:
-    """Link from a face to the file of its character.
-
-    Parameters
-    ----------
-    file, sha256
-        Path of the file and hash of its content; no hash for .obj files.
-    yaw_deg, scale, origin
-        Turn of the file's axes about y, then ``mm = (place - origin) * scale``.
-    mapping
-        Morph targets and expressions of each shape.
-    """
-
-    file: str
-    sha256: str
-    yaw_deg: float
-    scale: float
-    origin: tuple[float, float, float]
-    mapping: ShapeMapping
-
-    def as_metadata(self) -> dict[str, Any]:
-        """The binding as JSON."""
-        sources = {
-            shape: [[source.name, source.gain, source.side] for source in self.mapping[shape]] for shape in self.mapping
-        }
-        plain = {key: value for key, value in asdict(self).items() if key != "mapping"}
-        return plain | {"origin": list(self.origin), "mapping": sources}
-
-
-def has_binding(face: Face) -> bool:
-    """Whether a face was imported from a file onto which animation can be written."""
-    found = face.metadata.get(KEY)
-    return isinstance(found, dict) and bool(found.get("sha256"))
-
-
-def read_binding(face: Face) -> CharacterBinding:
-    """Binding of an imported face.
-
-    Raises
-    ------
-    InputError
-        The face was not imported, or was imported from .obj files.
-    DataError
-        Its metadata are damaged.
-    """
-    found = face.metadata.get(KEY)
-    if not isinstance(found, dict):
-        raise InputError("the face was not imported from a character's file; import one with `tts2face face import`")
-    if not found.get("sha256"):
-        raise InputError("the face was imported from .obj files, which hold no animation; import a .glb file instead")
-    try:
-        x, y, z = (float(value) for value in found["origin"])
-        binding = CharacterBinding(
-            file=str(found["file"]),
-            sha256=str(found["sha256"]),
-            yaw_deg=float(found["yaw_deg"]),
-            scale=float(found["scale"]),
-            origin=(x, y, z),
-            mapping={
-                str(shape): tuple(ShapeSource(str(name), float(gain), str(side)) for name, gain, side in sources)
-                for shape, sources in found["mapping"].items()
-            },
-        )
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise _damaged() from error
-    numbers = (binding.yaw_deg, binding.scale, x, y, z)
-    if not all(math.isfinite(value) for value in numbers) or binding.scale <= 0:
-        raise _damaged()
-    return binding
-
-
-def character_file(binding: CharacterBinding, given: str | Path | None = None) -> Path:
-    """Path of the character's file, unchanged since its import; by default the path of the import.
-
-    Raises
-    ------
-    DataError
-        The file is missing or has changed.
-    """
-    path = Path(binding.file if given is None else given)
-    if not path.is_file() and given is not None:
-        raise DataError(f"there is no character {path}; check the path")
-    if not path.is_file():
-        raise DataError(
-            f"there is no character {path}, from which the face was imported; "
-            "if it was moved, run `tts2face face relink FACE.face CHARACTER`"
-        )
-    if sha256(path.read_bytes()).hexdigest() != binding.sha256:
-        raise DataError(
-            f"the content of {path} differs from the file from which the face was imported; "
-            "import it again, or give that file"
-        )
-    return path
-
-
-def _damaged() -> DataError:
-    return DataError("what the face says about its character is damaged; import the character again")

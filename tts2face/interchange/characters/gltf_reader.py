@@ -5,7 +5,8 @@ from pathlib import Path
 
 from lexicon.errors import DataError
 from tts2face.interchange.characters.character import Character, Material, MorphTarget
-from tts2face.interchange.characters.meshes import MaterialReader, read_pieces, target_names
+from tts2face.interchange.characters.materials import MaterialReader
+from tts2face.interchange.characters.meshes import read_pieces, target_names
 from tts2face.interchange.gltf.fields import Fields
 from tts2face.interchange.gltf.nodes import find_bones, read_nodes
 from tts2face.interchange.gltf.reader import GltfFile, read_gltf

@@ -1,7 +1,4 @@
-"""Import of a character of another program as a face: ``tts2face face import``.
-
-Writing of imported faces, checked before they appear.
-"""
+"""Import of a character of another program as a face: ``tts2face face import``."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,9 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import BackendError, DataError, InputError
-from tts2face.interchange.characters.character import KEY, Character, CharacterBinding, character_file, read_binding
+from lexicon.errors import DataError, InputError
+from tts2face.interchange.characters.binding import KEY, CharacterBinding
+from tts2face.interchange.characters.character import Character
 from tts2face.interchange.characters.eyeballs import mark_eyeballs
+from tts2face.interchange.characters.fitting import drop_unsuited_shapes, missing_shapes, place_face
 from tts2face.interchange.characters.gltf_reader import read_gltf_character
 from tts2face.interchange.characters.head_mesh import (
     HeadMesh,
@@ -34,25 +33,13 @@ from tts2face.interchange.characters.landmarks import (
 from tts2face.interchange.characters.obj_reader import read_obj_folder
 from tts2face.interchange.characters.shape_names import guess_mapping
 from tts2face.interchange.characters.shapes import ShapeMapping, read_mapping
-from tts2face.interchange.characters.surface import (
-    Placement,
-    add_gaze_shapes,
-    build_face,
-    drop_unsuited_shapes,
-    is_plain,
-    missing_shapes,
-    place_face,
-    unwrap,
-)
+from tts2face.interchange.characters.surface import Placement, add_gaze_shapes, build_face, is_plain, unwrap
 from tts2face.interchange.characters.surface_points import nearest_points
 from tts2face.interchange.gltf.reader import SUFFIXES
 from tts2face.models.face import Face
-from tts2face.models.face_file import FORMAT_VERSION, KIND, read_face, write_face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.picture.occlusion import bake_occlusion
 from tts2face.processes.threads import available_cores
-from tts2face.storage.temporary import Temporary
-from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.video.tracking import MIN_SCORE
 
 FRONTS = {"+z": 0.0, "-z": 180.0, "+x": -90.0, "-x": 90.0}  # axis that a character looks along -> turn, degrees
@@ -311,52 +298,3 @@ def _metadata(path: Path, character: Character, mapping: ShapeMapping, head: Hea
         "attribution": "",
         KEY: binding.as_metadata(),
     }
-
-
-def save_face(path: str | Path, face: Face) -> None:
-    """Write a face to a ``.face`` file, which appears when its content has been read back and checked.
-
-    Raises
-    ------
-    DataError
-        The face breaks a rule of the format, for example too many vertices times shapes.
-    BackendError
-        The file cannot be written.
-    """
-    path = Path(path)
-    try:
-        with Temporary(path) as temporary:
-            write_face(temporary.path, face)
-            _check(temporary.path, path)
-            temporary.replace(path)
-    except OSError as error:
-        raise BackendError(
-            f"cannot write {path}: {error.strerror}; free some space or choose another folder"
-        ) from error
-
-
-def relink_face(path: str | Path, character: str | Path) -> Path:
-    """Write the new place of a moved character into the ``.face`` file that was imported from it; that place.
-
-    Raises
-    ------
-    InputError
-        There is no such face, or it was not imported from a .glb, .gltf or .vrm file.
-    DataError
-        The face is damaged, the character is missing, or its content is not that of the import.
-    BackendError
-        The file cannot be written.
-    """
-    path = Path(path)
-    place = character_file(read_binding(read_face(path)), character).resolve()
-    arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
-    header["metadata"][KEY]["file"] = str(place)
-    write_tensors(path, KIND, FORMAT_VERSION, arrays, header, is_packed=True)
-    return place
-
-
-def _check(written: Path, path: Path) -> None:
-    try:
-        read_face(written)
-    except DataError as wrong:
-        raise DataError(str(wrong).replace(str(written), str(path))) from wrong

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from lexicon.values.files import read_text
 from tts2face.interchange.characters.character import BLEND, Material
-from tts2face.interchange.characters.meshes import decode_image
+from tts2face.interchange.characters.materials import decode_image
 from tts2face.interchange.gltf.reader import read_bytes
 from tts2face.picture.kernels.tables import linear_light
 

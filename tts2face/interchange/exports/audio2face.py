@@ -3,7 +3,8 @@
 import json
 
 from tts2face.interchange.exports.arkit import ARKIT_SHAPES, build_arkit_projection
-from tts2face.interchange.exports.parts import Part, Target, frame_rows
+from tts2face.interchange.exports.frame_grid import frame_rows
+from tts2face.interchange.exports.parts import Part, Target
 
 N_DIGITS = 10  # digits reserved for the number of frames, which is known last
 

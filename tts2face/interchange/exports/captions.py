@@ -5,7 +5,8 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from difflib import SequenceMatcher
 
-from tts2face.interchange.exports.parts import Label, Part, Target, part_words
+from tts2face.interchange.exports.labels import Label, part_words
+from tts2face.interchange.exports.parts import Part, Target
 
 MAX_LINE_CHARACTERS = 42  # of a line of captions, a common limit of subtitling guides
 MAX_CUE_CHARACTERS = 2 * MAX_LINE_CHARACTERS

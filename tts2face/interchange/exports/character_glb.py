@@ -4,7 +4,7 @@ import numpy as np
 
 from lexicon.errors import InputError
 from tts2face.interchange.characters.animation import animate_character
-from tts2face.interchange.characters.character import character_file, has_binding, read_binding
+from tts2face.interchange.characters.binding import character_file, has_binding, read_binding
 from tts2face.interchange.exports.face_glb import FaceGlbWriter
 from tts2face.interchange.exports.parts import FormatWriter, Part, Target
 from tts2face.storage.output_paths import refuse_overwriting

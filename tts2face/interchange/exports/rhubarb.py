@@ -6,7 +6,8 @@ from pathlib import Path
 from xml.sax.saxutils import escape
 
 from lexicon.sequence import SILENCE
-from tts2face.interchange.exports.parts import AllLabels, Part, Target
+from tts2face.interchange.exports.labels import AllLabels
+from tts2face.interchange.exports.parts import Part, Target
 from tts2face.interchange.exports.visemes import viseme_labels
 
 Cue = tuple[str, str, str]  # start and end in seconds with two decimals, as Rhubarb writes them, and shape

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 from lexicon.errors import InputError
 from lexicon.sequence import PhoneSequence, WordSpan
-from tts2face.interchange.exports.parts import AllLabels, Part, Target
+from tts2face.interchange.exports.labels import AllLabels
+from tts2face.interchange.exports.parts import Part, Target
 
 if TYPE_CHECKING:
     pass

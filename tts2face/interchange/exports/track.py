@@ -20,7 +20,8 @@ from lexicon.sequence import PhoneSequence, WordSpan
 from lexicon.values.checks import EXPECTED, Place, check_type, list_of, typed
 from lexicon.values.files import check_regular_file
 from lexicon.values.json_text import parse_json
-from tts2face.interchange.exports.parts import Part, Target, frame_rows
+from tts2face.interchange.exports.frame_grid import frame_rows
+from tts2face.interchange.exports.parts import Part, Target
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
 FORMAT_NAME = "tts2face-track"

@@ -3,7 +3,8 @@
 import json
 from typing import Any
 
-from tts2face.interchange.exports.parts import Label, Part, PhoneLabels, Target
+from tts2face.interchange.exports.labels import Label, PhoneLabels
+from tts2face.interchange.exports.parts import Part, Target
 from tts2face.interchange.exports.visemes import OCULUS, viseme_labels
 
 TICKS_PER_SECOND = 10_000_000  # Azure states offsets in units of 100 ns

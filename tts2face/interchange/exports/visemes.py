@@ -9,7 +9,7 @@ from importlib import resources
 from types import MappingProxyType
 
 from lexicon.phones import look_up_phone
-from tts2face.interchange.exports.parts import Label
+from tts2face.interchange.exports.labels import Label
 
 OCULUS = ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "I", "O", "U")  # index = id
 AZURE = tuple(str(number) for number in range(22))

@@ -3,7 +3,8 @@
 import json
 from typing import TYPE_CHECKING
 
-from tts2face.interchange.exports.parts import Part, Target, part_words
+from tts2face.interchange.exports.labels import part_words
+from tts2face.interchange.exports.parts import Part, Target
 
 if TYPE_CHECKING:
     pass

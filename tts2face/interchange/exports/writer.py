@@ -7,7 +7,8 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Protocol, TextIO
 
 from lexicon.errors import InputError
-from tts2face.interchange.exports.parts import FormatWriter, FrameGrid, Target
+from tts2face.interchange.exports.frame_grid import FrameGrid
+from tts2face.interchange.exports.parts import FormatWriter, Target
 from tts2face.interchange.exports.table import FormatInfo, find_format, sound_name, split_format
 from tts2face.storage.files import translate_disk_errors
 from tts2face.storage.output_paths import check_name

@@ -8,8 +8,9 @@ from pathlib import Path
 from lexicon.errors import DataError
 from tts2face.interchange.subtitles.blocks import read_subrip, read_webvtt
 from tts2face.interchange.subtitles.clock import HAS_ARROW
-from tts2face.interchange.subtitles.cues import Cue, Subtitles, SubtitleWarning, WrittenCue, spoken_text
+from tts2face.interchange.subtitles.cues import Cue, Subtitles, SubtitleWarning, WrittenCue
 from tts2face.interchange.subtitles.decoding import read_text
+from tts2face.interchange.subtitles.spoken_text import spoken_text
 from tts2face.interchange.subtitles.substation import read_substation
 from tts2face.interchange.subtitles.ttml import read_ttml
 

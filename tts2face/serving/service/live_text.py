@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from lexicon.errors import DataError
-from lexicon.spoken_words import GrowingText
+from lexicon.growing_text import GrowingText
 from lexicon.values.checks import format_value
 from lexicon.values.json_text import parse_json
 from tts2face.serving.service.errors import RefusedError

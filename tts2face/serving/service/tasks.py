@@ -59,7 +59,7 @@ def timed_speech(session: "Session", work: Work, _: Inputs) -> Iterator[Event | 
 
 
 def _timed_event(timed: "Piece") -> Event:
-    from tts2face.interchange.exports.parts import Label
+    from tts2face.interchange.exports.labels import Label
     from tts2face.interchange.exports.visemes import viseme_labels
 
     spoken, phones, begin = timed.speech, timed.speech.phones, timed.begin

@@ -282,7 +282,7 @@ def _check_dictionary(source: Path, out: Path) -> dict[str, Any]:
 
 def _rewrite(source: Path, out: Path, kind: str, version: int) -> None:
     """Write arrays and metadata again, without links to files of the machine that made them."""
-    from tts2face.interchange.characters.character import KEY
+    from tts2face.interchange.characters.binding import KEY
     from tts2face.models.face_schema import check_face
     from tts2face.storage.tensors import read_tensors, write_tensors
 

@@ -26,7 +26,8 @@ from tests.interchange.characters.made import (
 from tests.interchange.exports import programs
 from tests.packages import package
 from tts2face.face.deformation import build_rig
-from tts2face.interchange.characters.animation import NECK_SHARE, write_character
+from tts2face.interchange.characters.animation import write_character
+from tts2face.interchange.characters.bone_tracks import NECK_SHARE
 from tts2face.interchange.characters.importing import import_face
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face

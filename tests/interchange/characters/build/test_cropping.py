@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.interchange.characters.made import shipped_head, write_character_file
+from tts2face.interchange.characters.cutting import cut_triangles
 from tts2face.interchange.characters.gltf_reader import read_gltf_character
-from tts2face.interchange.characters.head_mesh import NECK_SHARE, WIDTH_SHARE, build_head_mesh, cut_triangles, moved_box
+from tts2face.interchange.characters.head_mesh import NECK_SHARE, WIDTH_SHARE, build_head_mesh, moved_box
 from tts2face.interchange.characters.importing import propose_mapping
 
 ROUNDING = 1e-9  # of coordinates of about 1

@@ -15,7 +15,8 @@ from tests.interchange.characters.made import (
     write_character_file,
     write_landmarks,
 )
-from tts2face.interchange.characters.importing import import_face, save_face
+from tts2face.interchange.characters.importing import import_face
+from tts2face.interchange.characters.saving import save_face
 from tts2face.models.face_file import read_face
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import draw

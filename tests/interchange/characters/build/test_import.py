@@ -20,8 +20,9 @@ from tests.interchange.characters.made import (
 )
 from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.face.gestures import gesture_face
-from tts2face.interchange.characters.importing import ImportedFace, import_face, save_face
+from tts2face.interchange.characters.importing import ImportedFace, import_face
 from tts2face.interchange.characters.landmark_table import landmark_table, read_landmark_table
+from tts2face.interchange.characters.saving import save_face
 from tts2face.interchange.characters.shapes import mapping_table, read_mapping
 from tts2face.lips.retargeting import build_retargeter
 from tts2face.models.face import Face

@@ -16,7 +16,8 @@ from tests.interchange.characters.build.test_animation import FPS, N_FRAMES, Pla
 from tests.interchange.characters.made import METRES, Variant, shipped_head, write_character_file, write_landmarks
 from tests.interchange.exports import programs
 from tts2face.face.deformation import head_rotation, rotation_matrix
-from tts2face.interchange.characters.animation import NECK_SHARE, share_of_rotation, write_character
+from tts2face.interchange.characters.animation import write_character
+from tts2face.interchange.characters.bone_tracks import NECK_SHARE, share_of_rotation
 from tts2face.interchange.characters.importing import import_face
 from tts2face.models.face import VERTEX_COLOURS
 from tts2face.numeric.arrays import quaternion_matrix

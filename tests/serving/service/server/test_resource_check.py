@@ -17,7 +17,7 @@ from tests.interchange.characters.made import Variant, head_without_mouth, write
 from tests.models.made import write_made_models, write_made_talker
 from tests.photo.pictures import still
 from tests.processes.answered import refusal
-from tts2face.interchange.characters.character import KEY
+from tts2face.interchange.characters.binding import KEY
 from tts2face.models.consent import PHOTO_TOOL
 from tts2face.models.face_file import read_face
 from tts2face.models.light import Photographed

@@ -13,7 +13,7 @@ from fastapi import Request as HttpRequest
 from fastapi.responses import JSONResponse, PlainTextResponse
 from pydantic import BaseModel, ConfigDict, Field
 
-from tts2face.interchange.exports.parts import Label
+from tts2face.interchange.exports.labels import Label
 from tts2face.picture.sound_stream import wav_header
 from tts2face.serving.service.client_names import Adjustments, choose_voice, limited_rate
 from tts2face.serving.service.errors import ErrorBody, RefusedError
