@@ -1,4 +1,13 @@
-"""Reading of subtitle files: SubRip, WebVTT, SubStation Alpha and TTML, with warnings in place of refusals."""
+"""Reading of subtitle files: SubRip, WebVTT, SubStation Alpha and TTML, with warnings in place of refusals.
+
+How the next format is made:
+
+1. Write a function from the lines of a file to `WrittenCue` objects and `SubtitleWarning` objects in a module of its
+   own here, as `tts2face.interchange.subtitles.substation` does; a DataError only where nothing can be read.
+2. Name the format below, with its endings in `SUFFIXES`, recognise its content in `subtitle_format`, and call the
+   function in `_read`; order, missing ends and speakers are the same for all formats.
+3. Say in docs/subtitles.md what is read of it, and add its file and its defects to tests/interchange/subtitles.
+"""
 
 import re
 from collections.abc import Sequence
