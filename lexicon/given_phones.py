@@ -36,7 +36,7 @@ def words_with_given_phones(written: str, phones: Sequence[PhoneMark], language:
     """
     names = _placeholders(written, len(phones))
     placeholder = re.compile(rf"{_placeholder_stem(written)}[a-z]+")
-    spoken = spoken_form(_insert_placeholders(written, phones, names), language).split()
+    spoken = spoken_form("".join(_pieces_of_phones(written, phones, names)), language).split()
     marks = dict(zip(names, phones, strict=True))
     words: list[TextWord] = []
     for word in spoken:
@@ -99,10 +99,6 @@ def _placeholders(written: str, n: int) -> list[str]:
     return [
         stem + letters[k // 676 % 26] + letters[k // 26 % 26] + letters[k % 26] + "q" * (k // 17576) for k in range(n)
     ]
-
-
-def _insert_placeholders(written: str, phones: Sequence[PhoneMark], names: Sequence[str]) -> str:
-    return "".join(_pieces_of_phones(written, phones, names))
 
 
 def _pieces_of_phones(written: str, phones: Sequence[PhoneMark], names: Sequence[str]) -> Iterator[str]:

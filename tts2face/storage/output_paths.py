@@ -93,7 +93,11 @@ def refuse_overwriting(outputs: Mapping[str, AnyPath], inputs: Mapping[str, AnyP
         same file.
     """
     written = [(name, Path(path)) for name, path in outputs.items() if path is not None]
-    read = [(name, Path(path)) for name, path in inputs.items() if path is not None and _is_path(path)]
+    read = [
+        (name, Path(path))
+        for name, path in inputs.items()
+        if path is not None and os.path.lexists(path) and (isinstance(path, Path) or Path(path).suffix)
+    ]
     for at, (name, output) in enumerate(written):
         for other, earlier in written[:at]:
             if _is_same(output, earlier):
@@ -107,10 +111,6 @@ def refuse_overwriting(outputs: Mapping[str, AnyPath], inputs: Mapping[str, AnyP
                 )
             if given.is_dir() and output.exists() and output.suffix not in OUTPUT_SUFFIXES and _lies_in(output, given):
                 raise InputError(f"{name} {output} would replace a file of {source}; choose another name")
-
-
-def _is_path(given: Path | str) -> bool:
-    return os.path.lexists(given) and (isinstance(given, Path) or Path(given).suffix != "")
 
 
 def _is_same(path: Path, other: Path) -> bool:

@@ -74,11 +74,12 @@ def _by_bones(head: HeadMesh, character: Character) -> NDArray[np.int8]:
     if not all(bone in character.bones for bone in BONES.values()):
         return marked
     nodes = {number: _ancestors(number, character.parents) for number in np.unique(head.bones).tolist()}
+    middle = float((head.vertices[:, 0].min() + head.vertices[:, 0].max()) / 2)
     for bone in BONES.values():
         follows = [number for number, above in nodes.items() if character.bones[bone] in above]
         is_on = np.isin(head.bones, follows)
         if is_on.any():  # the character's left is +x whatever the bone's name says
-            marked[is_on] = LEFT_EYE if head.vertices[is_on, 0].mean() > _middle(head) else RIGHT_EYE
+            marked[is_on] = LEFT_EYE if head.vertices[is_on, 0].mean() > middle else RIGHT_EYE
     return marked
 
 
@@ -88,10 +89,6 @@ def _ancestors(node: int, parents: Mapping[int, int]) -> set[int]:
         node = parents[node]
         found.add(node)
     return found
-
-
-def _middle(head: HeadMesh) -> float:
-    return float((head.vertices[:, 0].min() + head.vertices[:, 0].max()) / 2)
 
 
 def _by_spheres(head: HeadMesh) -> NDArray[np.int8]:

@@ -167,7 +167,9 @@ def _join(character: Character, mapping: ShapeMapping, turn: FloatArray) -> Head
         vertices=ordered_product(np.concatenate([_at_rest(piece, driven) for piece in pieces]), turn.T),
         triangles=np.concatenate([piece.triangles + start for piece, start in zip(pieces, starts, strict=False)]),
         piece_of=np.repeat(np.arange(len(pieces)), [len(piece.triangles) for piece in pieces]),
-        uv=np.concatenate([_or_nan(piece.uv, len(piece.vertices)) for piece in pieces]),
+        uv=np.concatenate(
+            [np.full((len(piece.vertices), 2), np.nan) if piece.uv is None else piece.uv for piece in pieces]
+        ),
         colours=np.concatenate(
             [np.ones(piece.vertices.shape) if piece.colours is None else piece.colours for piece in pieces]
         ),
@@ -199,7 +201,3 @@ def _displacement(piece: MaterialPiece, sources: list[Mapping[MorphTarget, float
     for weight, morph in used:
         moved += np.float32(weight) * morph
     return moved
-
-
-def _or_nan(uv: FloatArray | None, count: int) -> FloatArray:
-    return np.full((count, 2), np.nan) if uv is None else uv

@@ -1,7 +1,6 @@
 """Pictures to check a face with: its landmarks, and a contact sheet of all shapes."""
 
 import io
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,9 +110,6 @@ def _draw_landmarks(face: Face, weights: NDArray[np.float32], camera: str) -> Pi
     for x, y in places[np.isfinite(places[:, 0])]:
         pen.ellipse((x - 1.5, y - 1.5, x + 1.5, y + 1.5), fill=(255, 255, 255))
     for line, colour in LINES:
-        pen.line(_known(places, line), fill=colour, width=2)
+        known = [(float(x), float(y)) for x, y in places[list(line)] if np.isfinite(x)]
+        pen.line(known, fill=colour, width=2)
     return np.array(drawn)
-
-
-def _known(places: NDArray[np.float64], line: Sequence[int]) -> list[tuple[float, float]]:
-    return [(float(x), float(y)) for x, y in places[list(line)] if np.isfinite(x)]

@@ -118,16 +118,12 @@ def build_face(head: HeadMesh, character: Character, placement: Placement) -> Fa
         eyes=_eyes(head, character, placement, names),
         colours=colours,
         uv=None if atlas.texture is None else uv.astype(np.float32),
-        textures=_textures(atlas, has_holes),
+        textures=() if atlas.texture is None else (Texture(atlas.texture, atlas.alpha if has_holes else None),),
         landmarks=np.zeros(0, np.int32),
         landmark_vertices=np.zeros((0, 3), np.int32),
         landmark_weights=np.zeros((0, 3), np.float32),
         pivot=np.zeros(3, np.float32),
     )
-
-
-def _textures(atlas: Atlas, has_holes: bool) -> tuple[Texture, ...]:
-    return () if atlas.texture is None else (Texture(atlas.texture, atlas.alpha if has_holes else None),)
 
 
 def _parts(keys: list[tuple[str, int, float]], character: Character, atlas: Atlas) -> tuple[FacePart, ...]:
