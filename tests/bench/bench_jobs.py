@@ -22,10 +22,9 @@ from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.segment_result import SegmentResult
 from tts2face.serving.batch.store import open_store
 from tts2face.serving.work.database import database_url, prepare_database
-from tts2face.serving.work.engine import DatabaseEngine
+from tts2face.serving.work.engine import DatabaseEngine, enqueue, open_client
 from tts2face.serving.work.local_workers import LocalWorker, LocalWorkers
 from tts2face.serving.work.queue_control import list_jobs
-from tts2face.serving.work.segment_queue import enqueue, open_client
 from tts2face.serving.work.worker import Worker, poll_interval
 from tts2face.serving.work.workers import BEAT_S, Workers
 

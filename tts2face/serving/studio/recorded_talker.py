@@ -11,7 +11,7 @@ from lexicon.errors import BackendError
 from tts2face.processes.async_parent import call_once
 from tts2face.processes.child import Call, Handler
 from tts2face.processes.program import ProcessLimits, Program
-from tts2face.serving.work.talker_build import TOOL, TalkerBuild
+from tts2face.serving.work.talker_build import TOOL, talker_build
 from tts2face.serving.work.tools import run_tool
 
 # files in the folder of a recording
@@ -43,8 +43,11 @@ async def build_talker(folder: Path, *, name: str, consent: str, n_takes: int, o
     for old in (TALKER, REPORT, CLIP, MADE):
         (folder / old).unlink(missing_ok=True)
     shutil.rmtree(folder / CHECKED, ignore_errors=True)
-    seconds = SECONDS_A_TAKE * n_takes
-    build = TalkerBuild(folder, name, consent, {"name": name}, seconds, MAX_TALKER_BYTES)
+    order = {
+        "folder": str(folder), "name": name, "consent": consent, "provenance": {"name": name},
+        "with_appearance": True, "max_bytes": MAX_TALKER_BYTES,
+    }  # fmt: skip
+    build = talker_build(SECONDS_A_TAKE * n_takes, order)
     result = await run_tool(
         build.program, TOOL, build.order, on_message, what="the recording", timeout_s=build.timeout_s
     )

@@ -16,11 +16,10 @@ from tts2face.serving.batch.store import Store, wait_for_store
 from tts2face.serving.work.blobs import BlobStore, open_blobs
 from tts2face.serving.work.changes import Ending, JobChanges
 from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase, connection_errors
-from tts2face.serving.work.engine import DatabaseEngine
+from tts2face.serving.work.engine import ACTIVE, JOBS_PER_QUERY, DatabaseEngine, failure_reason, open_client
 from tts2face.serving.work.job_record import DONE, FAILED, JobFile, JobRecord
 from tts2face.serving.work.kinds import JobCancelledError, JobTask, Product, find_runner
 from tts2face.serving.work.placed_files import place_file, place_models
-from tts2face.serving.work.segment_queue import ACTIVE, JOBS_PER_QUERY, failure_reason, open_client
 from tts2face.storage.bucket import StoreAwayError
 from tts2face.storage.temporary import Temporary
 from tts2face.storage.user_folders import without_folders

@@ -138,13 +138,14 @@ class JobTable:
             insert_files(change, new.id, INPUT, new.inputs)
             self.add_event(change, new.id, {"type": "state", "state": "waiting"})
             enqueue(change, n_waiting)
-            return self._read(change, new.id), True
+            made = self._find(change, "j.id = :id", id=new.id)
+            assert made is not None
+            return made, True
 
     def get(self, job_id: str) -> JobRecord | None:
         """A job with its files; None if there is none."""
         with self.database.transaction() as read:
-            found = read.rows(f"{self._select} WHERE j.id = :id", id=job_id)
-            return _with_files(read, record_from_row(found[0])) if found else None
+            return self._find(read, "j.id = :id", id=job_id)
 
     def page(self, key_name: str | None, state: str | None, before: str | None, limit: int) -> list[JobRecord]:
         """Jobs without their files, the newest first.
@@ -245,17 +246,16 @@ class JobTable:
         """The job that has the idempotency key of a new one."""
         if new.idempotency_key is None:
             return None
-        query = f"{self._select} WHERE j.key_name = :key AND j.idempotency_key = :value"
-        found = change.rows(query, key=new.key_name, value=new.idempotency_key)
-        if not found:
-            return None
-        record = record_from_row(found[0])
-        if record.body_hash != new.body_hash:
+        condition = "j.key_name = :key AND j.idempotency_key = :value"
+        found = self._find(change, condition, key=new.key_name, value=new.idempotency_key)
+        if found is not None and found.body_hash != new.body_hash:
             raise OtherBodyError("this Idempotency-Key was sent with another body before; use a new one")
-        return _with_files(change, record)
+        return found
 
-    def _read(self, read: Transaction, job_id: str) -> JobRecord:
-        return _with_files(read, record_from_row(read.rows(f"{self._select} WHERE j.id = :id", id=job_id)[0]))
+    def _find(self, read: Transaction, condition: str, **values: Any) -> JobRecord | None:
+        """The job of a condition, with its files."""
+        rows = read.rows(f"{self._select} WHERE {condition}", **values)
+        return _with_files(read, record_from_row(rows[0])) if rows else None
 
 
 def insert_files(change: Transaction, job_id: str, role: str, files: Sequence[JobFile]) -> None:

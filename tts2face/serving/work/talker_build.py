@@ -1,10 +1,9 @@
-"""The build of a talker from recordings by the tool ``talker``: its order and its limits."""
+"""The build of a talker from recordings by the tool ``talker``, with its limits."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.util import find_spec
-from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from tts2face.processes.program import ProcessLimits, Program
 
@@ -15,47 +14,23 @@ CPU_S_PER_S = 40  # for each second of a recording; 256 x 256 pixels take 1 s a 
 SLOWNESS = 5.0  # elapsed time in units of the processor time, on a machine that has other work
 
 
-@dataclass(frozen=True, slots=True)
-class TalkerBuild:
-    """A build that is to be run by whoever calls the tool.
+class TalkerBuild(NamedTuple):
+    """A build for whoever calls the tool: the builder within its limits, its order, and the seconds that it may take."""
+
+    program: Program
+    order: Mapping[str, Any]
+    timeout_s: float
+
+
+def talker_build(seconds: float, order: Mapping[str, Any]) -> TalkerBuild:
+    """The build of an order for so many seconds of recordings.
 
     Parameters
     ----------
-    folder
-        It has the recordings in its folder ``recordings``; the builder writes beside it.
-    seconds
-        Of all recordings, for the limit of time.
-    max_bytes
-        Largest size of the talker.
+    order
+        ``folder``, whose folder ``recordings`` has them, and beside which the builder writes; ``name``, ``consent`` and
+        ``provenance``; ``with_appearance``; ``max_bytes`` of the talker.
     """
-
-    folder: Path
-    name: str
-    consent: str
-    provenance: Mapping[str, Any]
-    seconds: float
-    max_bytes: float
-    has_appearance: bool = True
-
-    @property
-    def order(self) -> dict[str, Any]:
-        """The order of the tool."""
-        return {
-            "folder": str(self.folder), "name": self.name, "provenance": self.provenance, "consent": self.consent,
-            "with_appearance": self.has_appearance, "with_report": find_spec("matplotlib") is not None,
-            "max_bytes": self.max_bytes,
-        }  # fmt: skip
-
-    @property
-    def program(self) -> Program:
-        """The builder within its limits."""
-        return Program(BUILDER, replace(LIMITS, cpu_s=self._cpu_s))
-
-    @property
-    def timeout_s(self) -> float:
-        """Elapsed time after which it is given up."""
-        return SLOWNESS * self._cpu_s
-
-    @property
-    def _cpu_s(self) -> int:
-        return int(CPU_S + CPU_S_PER_S * self.seconds)
+    cpu_s = int(CPU_S + CPU_S_PER_S * seconds)
+    order = {**order, "with_report": find_spec("matplotlib") is not None}
+    return TalkerBuild(Program(BUILDER, replace(LIMITS, cpu_s=cpu_s)), order, SLOWNESS * cpu_s)

@@ -16,7 +16,7 @@ from tts2face.serving.work.connection import DatabaseAwayError
 from tts2face.serving.work.kinds import JobTask, Product, Products
 from tts2face.serving.work.resource_check import TALKER
 from tts2face.serving.work.resources import ResourceTable, Usage, keep_files, over_quota, resource_from_folder
-from tts2face.serving.work.talker_build import TOOL, TalkerBuild
+from tts2face.serving.work.talker_build import TOOL, talker_build
 from tts2face.serving.work.tools import limits_of
 
 AWAY_S = 2.0  # between tries to reach the database
@@ -58,10 +58,12 @@ def _place(source: Path, target: Path) -> None:
 def _build(task: JobTask) -> Mapping[str, Any]:
     """Run the builder; its result."""
     asked = task.request
-    build = TalkerBuild(
-        task.folder, asked["name"], asked["consent"], asked["provenance"], float(asked["seconds"]),
-        asked["limits"]["n_bytes"], asked["appearance"],
-    )  # fmt: skip
+    order = {
+        "folder": str(task.folder), "name": asked["name"], "consent": asked["consent"],
+        "provenance": asked["provenance"], "with_appearance": asked["appearance"],
+        "max_bytes": asked["limits"]["n_bytes"],
+    }  # fmt: skip
+    build = talker_build(float(asked["seconds"]), order)
 
     def report(event: Message) -> None:
         with suppress(DatabaseAwayError):

@@ -33,8 +33,7 @@ from tts2face.serving.work.queues import (
 )
 from tts2face.serving.work.run import JobRunner, job_blobs
 from tts2face.serving.work.segment_worker import SegmentWorker, is_cancelled
-from tts2face.serving.work.takeover import list_running, return_work
-from tts2face.serving.work.workers import BEAT_S, Workers
+from tts2face.serving.work.workers import BEAT_S, Workers, list_running, return_work
 
 POLL_S = 0.2  # between two polls of the queue
 MAX_POLLS_PER_S = 200.0  # of all workers together: with more than 40, each polls less often

@@ -1,4 +1,10 @@
-"""The table of the workers that are alive in a database, and what they ask of the queues."""
+"""The workers of a database: who is alive, what they ask of the queues, and the return of the work of the dead.
+
+DBOS' open-source package has no fail-over of its own: work of an executor that died waits for an executor of the same
+id. Here every worker has a new id and sends heartbeats; with each of them it learns which workers have sent none for
+some time, and returns their work to the queue. A worker is forgotten only when none of its work is running any more. A
+segment that two workers take nevertheless is rendered twice and stored once, as its name is its content address.
+"""
 
 from collections.abc import Iterable
 from typing import Any
@@ -11,7 +17,7 @@ from tts2face.serving.work.connection import (
     open_engine,
     repeat_creation,
 )
-from tts2face.serving.work.queues import APPLICATION_VERSION, PLACES, WORKFLOWS
+from tts2face.serving.work.queues import APPLICATION_VERSION, JOB_WORKFLOW, PLACES, WORKFLOW, WORKFLOWS
 
 BEAT_S = 1.5  # between two heartbeats of a worker
 DEAD_AFTER_S = 6.0  # without a heartbeat; with the interval of looking this is below 10 s
@@ -25,13 +31,8 @@ ON CONFLICT (executor_id) DO UPDATE SET beat = {now}"""
 _FROM_LATER = "UPDATE tts2face_workers SET beat = {now} WHERE beat > {now} + 1"  # by a clock that was set back since
 _QUEUES = ", ".join(f"'{name}'" for name in PLACES)
 _WAITS = f"status = 'ENQUEUED' AND queue_name IN ({_QUEUES})"  # condition of the engine's rows
+_OURS = f"application_version = '{APPLICATION_VERSION}'"
 AHEAD_S = 60.0  # by which clocks of machines may differ
-
-
-def _waiting_query(kind: str) -> str:
-    """Query for one job of this version that waits in a queue, in the engine's table."""
-    version = f"application_version = '{APPLICATION_VERSION}'"
-    return f"SELECT 1 FROM {WORKFLOWS[kind]} WHERE {_WAITS} AND {version} LIMIT 1"
 
 
 class Workers:
@@ -42,8 +43,8 @@ class Workers:
 
         self._sql = sqlalchemy.text
         self._now = NOW[database_kind(url)]
-        self._waiting = _waiting_query(database_kind(url))
         self._table = WORKFLOWS[database_kind(url)]
+        self._waiting = f"SELECT 1 FROM {self._table} WHERE {_WAITS} AND {_OURS} LIMIT 1"
         self._database_error = sqlalchemy.exc.SQLAlchemyError
         self._engine = open_engine(url)
         self._looking: Any = None
@@ -143,3 +144,32 @@ class Workers:
         query = f"DELETE FROM tts2face_workers WHERE beat < {self._now} - :age"
         with self._engine.begin() as connection:
             connection.execute(self._sql(query), {"age": older_than_s})
+
+
+def return_work(executor_ids: set[str]) -> set[str]:
+    """Return the running work of executors to the queue; the executors that have none left.
+
+    The engine has no public function that does so safely: `resume_workflows` has no condition on the owner, so that it
+    would take work from a worker that has just taken it over, and it sets the number of tries to zero, so that a
+    segment that ends every worker would never fail (decision 083).
+    """
+    from dbos import DBOS
+
+    names = sorted(executor_ids)
+    DBOS._recover_pending_workflows(names)
+    return executor_ids - {str(job.executor_id) for job in list_running(names)}
+
+
+def list_running(executor_ids: list[str] | None = None) -> list[Any]:
+    """Running jobs of this version, of some executors or all."""
+    from dbos import DBOS
+
+    found: list[Any] = DBOS.list_workflows(
+        status="PENDING",
+        name=[WORKFLOW, JOB_WORKFLOW],
+        app_version=APPLICATION_VERSION,
+        executor_id=executor_ids,
+        load_input=False,
+        load_output=False,
+    )
+    return found

@@ -24,11 +24,10 @@ from tests.world import World
 from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import open_store
 from tts2face.serving.work.database import database_url, prepare_database, shown_url
-from tts2face.serving.work.engine import DatabaseEngine
+from tts2face.serving.work.engine import DatabaseEngine, enqueue, open_client
 from tts2face.serving.work.local_workers import LocalWorker, LocalWorkers
 from tts2face.serving.work.queue_control import cancel_jobs, list_jobs, prune_jobs, retry_jobs, show_job
 from tts2face.serving.work.queues import APPLICATION_VERSION
-from tts2face.serving.work.segment_queue import enqueue, open_client
 from tts2face.serving.work.workers import DEAD_AFTER_S, Workers
 
 Segments = Callable[..., dict[str, Segment]]

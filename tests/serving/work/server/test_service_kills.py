@@ -23,9 +23,9 @@ from tests.serving.service.receiver import Receiver
 from tests.serving.work.watch import StoreWatch, ends_of_jobs
 from tests.started import running_processes
 from tts2face.serving.work.database import database_url
+from tts2face.serving.work.engine import open_client
 from tts2face.serving.work.local_workers import LocalWorker, LocalWorkers
 from tts2face.serving.work.queue_control import list_jobs
-from tts2face.serving.work.segment_queue import open_client
 
 N_JOBS = int(os.environ.get("TTS2FACE_KILLED_JOBS", "20"))
 TIMEOUT_S = 240.0 + 4 * N_JOBS

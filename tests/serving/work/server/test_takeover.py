@@ -26,9 +26,8 @@ from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import open_store
 from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
-from tts2face.serving.work.engine import POLL_S, DatabaseEngine, _Awaited
+from tts2face.serving.work.engine import JOBS_PER_QUERY, POLL_S, DatabaseEngine, _Awaited, enqueue, open_client
 from tts2face.serving.work.queue_control import cancel_jobs, list_jobs, prune_jobs
-from tts2face.serving.work.segment_queue import JOBS_PER_QUERY, enqueue, open_client
 from tts2face.serving.work.worker import MAX_POLLS_PER_S, Worker, poll_interval
 from tts2face.serving.work.worker import POLL_S as WORKER_POLL_S
 from tts2face.serving.work.workers import BEAT_S, DEAD_AFTER_S, Workers
@@ -41,7 +40,7 @@ def test_the_engine_still_returns_the_work_of_dead_executors() -> None:
 
     assert callable(getattr(DBOS, "_recover_pending_workflows", None)), (
         "this release of dbos has no DBOS._recover_pending_workflows(executor_ids); "
-        "tts2face.serving.work.takeover.return_work needs "
+        "tts2face.serving.work.workers.return_work needs "
         "another way to return the work of dead workers to the queue (decision 083)"
     )
 
