@@ -52,9 +52,9 @@ _MIGRATION = (
 IS_OPEN = "ending IS NULL"  # condition of a query
 # The ending belongs to the results, and is written with them; whether an open job waits or runs is what DBOS says.
 # A workflow that has ended without its job counts as running until `JobRunner.end_abandoned`.
-_STATE = """CASE WHEN j.ending IS NOT NULL THEN j.ending
-    WHEN w.status IS NULL OR w.status IN ('ENQUEUED', 'DELAYED') THEN 'waiting' ELSE 'running' END"""
-_SHOWN = ", ".join(f"{_STATE} AS state" if name == "state" else f"j.{name}" for name in COLUMNS)
+_STATE = """CASE WHEN ending IS NOT NULL THEN ending
+    WHEN EXISTS (SELECT 1 FROM {workflows} WHERE workflow_uuid = tts2face_jobs.id
+        AND status NOT IN ('ENQUEUED', 'DELAYED')) THEN 'running' ELSE 'waiting' END"""
 CHILD_TABLES = ("tts2face_job_files", "tts2face_job_events", "tts2face_job_segments")
 
 
@@ -77,8 +77,9 @@ class JobTable:
 
     def __init__(self, database: JobDatabase) -> None:
         self.database = database
-        self._jobs = f"tts2face_jobs j LEFT JOIN {WORKFLOWS[database.kind]} w ON w.workflow_uuid = j.id"
-        self._select = f"SELECT {_SHOWN} FROM {self._jobs}"
+        self._state = _STATE.format(workflows=WORKFLOWS[database.kind])
+        shown = ", ".join(f"{self._state} AS state" if name == "state" else name for name in COLUMNS)
+        self._select = f"SELECT {shown} FROM tts2face_jobs"
 
     def create(self) -> None:
         """Create the tables or bring them up to date; several processes may do so at once."""
@@ -121,8 +122,8 @@ class JobTable:
             found = self._with_key(change, new)
             if found is not None:
                 return found, False
-            condition = f"j.key_name = :key AND j.{IS_OPEN} AND {_STATE} = 'waiting'"
-            n_waiting = int(change.value(f"SELECT count(*) FROM {self._jobs} WHERE {condition}", key=new.key_name))
+            condition = f"key_name = :key AND {IS_OPEN} AND {self._state} = 'waiting'"
+            n_waiting = int(change.value(f"SELECT count(*) FROM tts2face_jobs WHERE {condition}", key=new.key_name))
             if max_waiting is not None and n_waiting >= max_waiting:
                 raise QueueFullError(
                     f"the key {new.key_name} has {max_waiting} waiting jobs; wait until some have ended"
@@ -138,14 +139,14 @@ class JobTable:
             insert_files(change, new.id, INPUT, new.inputs)
             self.add_event(change, new.id, {"type": "state", "state": "waiting"})
             enqueue(change, n_waiting)
-            made = self._find(change, "j.id = :id", id=new.id)
+            made = self._find(change, "id = :id", id=new.id)
             assert made is not None
             return made, True
 
     def get(self, job_id: str) -> JobRecord | None:
         """A job with its files; None if there is none."""
         with self.database.transaction() as read:
-            return self._find(read, "j.id = :id", id=job_id)
+            return self._find(read, "id = :id", id=job_id)
 
     def page(self, key_name: str | None, state: str | None, before: str | None, limit: int) -> list[JobRecord]:
         """Jobs without their files, the newest first.
@@ -159,15 +160,15 @@ class JobTable:
         """
         conditions, values = ["1 = 1"], dict[str, Any](limit=limit)
         if key_name is not None:
-            conditions.append("j.key_name = :key")
+            conditions.append("key_name = :key")
             values["key"] = key_name
         if state is not None:
-            conditions.append(f"{_STATE} = :state")
+            conditions.append(f"{IS_OPEN} AND {self._state} = :state" if state in OPEN_STATES else "ending = :state")
             values["state"] = state
         if before is not None:
-            conditions.append("(j.created, j.id) < (SELECT created, id FROM tts2face_jobs WHERE id = :before)")
+            conditions.append("(created, id) < (SELECT created, id FROM tts2face_jobs WHERE id = :before)")
             values["before"] = before
-        query = f"{self._select} WHERE {' AND '.join(conditions)} ORDER BY j.created DESC, j.id DESC LIMIT :limit"
+        query = f"{self._select} WHERE {' AND '.join(conditions)} ORDER BY created DESC, id DESC LIMIT :limit"
         with self.database.transaction() as read:
             return [record_from_row(row) for row in read.rows(query, **values)]
 
@@ -193,10 +194,9 @@ class JobTable:
     def counts(self) -> tuple[dict[str, int], float]:
         """Numbers of jobs by state, and the age of the oldest waiting one in seconds."""
         with self.database.transaction() as read:
-            query = f"SELECT ending, count(*), 0.0 FROM tts2face_jobs WHERE NOT {IS_OPEN} GROUP BY ending"
-            rows = read.rows(query)
-            age = f"{self.database.now} - min(j.created)"
-            rows += read.rows(f"SELECT {_STATE}, count(*), {age} FROM {self._jobs} WHERE j.{IS_OPEN} GROUP BY 1")
+            rows = read.rows("SELECT ending, count(*), 0.0 FROM tts2face_jobs WHERE ending IS NOT NULL GROUP BY ending")
+            query = f"SELECT {self._state} AS state, count(*), {self.database.now} - min(created) FROM tts2face_jobs"
+            rows += read.rows(f"{query} WHERE {IS_OPEN} GROUP BY 1")
         ages = {row[0]: float(row[2]) for row in rows}
         return dict.fromkeys(STATES, 0) | {row[0]: row[1] for row in rows}, ages.get(WAITING, 0.0)
 
@@ -246,7 +246,7 @@ class JobTable:
         """The job that has the idempotency key of a new one."""
         if new.idempotency_key is None:
             return None
-        condition = "j.key_name = :key AND j.idempotency_key = :value"
+        condition = "key_name = :key AND idempotency_key = :value"
         found = self._find(change, condition, key=new.key_name, value=new.idempotency_key)
         if found is not None and found.body_hash != new.body_hash:
             raise OtherBodyError("this Idempotency-Key was sent with another body before; use a new one")

@@ -15,7 +15,7 @@ SLOWNESS = 5.0  # elapsed time in units of the processor time, on a machine that
 
 
 class TalkerBuild(NamedTuple):
-    """A build for whoever calls the tool: the builder within its limits, its order, and the seconds that it may take."""
+    """A build for whoever calls the tool: the builder within its limits, its order, and the seconds for it."""
 
     program: Program
     order: Mapping[str, Any]

@@ -20,7 +20,7 @@ from tts2face.serving.work.connection import (
 from tts2face.serving.work.queues import APPLICATION_VERSION, JOB_WORKFLOW, PLACES, WORKFLOW, WORKFLOWS
 
 BEAT_S = 1.5  # between two heartbeats of a worker
-DEAD_AFTER_S = 6.0  # without a heartbeat; with the interval of looking this is below 10 s
+DEAD_AFTER_S = 6.0  # without a heartbeat; with the interval of polling this is below 10 s
 _TABLE = """
 CREATE TABLE IF NOT EXISTS tts2face_workers (
     executor_id VARCHAR(64) PRIMARY KEY, beat DOUBLE PRECISION NOT NULL, place VARCHAR(200) NOT NULL
