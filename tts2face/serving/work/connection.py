@@ -1,14 +1,13 @@
 """Connections to the database of jobs: SQLite or PostgreSQL, with transactions whose failures are `BackendError`."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 from lexicon.errors import BackendError
 
 NOW = {"sqlite": "(julianday('now') - 2440587.5) * 86400.0", "postgresql": "EXTRACT(EPOCH FROM clock_timestamp())"}
-CONNECTIONS = {"pool_size": 1, "max_overflow": 2}  # of a process to a table; one of them stays open
 N_CREATE_TRIES, CREATE_PAUSE_S = 5, 0.2  # of tables that another process may be creating
 LOCK_KEY = 5_742_301  # of PostgreSQL's advisory lock for changes of jobs
 # SQLite begins a transaction, and takes its lock for writing, with the first statement that changes something.
@@ -22,30 +21,6 @@ class DatabaseAwayError(BackendError):
 def database_kind(url: str) -> str:
     """``sqlite`` or ``postgresql``."""
     return "sqlite" if url.startswith("sqlite") else "postgresql"
-
-
-def open_engine(
-    url: str, connections: Mapping[str, Any] = CONNECTIONS, *, connect_s: int = 5, options: str = ""
-) -> Any:
-    """Engine of SQLAlchemy for a URL of `tts2face.serving.work.database.database_url`.
-
-    Parameters
-    ----------
-    connections
-        Size of the pool.
-    connect_s
-        Seconds to wait for a connection to PostgreSQL.
-    options
-        Options of PostgreSQL's sessions.
-    """
-    import sqlalchemy
-
-    if database_kind(url) == "sqlite":
-        arguments: dict[str, Any] = {"timeout": 30.0}
-    else:
-        arguments = {"connect_timeout": connect_s} | ({"options": options} if options else {})
-        url = url.replace("postgresql://", "postgresql+psycopg://", 1)
-    return sqlalchemy.create_engine(url, pool_pre_ping=True, connect_args=arguments, **connections)
 
 
 def connection_errors() -> tuple[type[Exception], ...]:
@@ -70,8 +45,20 @@ class JobDatabase:
         self.kind = database_kind(url)
         self.now = NOW[self.kind]
         self._sql = sqlalchemy.text
-        pool = {"pool_size": 1, "max_overflow": n_connections - 1, "pool_timeout": 10}
-        self._engine = open_engine(url, pool, connect_s=connect_s, options=options)
+        if self.kind == "sqlite":
+            arguments: dict[str, Any] = {"timeout": 30.0}
+        else:
+            arguments = {"connect_timeout": connect_s} | ({"options": options} if options else {})
+            url = url.replace("postgresql://", "postgresql+psycopg://", 1)
+        self._engine = sqlalchemy.create_engine(
+            url, pool_pre_ping=True, connect_args=arguments, pool_size=1, max_overflow=n_connections - 1,
+            pool_timeout=10,
+        )  # fmt: skip
+        # Of `connect`, and of its use.
+        self.errors: tuple[type[Exception], ...] = (
+            self._engine.dialect.loaded_dbapi.Error,
+            sqlalchemy.exc.SQLAlchemyError,
+        )
 
     @contextmanager
     def transaction(self, *, is_change: bool = False) -> Iterator["Transaction"]:
@@ -86,6 +73,10 @@ class JobDatabase:
             raise DatabaseAwayError(
                 f"the database cannot be reached ({database_reason(away, 160)}); try again"
             ) from away
+
+    def connect(self) -> Any:
+        """A connection outside of transactions, for a reader that asks often."""
+        return self._engine.connect().execution_options(isolation_level="AUTOCOMMIT")
 
     def close(self) -> None:
         """Close all connections."""

@@ -140,10 +140,13 @@ def enqueue(client: Any, workers: Workers, segments: Mapping[str, Segment], prio
         missing = [(name, address) for name, address in names.items() if address not in active]
         jobs = [(_enqueue_options(name, priority), address, segments[address].as_json()) for name, address in missing]
         try:
-            with workers.transaction() as connection:
+            with workers.transaction() as change:
                 for job in jobs:
-                    client.enqueue_in_transaction(connection, *job)
-        except sqlalchemy.exc.DBAPIError:  # such as a deadlock with a batch of the same segments in another order
+                    client.enqueue_in_transaction(change.connection, *job)
+        except (
+            sqlalchemy.exc.DBAPIError,
+            DatabaseAwayError,
+        ):  # such as a deadlock with a batch of the same segments in another order
             for job in jobs:
                 client.enqueue(*job)
     return waiting

@@ -154,7 +154,7 @@ class Worker:
             self._poll_s = poll_interval(len(workers.alive()))
             for queue, n_places in PLACES.items():
                 DBOS.register_queue(queue, worker_concurrency=n_places, polling_interval_sec=self._poll_s)
-        except (sqlalchemy.exc.SQLAlchemyError, dbos_error.DBOSException) as away:
+        except (sqlalchemy.exc.SQLAlchemyError, dbos_error.DBOSException, DatabaseAwayError) as away:
             raise BackendError(f"the worker cannot start: {database_reason(away)}; check the database") from away
 
     def stop(self) -> None:

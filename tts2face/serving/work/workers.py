@@ -7,16 +7,10 @@ segment that two workers take nevertheless is rendered twice and stored once, as
 """
 
 from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from typing import Any
 
-from tts2face.serving.work.connection import (
-    NOW,
-    DatabaseAwayError,
-    database_kind,
-    database_reason,
-    open_engine,
-    repeat_creation,
-)
+from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase, Transaction, create_tables, database_reason
 from tts2face.serving.work.queues import APPLICATION_VERSION, JOB_WORKFLOW, PLACES, WORKFLOW, WORKFLOWS
 
 BEAT_S = 1.5  # between two heartbeats of a worker
@@ -39,15 +33,11 @@ class Workers:
     """Table of workers with the time of their last heartbeat, by the clock of the database."""
 
     def __init__(self, url: str) -> None:
-        import sqlalchemy
-
-        self._sql = sqlalchemy.text
-        self._now = NOW[database_kind(url)]
-        self._table = WORKFLOWS[database_kind(url)]
+        self._database = JobDatabase(url)
+        self._now = self._database.now
+        self._table = WORKFLOWS[self._database.kind]
         self._waiting = f"SELECT 1 FROM {self._table} WHERE {_WAITS} AND {_OURS} LIMIT 1"
-        self._database_error = sqlalchemy.exc.SQLAlchemyError
-        self._engine = open_engine(url)
-        self._looking: Any = None
+        self._polling: Any = None  # connection that stays open
 
     def __enter__(self) -> "Workers":
         """Return itself."""
@@ -55,27 +45,22 @@ class Workers:
 
     def __exit__(self, *_: object) -> None:
         """Close the connections."""
-        if self._looking is not None:
-            self._looking.close()
-        self._engine.dispose()
+        if self._polling is not None:
+            self._polling.close()
+        self._database.close()
 
     def create(self) -> None:
         """Create the table where it is missing; several processes may do so at once."""
+        create_tables(self._database, (_TABLE,))
 
-        def create() -> None:
-            with self._engine.begin() as connection:
-                connection.execute(self._sql(_TABLE))
-
-        repeat_creation(create)
-
-    def transaction(self) -> Any:
-        """Context of a transaction in the database; the value is its connection."""
-        return self._engine.begin()
+    def transaction(self) -> AbstractContextManager[Transaction]:
+        """Context of a transaction in the database."""
+        return self._database.transaction()
 
     def now(self) -> float:
         """Seconds since 1970 by the clock of the database."""
-        with self._engine.begin() as connection:
-            return float(connection.execute(self._sql(f"SELECT {self._now}")).scalar() or 0.0)
+        with self._database.transaction() as read:
+            return float(read.value(f"SELECT {self._now}"))
 
     def beat(self, executor_id: str, place: str) -> set[str]:
         """Note that a worker is alive; the ids of workers without a heartbeat.
@@ -83,10 +68,10 @@ class Workers:
         Heartbeats of a clock that has been set back since count as of now: a dead worker has none after it.
         """
         query = f"SELECT executor_id FROM tts2face_workers WHERE beat <= {self._now} - :age"
-        with self._engine.begin() as connection:
-            connection.execute(self._sql(_BEAT.format(now=self._now)), {"id": executor_id, "place": place[:200]})
-            connection.execute(self._sql(_FROM_LATER.format(now=self._now)))
-            return {str(row[0]) for row in connection.execute(self._sql(query), {"age": DEAD_AFTER_S})}
+        with self._database.transaction() as change:
+            change.run(_BEAT.format(now=self._now), id=executor_id, place=place[:200])
+            change.run(_FROM_LATER.format(now=self._now))
+            return {str(row[0]) for row in change.rows(query, age=DEAD_AFTER_S)}
 
     def return_later(self) -> int:
         """Let jobs that a clock queued which has been set back since wait no longer than the others; their number.
@@ -97,22 +82,21 @@ class Workers:
         last = f"SELECT max(created_at) FROM {self._table} WHERE {later}"
         now = f"CAST(1000.0 * {self._now} AS BIGINT)"
         query = f"UPDATE {self._table} SET created_at = created_at - ({last}) + {now} WHERE {later}"
-        with self._engine.begin() as connection:
-            return int(connection.execute(self._sql(query)).rowcount)
+        with self._database.transaction() as change:
+            return change.run(query)
 
     def has_waiting(self) -> bool:
         """Whether a job waits in a queue; for one thread, which asks often: on a connection that stays open."""
         while True:
-            was_open = self._looking is not None
+            was_open = self._polling is not None
             try:
-                if self._looking is None:
-                    self._looking = self._engine.connect().execution_options(isolation_level="AUTOCOMMIT")
-                return self._looking.connection.driver_connection.execute(self._waiting).fetchone() is not None
-            except (self._engine.dialect.dbapi.Error, self._database_error) as away:
-                looking, self._looking = self._looking, None
-                if looking is not None:
-                    looking.invalidate()
-                    looking.close()
+                self._polling = self._polling or self._database.connect()
+                return self._polling.connection.driver_connection.execute(self._waiting).fetchone() is not None
+            except self._database.errors as away:
+                polling, self._polling = self._polling, None
+                if polling is not None:
+                    polling.invalidate()
+                    polling.close()
                 if not was_open:  # an old connection may be of before a restart of the database
                     raise DatabaseAwayError(
                         f"the database cannot be reached ({database_reason(away)}); try again"
@@ -120,30 +104,26 @@ class Workers:
 
     def leave(self, executor_id: str) -> None:
         """Note that a worker ends; the others take its jobs over without waiting."""
-        with self._engine.begin() as connection:
-            query = "UPDATE tts2face_workers SET beat = 0 WHERE executor_id = :id"
-            connection.execute(self._sql(query), {"id": executor_id})
+        with self._database.transaction() as change:
+            change.run("UPDATE tts2face_workers SET beat = 0 WHERE executor_id = :id", id=executor_id)
 
     def alive(self, within_s: float = DEAD_AFTER_S) -> dict[str, str]:
         """Places of the workers that sent a heartbeat within some seconds, by their ids."""
         query = f"SELECT executor_id, place FROM tts2face_workers WHERE beat > {self._now} - :age"
-        with self._engine.begin() as connection:
-            rows = connection.execute(self._sql(query), {"age": within_s})
-            return {str(row[0]): str(row[1]) for row in rows}
+        with self._database.transaction() as read:
+            return {str(row[0]): str(row[1]) for row in read.rows(query, age=within_s)}
 
     def forget(self, executor_ids: Iterable[str]) -> None:
         """Remove workers."""
-        with self._engine.begin() as connection:
-            for executor_id in executor_ids:
-                connection.execute(
-                    self._sql("DELETE FROM tts2face_workers WHERE executor_id = :id"), {"id": executor_id}
-                )
+        rows = [{"id": executor_id} for executor_id in executor_ids]
+        with self._database.transaction() as change:
+            change.run_many("DELETE FROM tts2face_workers WHERE executor_id = :id", rows)
 
     def forget_dead(self, older_than_s: float = 3600.0) -> None:
         """Remove workers without a heartbeat for a long time."""
         query = f"DELETE FROM tts2face_workers WHERE beat < {self._now} - :age"
-        with self._engine.begin() as connection:
-            connection.execute(self._sql(query), {"age": older_than_s})
+        with self._database.transaction() as change:
+            change.run(query, age=older_than_s)
 
 
 def return_work(executor_ids: set[str]) -> set[str]:
