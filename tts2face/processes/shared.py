@@ -63,10 +63,10 @@ def free_unused() -> None:
 
 
 def file_state(path: Path) -> Hashable:
-    """What changes when a file or folder is written again or replaced; without one, its path alone."""
+    """State that changes when a file or folder is written again or replaced; without one, its path alone."""
     try:
         status = path.stat()
-    except (OSError, ValueError):  # whoever reads it tells what is wrong
+    except (OSError, ValueError):  # whoever reads it says what is wrong
         return str(path)
     return os.path.realpath(path), status.st_mtime_ns, status.st_size, status.st_ino
 

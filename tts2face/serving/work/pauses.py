@@ -27,6 +27,7 @@ class EnginePauses:
 
     def install(self, engine: Any) -> None:
         """Replace the waiting of the engine's threads; those of its other pauses stay."""
+        # DBOS 3.4 has no public pause. The event of the background jobs is private; they ask twice a second.
         for stopped in (*engine.background_thread_stop_events, engine._background_jobs_stop_event):
             stopped.wait = partial(self._pause, stopped.wait, stopped.is_set)
 
