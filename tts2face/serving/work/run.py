@@ -106,11 +106,15 @@ class JobRunner:
         watch = JobWatch(job, changes, scratch)
         with Temporary(scratch / "job", is_folder=True) as folder:
             try:
-                inputs = self._inputs(job, folder.path)
+                inputs = {
+                    file.name: place_file(self._blobs(), file.sha256, file.name, folder.path / "inputs")
+                    for file in job.inputs
+                }
                 work = folder.path / "work"
                 work.mkdir()
+                engine = _JobEngine(watch, partial(DatabaseEngine, self._url, self._place, 0))
                 task = JobTask(
-                    self._request(job), inputs, work, self._engine(watch), self._store, watch.report, watch.check,
+                    self._request(job), inputs, work, engine, self._store, watch.report, watch.check,
                     self._url, lambda: self._blobs()[1],
                 )  # fmt: skip
                 products = find_runner(job.kind)(task)
@@ -122,9 +126,6 @@ class JobRunner:
                 ending, paths = Ending(FAILED, error=_without_folders(str(wrong), folder.path)), {}
             self._end(changes, job, ending, paths)
         return ending.state
-
-    def _engine(self, watch: "JobWatch") -> "_JobEngine":
-        return _JobEngine(watch, partial(DatabaseEngine, self._url, self._place, 0))
 
     def _request(self, job: JobRecord) -> dict[str, Any]:
         """JSON of a job with the paths of uploaded models on this machine."""
@@ -140,9 +141,6 @@ class JobRunner:
                 "role": [place_models(role, self._blobs) for role in roles],
             }
         return found
-
-    def _inputs(self, job: JobRecord, folder: Path) -> dict[str, Path]:
-        return {file.name: place_file(self._blobs(), file.sha256, file.name, folder / "inputs") for file in job.inputs}
 
     def _put(self, products: Sequence[Product]) -> tuple[JobFile, ...]:
         store = self._blobs()[0]
