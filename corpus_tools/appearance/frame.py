@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER, N_MESH_LANDMARKS
 from tts2face.numeric.arrays import points_in_polygon
-from tts2face.picture.own_face import sample_triangles
+from tts2face.picture.kernels.warps import sample_triangles
 
 RING_SCALE = 1.35  # scale of the ring of skin around the face, relative to its oval
 MOUTH_LANDMARKS = (*INNER_LIP_UPPER, *INNER_LIP_LOWER[-2:0:-1])  # in order around the inner lips

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from corpus_tools.appearance.frame import rasterise_triangles
 from tts2face.lips.cloning import MAX_STANDARD_DEVIATIONS
 from tts2face.models.appearance import Appearance, TextureModel, nearest_pixels
-from tts2face.picture.own_face import sample_triangles
+from tts2face.picture.kernels.warps import sample_triangles
 
 Floats = NDArray[np.float64]
 

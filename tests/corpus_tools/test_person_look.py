@@ -43,7 +43,8 @@ from tts2face.models.hair import EYE_COLOURS, HAIR_COLOURS, parse_hair_colour
 from tts2face.models.landmarks import N_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.numeric.arrays import decode_srgb, encode_srgb
 from tts2face.picture.camera import camera_matrices
-from tts2face.picture.options import Picture, parse_camera
+from tts2face.picture.camera_view import parse_camera
+from tts2face.picture.options import Picture
 from tts2face.picture.renderer import draw
 from tts2face.storage.shipped import find_file
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tts2face.picture.kernels.lamps import BRIGHTNESS
 from tts2face.picture.kernels.shade import (
     DARK_ALBEDO,
     INTERREFLECTION,
@@ -29,7 +30,6 @@ from tts2face.picture.kernels.tables import (
     AT_RAY,
     AT_ROUGHNESS,
     AT_SECOND_LOBE,
-    BRIGHTNESS,
     DIFFUSE,
     N_ROWS,
     N_VERTEX_COLUMNS,

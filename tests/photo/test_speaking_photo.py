@@ -22,7 +22,7 @@ from tts2face.photo.found_face import FoundFace
 from tts2face.photo.photograph import Photograph, split_number
 from tts2face.photo.surface import EYES, LIDS, SKIN
 from tts2face.picture.baked.scene import BEHIND_SHARE
-from tts2face.picture.baked.surface import NEAR, TRIANGLE_MASK, nearest_triangles, project
+from tts2face.picture.baked.visibility import NEAR, TRIANGLE_MASK, nearest_triangles, project
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import MeshRenderer, draw, mesh_renderer
 from tts2face.session.session import Session

@@ -8,7 +8,7 @@ import pytest
 
 from tests.picture.tiny_face import tiny_face
 from tts2face.models.face import Face
-from tts2face.picture.kernels.tables import linear_table
+from tts2face.picture.kernels.tones import TONE_TABLES
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import draw
 
@@ -53,7 +53,7 @@ def test_half_coverage_is_the_mean_of_both() -> None:
     with_it, without = drawn(opaque), drawn(without_sheet(opaque))
     inside = np.abs(with_it - without).max(axis=2) > 60
     assert inside.sum() > 100
-    light = linear_table()
+    light = TONE_TABLES[0]
     whole, part = ((light[one] - light[without])[inside] for one in (with_it, mixed))
     share = (part * whole).sum() / (whole * whole).sum()  # by least squares; a sum of signed differences nearly cancels
     assert share == pytest.approx(0.5, abs=0.04)  # the shadow of the sheet does not become half

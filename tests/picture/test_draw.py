@@ -11,7 +11,7 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tests.picture.tiny_face import tiny_face
 from tts2face.models.face import keep_parts
 from tts2face.models.face_loading import load_face
-from tts2face.picture.kernels.tables import linear_table
+from tts2face.picture.kernels.tones import TONE_TABLES, linear_light
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import draw, mesh_renderer
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
@@ -66,7 +66,7 @@ def test_merged_samples_equal_samples_shaded_one_by_one(textured):
     face = tiny_face(textured=textured, n_rings=30)
     joined = draw(face, REST, picture=Picture(size="100x100", supersampling=3)).astype(float)
     single = draw(face, REST, picture=Picture(size="300x300", supersampling=1))
-    light = linear_table()[single].reshape(100, 3, 100, 3, 3).mean(axis=(1, 3))
+    light = linear_light(single).reshape(100, 3, 100, 3, 3).mean(axis=(1, 3))
     srgb = 255 * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
     assert np.abs(joined - srgb).mean() <= 2
 
@@ -85,7 +85,7 @@ def test_a_transparent_picture_laid_over_a_colour_is_the_picture_on_that_colour(
     face = tiny_face()
     solid = draw(face, REST, picture=replace(SMALL, background="#204060"))
     clear = draw(face, REST, picture=replace(SMALL, background="transparent"))
-    table = linear_table()
+    table = TONE_TABLES[0]
     share = clear[:, :, 3:] / 255
     light = table[clear[:, :, :3]] * share + table[np.array([0x20, 0x40, 0x60])] * (1 - share)
     srgb = 255 * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)

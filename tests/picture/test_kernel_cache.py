@@ -31,7 +31,7 @@ from tts2face.models.light import Lamps
 from tts2face.numeric import compiler, least_squares, object_code
 from tts2face.numeric import kernels as compilation
 from tts2face.numeric.kernels import CACHE_VARIABLE, Kernel, cache_folder, inlined_kernel, kernel
-from tts2face.picture.baked import cut_out, eyes, response, shading, surface
+from tts2face.picture.baked import cut_out, eyes, modes, response, shading, visibility
 from tts2face.picture.kernels import fragments, raster, shade, strand_light, strands
 from tts2face.request import OWN_FACE
 from tts2face.serving.service.logs import LineFormatter
@@ -91,7 +91,7 @@ def indexes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> dict[str, Path]:
         "motion": contacts._closest_rows,
         "gestures": field_kernels.generate_frames,
         "lamps": raster.draw_band,
-        "baked": surface.find_nearest,
+        "baked": visibility.find_nearest,
     }
     files = {what: one._folder() / f"{one._stem()}-0{compilation.SUFFIX}" for what, one in kernels.items()}
     for file in files.values():
@@ -272,8 +272,8 @@ def test_some_kernels_may_reorder_sums():
 
 
 CLIP = (
-    surface, shading, eyes, response, cut_out, fragments, deformation, eyeballs, blending, contacts, token_search,
-    tokens, phone_network, least_squares, field_kernels, segments, level,
+    visibility, modes, shading, eyes, response, cut_out, fragments, deformation, eyeballs, blending, contacts,
+    token_search, tokens, phone_network, least_squares, field_kernels, segments, level,
 )  # fmt: skip
 
 

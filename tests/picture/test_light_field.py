@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from tests.picture.tiny_face import tiny_face
-from tts2face.picture.light import N_HARMONICS, harmonics, light_fields
+from tts2face.picture.light_fields import N_HARMONICS, harmonics, light_fields
 from tts2face.picture.occlusion import bake_occlusion, sphere_directions
 from tts2face.picture.surface import build_surface
 

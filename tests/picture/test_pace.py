@@ -9,10 +9,10 @@ import pytest
 from tests.picture.film.lit_face import lit_tiny_face
 from tests.picture.test_encode import clip_of
 from tests.picture.tiny_face import tiny_face
-from tts2face.picture.movie import encode_movie
 from tts2face.picture.options import Picture
 from tts2face.picture.pace import CHECK_S, HIGH_LEAD_S, LOW_LEAD_S, QUALITIES, Pace
 from tts2face.picture.renderer import mesh_renderer
+from tts2face.picture.streamed_movie import encode_movie
 
 pytestmark = pytest.mark.usefixtures("few_directions")
 FPS = 30.0

@@ -3,7 +3,8 @@
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.picture.options import NAMED_VIEWS, Picture, parse_background, parse_camera, parse_size
+from tts2face.picture.camera_view import NAMED_VIEWS, parse_camera
+from tts2face.picture.options import Picture, parse_background, parse_size
 from tts2face.types import exact_rate, first_sample
 
 

@@ -11,8 +11,9 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tests.picture.tiny_talker import SIZE, face_points, own_talker
 from tts2face.models.talker import Talker
 from tts2face.picture import plate
+from tts2face.picture.kernels.warps import warp_image
 from tts2face.picture.options import Picture
-from tts2face.picture.own_face import draw_video_frame, own_face_renderer, warp_image
+from tts2face.picture.own_face import draw_video_frame, own_face_renderer
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
 

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tts2face.picture.frames import PngFolderWriter
 from tts2face.picture.movie import MOV_MOVIE, MP4_MOVIE, STREAMED_MP4, MovieKind, MovieWriter
-from tts2face.picture.provenance import MP4_BOX, SOURCE_TYPE, WriteBuffer
+from tts2face.picture.png_folder import PngFolderWriter
+from tts2face.picture.provenance import MP4_BOX, SOURCE_TYPE
+from tts2face.picture.write_buffer import WriteBuffer
 from tts2face.serving.batch.assemble import join_segments
 
 NOTICE = 'Synthetic media: synthesised by tts2face from a photograph of <Zoë> & "friends"'

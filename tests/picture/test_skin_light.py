@@ -6,7 +6,7 @@ import pytest
 from tests.picture.stability import visible_triangles
 from tts2face.models.face import keep_parts
 from tts2face.models.face_loading import load_face
-from tts2face.picture.kernels.tables import linear_light
+from tts2face.picture.kernels.tones import linear_light
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
 

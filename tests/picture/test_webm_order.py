@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tts2face.picture.movie import STREAMED_WEBM, WEBM_MOVIE, MovieKind, MovieWriter
-from tts2face.picture.provenance import WriteBuffer
+from tts2face.picture.write_buffer import WriteBuffer
 
 SEGMENT, CLUSTER, CLUSTER_TIME, GROUP, BLOCK, SIMPLE_BLOCK = 0x18538067, 0x1F43B675, 0xE7, 0xA0, 0xA1, 0xA3
 N_FRAMES, RATE = 100, 24_000

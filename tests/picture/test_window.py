@@ -12,7 +12,8 @@ from tests.picture.tiny_face import tiny_face
 from tts2face.picture import display
 from tts2face.picture import window as view
 from tts2face.picture.camera import camera_matrices
-from tts2face.picture.options import NAMED_VIEWS, Picture, parse_camera
+from tts2face.picture.camera_view import NAMED_VIEWS, parse_camera
+from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
 from tts2face.processes.parent import Child
 from tts2face.processes.program import Program

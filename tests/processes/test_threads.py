@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tts2face.picture.film import EncoderThread
+from tts2face.picture.encoder_thread import EncoderThread
 from tts2face.processes.threads import Prefetch
 
 

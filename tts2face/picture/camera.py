@@ -12,7 +12,7 @@ from tts2face.models.face import Face
 from tts2face.models.landmarks import CHIN
 from tts2face.models.light import Photographed
 from tts2face.models.photo_view import PhotoView
-from tts2face.picture.options import CameraView
+from tts2face.picture.camera_view import CameraView
 
 FIELD_OF_VIEW_RAD = math.radians(
     22.0

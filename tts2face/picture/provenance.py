@@ -1,41 +1,15 @@
-"""What files with synthetic pictures of people say of themselves: XMP with IPTC's type of digital source.
+"""Statement in files with synthetic pictures of people that they are: XMP with IPTC's type of digital source.
 
 Sources: XMP Specification Part 3, "Storage in Files" (Adobe 2020), for PNG and MP4; IPTC NewsCodes, "Digital Source
 Type".
-
-A stream that collects what an encoder writes until it is taken.
 """
 
-import io
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from PIL.PngImagePlugin import PngInfo
-
-
-class WriteBuffer(io.RawIOBase):
-    """Write-only stream without positions, so that encoders never go back."""
-
-    def __init__(self) -> None:
-        self._parts: list[bytes] = []
-
-    def writable(self) -> bool:
-        """Return True."""
-        return True
-
-    def write(self, content: object) -> int:
-        """Append bytes."""
-        part = bytes(content)  # type: ignore[call-overload]
-        self._parts.append(part)
-        return len(part)
-
-    def take(self) -> bytes:
-        """Return the bytes written since the last call."""
-        taken = b"".join(self._parts)
-        self._parts.clear()
-        return taken
-
+from tts2face.picture.write_buffer import WriteBuffer
 
 PNG_KEYWORD = "XML:com.adobe.xmp"  # of an iTXt chunk
 MP4_BOX = bytes.fromhex("be7acfcb97a942e89c71999491e3afac")  # user type of a top-level "uuid" box

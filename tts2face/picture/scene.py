@@ -11,6 +11,8 @@ from lexicon.errors import InputError
 from tts2face.face.deformation import head_transform
 from tts2face.models.face import Face
 from tts2face.picture.camera import CameraMatrices, camera_matrices
+from tts2face.picture.camera_view import CameraView
+from tts2face.picture.kernels.lamps import FIRST_LIGHT_ROW, lamp_directions, light_table
 from tts2face.picture.kernels.picture import (
     DrawingBuffers,
     Pose,
@@ -20,10 +22,10 @@ from tts2face.picture.kernels.picture import (
     project_surface,
 )
 from tts2face.picture.kernels.raster import NOT_DRAWN
-from tts2face.picture.kernels.tables import FIRST_LIGHT_ROW, OPEN_SURFACE, lamp_directions, light_table
+from tts2face.picture.kernels.tables import OPEN_SURFACE
 from tts2face.picture.light import Exposure, compute_exposure
 from tts2face.picture.occlusion import occlusion_poses
-from tts2face.picture.options import BLUR, DRAFT, STUDIO, CameraView, Picture, parse_background
+from tts2face.picture.options import BLUR, DRAFT, STUDIO, Picture, parse_background
 from tts2face.picture.surface import Surface, build_surface
 from tts2face.processes.threads import available_cores
 from tts2face.storage.pictures import open_picture

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from lexicon.errors import InputError
-from tts2face.picture.provenance import WriteBuffer
+from tts2face.picture.write_buffer import WriteBuffer
 from tts2face.storage.wave_files import pcm_bytes
 from tts2face.types import Chunk, Waveform
 

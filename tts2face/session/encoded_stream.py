@@ -15,10 +15,10 @@ from tts2face.interchange.exports.parts import FormatWriter
 from tts2face.interchange.exports.table import FormatInfo, all_formats
 from tts2face.interchange.exports.writer import ExportFile, ExportWriter, make_target, mesh_of, plan_exports
 from tts2face.models.face import Face
-from tts2face.picture.movie import MOVIE_KINDS, encode_movie, find_movie_kind
 from tts2face.picture.options import Picture
 from tts2face.picture.pace import Pace
 from tts2face.picture.sound_stream import SOUND_KINDS, encode_sound
+from tts2face.picture.streamed_movie import MOVIE_KINDS, encode_movie, find_movie_kind
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.prepared import PreparedRequest
 from tts2face.session.shared_models import SessionModels
@@ -55,7 +55,7 @@ class StreamFormat:
     Parameters
     ----------
     threads, pace
-        As for `tts2face.picture.movie.ClipFrames`.
+        As for `tts2face.picture.clip_frames.ClipFrames`.
     is_complete
         Bytes come when all is made: a file whose header has its length, in place of one that plays while it is sent.
     """

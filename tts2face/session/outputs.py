@@ -26,7 +26,7 @@ from tts2face.types import Clip, Progress
 
 if TYPE_CHECKING:
     from tts2face.picture.film import ClipWriter
-    from tts2face.picture.renderer import FrameRenderer
+    from tts2face.picture.frame_renderer import FrameRenderer
     from tts2face.session.animated_face import AnimatedFace
     from tts2face.sound.alignment import TextMismatch
 
@@ -123,7 +123,7 @@ def plan_outputs(out: str | Path | None, exports: Sequence[str | Path], inputs: 
         A folder cannot be written.
     """
     if out is not None:
-        from tts2face.picture.film import check_output
+        from tts2face.picture.outputs import check_output
 
         check_output(out)
     files = plan_exports(exports)

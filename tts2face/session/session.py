@@ -9,9 +9,9 @@ from lexicon.errors import InputError
 from tts2face.models.face import Face
 from tts2face.models.palette import Derivation, Palette
 from tts2face.models.talker import Talker
+from tts2face.picture.frame_renderer import FrameRenderer
 from tts2face.picture.options import Picture
 from tts2face.picture.pace import Pace
-from tts2face.picture.renderer import FrameRenderer
 from tts2face.request import Request
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.encoded_stream import StreamFormat, encode_stream

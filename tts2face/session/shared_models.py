@@ -20,8 +20,8 @@ from tts2face.models.palette_editing import add_derivation
 from tts2face.models.palette_file import load_palette
 from tts2face.models.talker import Talker
 from tts2face.models.talker_file import load_talker
+from tts2face.picture.frame_renderer import FrameRenderer
 from tts2face.picture.options import Picture
-from tts2face.picture.renderer import FrameRenderer
 from tts2face.request import FIELDS, OWN_FACE, Request
 from tts2face.session.animated_face import AnimatedFace, mesh_face, own_appearance_face
 from tts2face.session.gesture_layer import GestureLayer

@@ -46,10 +46,10 @@ def kernels_are_compiled(drawn: Face | None) -> bool:
 
 
 def _drawing_kernel(drawn: Face) -> "Kernel":
-    from tts2face.picture.baked import surface
+    from tts2face.picture.baked import visibility
     from tts2face.picture.kernels import raster
 
-    return (raster, "draw_band") if isinstance(drawn.light, Lamps) else (surface, "find_nearest")
+    return (raster, "draw_band") if isinstance(drawn.light, Lamps) else (visibility, "find_nearest")
 
 
 def _is_compiled(module: ModuleType, name: str) -> bool:
@@ -62,7 +62,7 @@ def compile_kernels(drawn: Face | None) -> None:
     This process compiles those of pictures, and then, in turn with a child for each further core, the others. If a
     child fails, its kernels are compiled at their first use.
     """
-    from tts2face.picture.surface import STRANDS
+    from tts2face.picture.materials import STRANDS
 
     has_strands = drawn is not None and isinstance(drawn.light, Lamps)
     names = deque(name for name, work in TASKS.items() if has_strands or work is not compile_strands)
@@ -102,9 +102,9 @@ def compile_pictures(face: Face) -> None:
 def compile_strands() -> None:
     """Compile the kernels of hair, lashes and brows, a quarter of the drawing kernels' time, without the others."""
     from tts2face.picture.camera import camera_matrices
+    from tts2face.picture.kernels.lamps import FIRST_LIGHT_ROW, LAMPS
     from tts2face.picture.kernels.picture import allocate_buffers, arrange_cards, blend_strands
     from tts2face.picture.kernels.strand_light import light_strands
-    from tts2face.picture.kernels.tables import FIRST_LIGHT_ROW, LAMPS
     from tts2face.picture.surface import build_surface
 
     face, picture = load_face("head"), Picture(size="16x16")

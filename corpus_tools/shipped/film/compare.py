@@ -10,7 +10,7 @@ from corpus_tools.shipped.film.poses import LitPose
 from tts2face.models.face import Face
 from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT
 from tts2face.picture.baked.scene import LitScene
-from tts2face.picture.baked.surface import TRIANGLE_MASK, X, Y, nearest_triangles, project
+from tts2face.picture.baked.visibility import TRIANGLE_MASK, X, Y, nearest_triangles, project
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
 

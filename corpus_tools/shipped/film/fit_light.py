@@ -29,7 +29,7 @@ from tts2face.face.deformation import build_rig
 from tts2face.models.baked_light import BLACK_SHARE, N_BALL_TERMS, BakedLight, HairLight, HairTint, quantised
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import smoothstep
-from tts2face.picture.baked.scene import yaw_and_pitch_deg
+from tts2face.picture.baked.interpolation import yaw_and_pitch_deg
 from tts2face.picture.surface import weld_groups
 
 Floats = NDArray[np.float64]

@@ -19,7 +19,7 @@ from corpus_tools.shipped.film.poses import LitPose
 from tts2face.models.baked_light import LIMIT_STEP, BakedLight, quantised
 from tts2face.models.face import Face
 from tts2face.picture.baked.scene import LitScene
-from tts2face.picture.baked.surface import TRIANGLE_MASK, X, Y, nearest_triangles, project
+from tts2face.picture.baked.visibility import TRIANGLE_MASK, X, Y, nearest_triangles, project
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
 

@@ -21,7 +21,7 @@ from corpus_tools.shipped.film.scene import FilmScene
 from corpus_tools.shipped.head.source import SourceMesh, fetch_data, read_source
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
-from tts2face.picture.options import parse_camera
+from tts2face.picture.camera_view import parse_camera
 
 Pixels = NDArray[np.uint8]
 

@@ -16,9 +16,9 @@ from scipy.ndimage import binary_closing
 from tts2face.face.deformation import build_rig
 from tts2face.models.face import Face
 from tts2face.models.talker_file import load_talker
-from tts2face.picture.baked.surface import N_COLUMNS, TRIANGLE_MASK, X, Y, nearest_triangles, project
+from tts2face.picture.baked.visibility import N_COLUMNS, TRIANGLE_MASK, X, Y, nearest_triangles, project
 from tts2face.picture.camera import camera_matrices
-from tts2face.picture.options import CameraView
+from tts2face.picture.camera_view import CameraView
 from tts2face.session.session import Session
 
 Float32Array = NDArray[np.float32]

@@ -24,7 +24,7 @@ from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.light import Baked
 from tts2face.picture.camera import camera_matrices
-from tts2face.picture.options import parse_camera
+from tts2face.picture.camera_view import parse_camera
 
 Pixels = NDArray[np.uint8]
 

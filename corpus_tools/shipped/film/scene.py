@@ -17,7 +17,7 @@ from tts2face.models.face import Face
 from tts2face.numeric.arrays import decode_srgb, smoothstep
 from tts2face.picture.baked.scene import BLINK_SHRINK
 from tts2face.picture.camera import camera_matrices
-from tts2face.picture.options import CameraView
+from tts2face.picture.camera_view import CameraView
 from tts2face.picture.surface import weld_groups
 
 Floats = NDArray[np.float64]

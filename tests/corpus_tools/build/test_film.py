@@ -21,7 +21,7 @@ from tts2face.models.face_file import read_face, write_face
 from tts2face.models.face_loading import load_face
 from tts2face.models.hair_file import tint_hair
 from tts2face.models.light import Baked
-from tts2face.picture.options import CameraView, parse_camera
+from tts2face.picture.camera_view import CameraView, parse_camera
 
 SIDE, SAMPLES = 96, 2
 

@@ -90,7 +90,7 @@ def test_orders_that_make_no_sense(words: list[str], reason: str, capsys: pytest
 def test_without_a_display_the_message_names_the_cause(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("tts2face.picture.window.sys.platform", "linux")
+    monkeypatch.setattr("tts2face.picture.display.sys.platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     assert run(["mimic", "--camera", "0"]) == 4

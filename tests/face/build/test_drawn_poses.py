@@ -12,9 +12,10 @@ from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LID_RINGS
 from tts2face.models.palette_file import load_palette
 from tts2face.picture.baked.scene import LitScene
-from tts2face.picture.baked.surface import N_COLUMNS, TRIANGLE_MASK, nearest_triangles, project
+from tts2face.picture.baked.visibility import N_COLUMNS, TRIANGLE_MASK, nearest_triangles, project
 from tts2face.picture.camera import camera_matrices
-from tts2face.picture.options import CameraView, Picture
+from tts2face.picture.camera_view import CameraView
+from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
 from tts2face.session.session import Session
 

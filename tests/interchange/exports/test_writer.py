@@ -15,10 +15,10 @@ from tts2face.interchange.exports.arkit import ARKIT_SHAPES
 from tts2face.interchange.exports.frame_grid import FrameGrid
 from tts2face.interchange.exports.table import FORMATS
 from tts2face.picture.film import write_clips
-from tts2face.picture.movie import MOVIE_KINDS, encode_movie
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
 from tts2face.picture.sound_stream import SOUND_KINDS, encode_sound
+from tts2face.picture.streamed_movie import MOVIE_KINDS, encode_movie
 from tts2face.types import Speech, Trajectory, Waveform, concatenate_clips
 
 REAL_LOCALTIME, A_YEAR_S = time.localtime, 366 * 86400

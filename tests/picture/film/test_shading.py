@@ -5,6 +5,7 @@ import pytest
 from scipy.ndimage import map_coordinates
 
 from tts2face.numeric.kernels import BLOCK
+from tts2face.picture.baked.modes import LIGHT_STEP, add_modes, pack_change
 from tts2face.picture.baked.shading import (
     CHANGE_CODING,
     COLOUR_CODING,
@@ -17,17 +18,7 @@ from tts2face.picture.baked.shading import (
     lay_planes,
     list_fragments,
 )
-from tts2face.picture.baked.surface import (
-    LIGHT_STEP,
-    N_COLUMNS,
-    NEAR,
-    U,
-    X,
-    Y,
-    add_modes,
-    nearest_triangles,
-    pack_change,
-)
+from tts2face.picture.baked.visibility import N_COLUMNS, NEAR, U, X, Y, nearest_triangles
 
 SIZE = 16  # pixels
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tts2face.picture.baked.scene import camera_weights, turn_weights, yaw_and_pitch_deg
+from tts2face.picture.baked.interpolation import camera_weights, turn_weights, yaw_and_pitch_deg
 
 TURNS_DEG = np.array([[-20, 0], [20, 0], [0, -12], [0, 12]])
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tts2face.numeric.kernels import BLOCK
-from tts2face.picture.baked.surface import (
+from tts2face.picture.baked.visibility import (
     N_COLUMNS,
     N_SPAN_VALUES,
     NEAR,

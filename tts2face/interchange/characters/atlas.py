@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.interchange.characters.character import MASK, OPAQUE, Material
-from tts2face.picture.kernels.tables import encoding_table, linear_light
+from tts2face.picture.kernels.tones import encoding_table, linear_light
 
 MAX_ATLAS_SIDE = 4096  # pixels
 BORDER = 4  # pixels around each image that repeat its edge, so that neighbours do not bleed into it

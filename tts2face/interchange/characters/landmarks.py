@@ -18,7 +18,7 @@ from tts2face.models.landmarks import (
     N_MESH_LANDMARKS,
 )
 from tts2face.picture.camera import camera_matrices
-from tts2face.picture.kernels.tables import lamp_directions, light_table
+from tts2face.picture.kernels.lamps import lamp_directions, light_table
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import MeshRenderer
 from tts2face.picture.scene import Scene, build_scene

@@ -12,7 +12,7 @@ from lexicon.values.files import read_text
 from tts2face.interchange.characters.character import BLEND, Material
 from tts2face.interchange.characters.materials import decode_image
 from tts2face.interchange.gltf.reader import read_bytes
-from tts2face.picture.kernels.tables import linear_light
+from tts2face.picture.kernels.tones import linear_light
 
 MAX_TEXT_BYTES = 200_000_000
 GREY = 0.02  # greatest difference between the channels of a colour that exporters write for an unpainted material

@@ -23,12 +23,15 @@ from tts2face.models.face import Face, Texture
 from tts2face.models.light import Lamps, Photographed
 from tts2face.models.photo_view import HEAD_LIMIT_RAD, SHIFT_GAIN
 from tts2face.picture.camera import FIELD_OF_VIEW_RAD, framing_box
-from tts2face.picture.kernels import tables
+from tts2face.picture.camera_view import NAMED_VIEWS
+from tts2face.picture.cards import SKULL_CENTRE_MM
+from tts2face.picture.kernels import lamps
 from tts2face.picture.kernels.tables import DARK_GLOSS, GLOSS, OPEN_SURFACE, ROUGHNESS, SECOND_LOBE, WRAP
-from tts2face.picture.light import light_fields, lip_opening
-from tts2face.picture.options import NAMED_VIEWS
+from tts2face.picture.light import lip_opening
+from tts2face.picture.light_fields import light_fields
+from tts2face.picture.materials import STRANDS
 from tts2face.picture.scene import STUDIO_BRIGHT, STUDIO_CENTRE, STUDIO_DARK
-from tts2face.picture.surface import SKULL_CENTRE_MM, STRANDS, Surface, build_surface
+from tts2face.picture.surface import Surface, build_surface
 from tts2face.processes.threads import available_cores
 from tts2face.types import HEAD_CHANNELS
 
@@ -235,10 +238,10 @@ def _stage(face: Face, surface: Surface, skeleton: Skeleton, channels: tuple[str
         "opening": {name: float(value) for name, value in zip(channels, opening, strict=True) if value},
         **_cameras(face),
         "field_of_view": FIELD_OF_VIEW_RAD,
-        "lamps": [[yaw, pitch, list(colour)] for yaw, pitch, colour in tables.LAMPS],
-        "sky": list(tables.SKY_COLOUR),
-        "floor": list(tables.FLOOR_COLOUR),
-        "brightness": tables.BRIGHTNESS,
+        "lamps": [[yaw, pitch, list(colour)] for yaw, pitch, colour in lamps.LAMPS],
+        "sky": list(lamps.SKY_COLOUR),
+        "floor": list(lamps.FLOOR_COLOUR),
+        "brightness": lamps.BRIGHTNESS,
         "wall": _wall(face),
     }
 

@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 from tts2face.interchange.exports.decimation import N_SPACE, FloatArray, decimate
 from tts2face.interchange.exports.surfaces import ExportSurface, divide_surface
 from tts2face.models.face import Face
-from tts2face.picture.light import N_HARMONICS
-from tts2face.picture.surface import EYE_KIND, SKIN, STRANDS
+from tts2face.picture.light_fields import N_HARMONICS
+from tts2face.picture.materials import EYE_KIND, SKIN, STRANDS
 
 HIDDEN_SKY = 0.045  # share of the sky that a vertex hidden from all sides has in a light field
 HIDDEN_MM = 5.0  # error of hidden skin, which is removed
@@ -31,7 +31,7 @@ def stage_surfaces(face: Face, fields: NDArray[np.float32], moves: NDArray[np.fl
     Parameters
     ----------
     fields : (V, 20)
-        Light fields as `tts2face.picture.light.light_fields` makes them.
+        Light fields as `tts2face.picture.light_fields.light_fields` makes them.
     moves : (K, V, 3)
         Displacements in mm of the channels at weight 1.
     """

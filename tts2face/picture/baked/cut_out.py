@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from tts2face.models.baked_light import BakedLight
 from tts2face.models.photo_view import PhotoView
 from tts2face.numeric.kernels import kernel, vectorized_kernel
-from tts2face.picture.baked.surface import COVER_SHIFT, OPAQUE, LitSurface, U, V, nearest_triangles, project
+from tts2face.picture.baked.surface import COVER_SHIFT, OPAQUE, LitSurface
+from tts2face.picture.baked.visibility import U, V, nearest_triangles, project
 from tts2face.picture.camera import CameraMatrices
 
 Array = NDArray[Any]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tts2face.models.baked_light import OFFSET, SPAN
 from tts2face.numeric.kernels import inlined_kernel, kernel, vectorized_kernel
-from tts2face.picture.baked.surface import NEAR, X, Y
+from tts2face.picture.baked.visibility import NEAR, X, Y
 
 Array = NDArray[Any]
 

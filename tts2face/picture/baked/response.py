@@ -2,9 +2,7 @@
 
 Light depends on the shape that is posed, not on the names of its shapes: skin that turns from a lamp darkens whichever
 shape turns it. Fitted to all poses but one, that leaves half of the error of modes that are predicted from the shapes'
-weights. Teeth, gums and tongue are lit through the opening of the lips: by its form factor.
-
-Sources: Lambert 1760 (light from a polygon); Heitz, Dupuy, Hill and Neubelt 2016 (an edge's share of it without
+weights. Teeth, gums and tongue are lit through the opening of the lips: by its form factor. Sources: Lambert 1760 (light from a polygon); Heitz, Dupuy, Hill and Neubelt 2016 (an edge's share of it without
 trigonometry).
 """
 

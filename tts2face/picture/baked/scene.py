@@ -1,10 +1,6 @@
-"""Scene of a face with baked light: everything that is constant over the frames of a clip, and one frame.
-
-Interpolation of baked light between turns of the head and between cameras.
-"""
+"""Scene of a face with baked light: everything that is constant over the frames of a clip, and one frame."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,6 +15,8 @@ from tts2face.models.light import Lit
 from tts2face.numeric.kernels import BLOCK
 from tts2face.picture.baked.cut_out import compose_over, find_covers
 from tts2face.picture.baked.eyes import CENTRE, N_EYE_COLUMNS, PUPIL, TURN, colour_eyes
+from tts2face.picture.baked.interpolation import Cardinal, camera_weights, turn_weights, yaw_and_pitch_deg
+from tts2face.picture.baked.modes import add_modes, pack_change, still_change
 from tts2face.picture.baked.response import TermBuffers, add_responses, still_eyes
 from tts2face.picture.baked.shading import (
     AT_RED,
@@ -33,87 +31,13 @@ from tts2face.picture.baked.shading import (
     lay_planes,
     list_fragments,
 )
-from tts2face.picture.baked.surface import (
-    N_SPAN_VALUES,
-    NEAR,
-    RED,
-    TEXELS_A_PIXEL,
-    LitSurface,
-    X,
-    add_modes,
-    build_surface,
-    fill_bands,
-    find_bands,
-    find_nearest,
-    pack_change,
-    project,
-    stack_pages,
-    still_change,
-)
+from tts2face.picture.baked.surface import TEXELS_A_PIXEL, LitSurface, build_surface, stack_pages
+from tts2face.picture.baked.visibility import N_SPAN_VALUES, NEAR, RED, X, fill_bands, find_bands, find_nearest, project
 from tts2face.picture.camera import CameraMatrices
 from tts2face.picture.options import Picture
 
 Floats = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
-
-TURN_SCALE_DEG = (10.0, 8.0)  # of yaw and pitch in the distance between turns
-TURN_LIMIT_DEG = (23.0, 14.0)  # beyond the baked turns light stays
-CAMERA_SCALE_DEG = 15.0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Cardinal:
-    """Interpolation between nodes, the first of which is at rest: weights that are 1 at their node and 0 at others.
-
-    Multiquadrics with a linear part; quadratics in yaw and pitch left one to two of 255 more of error. Source: Hardy
-    1971.
-    """
-
-    nodes: Floats
-    scale: Floats
-    limit: Floats
-    inverse: Floats
-
-    @classmethod
-    def between(cls, nodes: NDArray[np.floating], scale: Sequence[float], limit: Sequence[float]) -> "Cardinal":
-        """Interpolation between rest and nodes (N, D), which are scaled and bounded in each dimension."""
-        sizes = np.array(scale, np.float64)
-        every = np.vstack([np.zeros((1, len(scale))), np.asarray(nodes, np.float64)]) / sizes
-        linear = np.column_stack([np.ones(len(every)), every])
-        corner = np.zeros((linear.shape[1], linear.shape[1]))
-        system = np.block([[_multiquadric(every, every), linear], [linear.T, corner]])
-        return cls(every, sizes, np.array(limit, np.float64), np.linalg.pinv(system))
-
-    def at(self, place: NDArray[np.floating]) -> Float32Array:
-        """(N,) weights of the nodes without that at rest, for a place (D,)."""
-        inside = np.clip(np.asarray(place, np.float64), -self.limit, self.limit) / self.scale
-        row = np.concatenate([_multiquadric(inside[None], self.nodes)[0], [1.0], inside])
-        weights: Float32Array = (row @ self.inverse)[1 : len(self.nodes)].astype(np.float32)
-        return weights
-
-
-def _multiquadric(a: Floats, b: Floats) -> Floats:
-    squared = ((a[:, None] - b[None]) ** 2).sum(axis=2)
-    root: Floats = np.sqrt(squared + 0.25)
-    return root
-
-
-def turn_weights(turns_deg: NDArray[np.floating]) -> Cardinal:
-    """Interpolation between turns of the head (T, 2), yaw and pitch."""
-    return Cardinal.between(turns_deg, TURN_SCALE_DEG, TURN_LIMIT_DEG)
-
-
-def camera_weights(yaws_deg: NDArray[np.floating]) -> Cardinal:
-    """Interpolation between cameras (Y,)."""
-    most = float(np.abs(yaws_deg).max(initial=1.0))
-    return Cardinal.between(np.asarray(yaws_deg)[:, None], (CAMERA_SCALE_DEG,), (most,))
-
-
-def yaw_and_pitch_deg(head: NDArray[np.floating]) -> Floats:
-    """(2,) of a head pose (6,)."""
-    return np.degrees(np.asarray(head, np.float64)[[1, 0]])
-
-
 BLINK_SHRINK = 0.075  # of the ball behind a shut lid, times its weight to the fourth power
 BLINKS = ("eyeBlinkLeft", "eyeBlinkRight")  # of the face's eyes
 BEHIND_SHARE = np.float32(0.8)  # of the nearness of what lies in openings

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.numeric.kernels import flat_view, kernel, vectorized_kernel
-from tts2face.picture.baked.surface import LIGHT_BITS, LIGHT_STEP, LIGHT_ZERO, TRIANGLE_BITS, TRIANGLE_MASK, U, X, Y
+from tts2face.picture.baked.modes import LIGHT_BITS, LIGHT_STEP, LIGHT_ZERO
+from tts2face.picture.baked.visibility import TRIANGLE_BITS, TRIANGLE_MASK, U, X, Y
 
 Array = NDArray[Any]
 
@@ -30,7 +31,7 @@ def list_fragments(
     Parameters
     ----------
     nearest : (side H, side W + BLOCK)
-        Of `tts2face.picture.baked.surface.find_nearest`.
+        Of `tts2face.picture.baked.visibility.find_nearest`.
     place
         Samples along a pixel's side, the band's first row of samples, and the columns [first, end) with any.
     piece_of : (F,)

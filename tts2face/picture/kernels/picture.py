@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.picture.camera import CameraMatrices
+from tts2face.picture.cards import Strands
 from tts2face.picture.kernels.cutouts import Textures, draw_cutouts
 from tts2face.picture.kernels.fragments import (
     PIXEL_ENDS,
@@ -45,8 +46,9 @@ from tts2face.picture.kernels.strand_light import (
     light_strands,
 )
 from tts2face.picture.kernels.strands import FRAGMENTS_AT_ONCE, Covered, StrandScene, draw_strands
-from tts2face.picture.kernels.tables import COLOUR, N_ROWS, N_VERTEX_COLUMNS, TONE_TABLES, UV
-from tts2face.picture.surface import Strands, Surface
+from tts2face.picture.kernels.tables import COLOUR, N_ROWS, N_VERTEX_COLUMNS, UV
+from tts2face.picture.kernels.tones import TONE_TABLES
+from tts2face.picture.surface import Surface
 
 Array = NDArray[Any]
 

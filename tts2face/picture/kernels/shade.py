@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.numeric.kernels import inlined_kernel, kernel, vectorized_kernel
+from tts2face.picture.kernels.lamps import BRIGHTNESS, FIRST_LIGHT_ROW, FLOOR_ROW, SKY_ROW, UP_ROW
 from tts2face.picture.kernels.tables import (
     AT_ALBEDO,
     AT_DARK_GLOSS,
@@ -23,14 +24,9 @@ from tts2face.picture.kernels.tables import (
     AT_RAY,
     AT_ROUGHNESS,
     AT_SECOND_LOBE,
-    BRIGHTNESS,
     DIFFUSE,
     EXPOSURE,
-    FIRST_LIGHT_ROW,
-    FLOOR_ROW,
     NORMAL,
-    SKY_ROW,
-    UP_ROW,
 )
 
 Array = NDArray[Any]

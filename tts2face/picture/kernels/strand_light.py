@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.numeric.kernels import kernel, vectorized_kernel
+from tts2face.picture.kernels.lamps import FIRST_LIGHT_ROW, FLOOR_ROW, SKY_ROW, UP_ROW
 from tts2face.picture.kernels.shade import kept_hue, tone_curve
-from tts2face.picture.kernels.tables import FIRST_LIGHT_ROW, FLOOR_ROW, NORMAL, SKY_ROW, UP_ROW
+from tts2face.picture.kernels.tables import NORMAL
 
 Array = NDArray[Any]
 

@@ -15,9 +15,10 @@ from lexicon.sentences import text_prefix
 from tts2face.interchange.exports.writer import ExportWriter, plan_exports
 from tts2face.models.face_loading import load_face
 from tts2face.picture.film import MKV, ClipWriter
+from tts2face.picture.frame_renderer import FrameRenderer
 from tts2face.picture.options import Picture
 from tts2face.picture.own_face import OwnFaceRenderer
-from tts2face.picture.renderer import FrameRenderer, MeshRenderer, before_studio
+from tts2face.picture.renderer import MeshRenderer, before_studio
 from tts2face.processes.child import Call, Handler
 from tts2face.request import DRAWN_FACE, Request
 from tts2face.serving.batch.fit import EASY_S, RELEASE_S, Fit, Limits, Room, fit_speech, without_overlap

@@ -4,8 +4,8 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from typing import Any
 
-from tts2face.picture.movie import MOVIE_KINDS
 from tts2face.picture.sound_stream import SOUND_KINDS
+from tts2face.picture.streamed_movie import MOVIE_KINDS
 from tts2face.serving.service.messages import Work
 
 # Shares of a core of a stream in real time, rounded up.

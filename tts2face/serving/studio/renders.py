@@ -11,8 +11,8 @@ from pathlib import Path
 
 from lexicon.errors import InputError
 from tts2face.interchange.exports.table import all_formats, find_format
-from tts2face.picture.movie import MOVIE_KINDS
 from tts2face.picture.sound_stream import SOUND_KINDS
+from tts2face.picture.streamed_movie import MOVIE_KINDS
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.studio.project_store import RENDERS
 from tts2face.serving.studio.requests import key_of, project_work

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from starlette.datastructures import FormData
 
 from lexicon.g2p import DEFAULT_LANGUAGE
-from tts2face.picture.movie import MOVIE_KINDS
+from tts2face.picture.streamed_movie import MOVIE_KINDS
 from tts2face.serving.service.client_names import Adjustments
 from tts2face.serving.service.clip_options import ClipRequest, divide_options
 from tts2face.serving.service.errors import RefusedError

@@ -11,8 +11,8 @@ from fastapi.responses import Response, StreamingResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from lexicon.marked_text import VOLUME_LIMITS
-from tts2face.picture.movie import MOVIE_KINDS
 from tts2face.picture.sound_stream import SOUND_KINDS
+from tts2face.picture.streamed_movie import MOVIE_KINDS
 from tts2face.processes.message import Message
 from tts2face.serving.service.client_names import (
     KOKORO_EXAMPLES,

@@ -46,7 +46,7 @@ class StageElement(Element, component="stage.js", esm={MODULES: str(COMPONENTS)}
         self.run_method("setPreview", url)
 
     def view(self, name: str) -> None:
-        """Choose a camera of `tts2face.picture.options.NAMED_VIEWS`."""
+        """Choose a camera of `tts2face.picture.camera_view.NAMED_VIEWS`."""
         self.run_method("view", name)
 
     def show_picture(self, url: str | None) -> None:

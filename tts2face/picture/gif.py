@@ -1,7 +1,4 @@
-"""Animated GIF with one palette for all pictures; sound is discarded.
-
-Folder of .png pictures, numbered from 0, with the sound in sound.wav.
-"""
+"""Animated GIF with one palette for all pictures; sound is discarded."""
 
 from collections.abc import Sequence
 from fractions import Fraction
@@ -10,9 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from tts2face.picture.provenance import png_labels
-from tts2face.storage.wave_files import open_wave, pcm_bytes
 
 TICKS_PER_SECOND = 100  # ticks of a GIF's clock per second
 MIN_TICKS = 2  # browsers play shorter delays as 0.1 s
@@ -107,45 +101,3 @@ def _colour_table(swatches: Sequence[NDArray[np.uint8]], n_colours: int) -> tupl
     levels = np.indices((1 << COLOUR_BITS,) * 3).reshape(3, -1).T * (1 << (8 - COLOUR_BITS)) + (1 << (7 - COLOUR_BITS))
     nearest = np.asarray(cKDTree(colours).query(levels)[1], np.uint8)
     return palette, nearest
-
-
-SOUND_NAME = "sound.wav"
-NUMBER_DIGITS = 6
-COMPRESSION = 3  # zlib level: twice as fast as the default 6, 4 % larger
-
-
-class PngFolderWriter:
-    """Sink that writes pictures to a folder."""
-
-    def __init__(self, folder: Path, sound_rate: int, notice: str = "") -> None:
-        """Open an existing folder; `notice` becomes the comment and an XMP packet of every picture."""
-        self._folder, self._n_frames, self._labels = folder, 0, png_labels(notice)
-        self._sound = open_wave(str(folder / SOUND_NAME), sound_rate)
-
-    def picture(self, pixels: NDArray[np.uint8]) -> None:
-        """Write one picture (H, W, 3 or 4)."""
-        from PIL import Image
-
-        path = self._folder / f"{self._n_frames:0{NUMBER_DIGITS}d}.png"
-        Image.fromarray(pixels).save(path, compress_level=COMPRESSION, pnginfo=self._labels)
-        self._n_frames += 1
-
-    def sound(self, samples: NDArray[np.float32]) -> None:
-        """Append mono samples (n,) in [-1, 1] as 16-bit integers."""
-        self._sound.writeframes(pcm_bytes(samples))
-
-    def finish(self) -> None:
-        """Complete the sound file."""
-        self._sound.close()
-
-    def abandon(self) -> None:
-        """Close the sound file."""
-        self._sound.close()
-
-
-def is_png_folder(folder: Path) -> bool:
-    """Whether a folder contains only files that `PngFolderWriter` writes."""
-    return all(
-        path.name == SOUND_NAME or (path.suffix == ".png" and path.stem.isdigit() and len(path.stem) >= NUMBER_DIGITS)
-        for path in folder.iterdir()
-    )
