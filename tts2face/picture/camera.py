@@ -79,11 +79,6 @@ def photo_crop(
     """Left, top, right and bottom, in pixels of its photograph, of what a camera shows in a picture of `size`.
 
     The picture is filled, with the face as near its middle as it can be.
-
-    Raises
-    ------
-    InputError
-        The camera does not see the face from where the photograph was taken.
     """
     if max(abs(camera.yaw_deg), abs(camera.pitch_deg)) > MAX_PHOTO_TURN_DEG:
         raise InputError(

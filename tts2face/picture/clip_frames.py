@@ -32,7 +32,9 @@ class ClipFrames:
 
     def __init__(self, renderer: FrameRenderer, threads: int | None = None, pace: Pace | None = None) -> None:
         self.n_frames = self.n_added = 0
-        self._renderer, self._threads, self._pace = renderer, threads, pace
+        self._renderer = renderer
+        self._threads = threads
+        self._pace = pace
         self._n_samples = 0
         self._clock: tuple[float, int] | None = None
 
@@ -74,7 +76,9 @@ class ClipFrames:
 
     def _pictures(self, clip: Clip) -> Iterator[tuple[int, NDArray[np.uint8]]]:
         """Numbers of the frames that are drawn, the first and the last among them, and their pictures."""
-        pace, n_frames, first = self._pace, len(clip.motion), self.n_frames
+        pace = self._pace
+        n_frames = len(clip.motion)
+        first = self.n_frames
         if pace is None:
             yield from enumerate(self._renderer.frames(clip, threads=self._threads, first=first))
             return

@@ -130,7 +130,9 @@ class ClipWriter:
     def _open_sink(self, clip: Clip) -> Sink:
         if self._temporary is None:
             raise InputError("ClipWriter writes only within a with statement; open it as `with ClipWriter(...)`")
-        fps, rate, picture = exact_rate(clip.fps), clip.speech.waveform.rate, self._renderer.picture
+        fps = exact_rate(clip.fps)
+        rate = clip.speech.waveform.rate
+        picture = self._renderer.picture
         if self._kind == FOLDER:
             return PngFolderWriter(self._temporary.path, rate, self._renderer.notice)
         if self._kind == GIF:

@@ -25,7 +25,9 @@ class GifWriter:
         import av
 
         self._path, self._notice = path, notice
-        self._fps, self._n_frames, self._last = fps, 0, -MIN_TICKS
+        self._fps = fps
+        self._n_frames = 0
+        self._last = -MIN_TICKS
         height, width, channels = swatches[0].shape
         self._palette, self._nearest = _colour_table(swatches, 256 if channels == 3 else 255)
         pattern = np.tile(BAYER, (-(-height // 4), -(-width // 4)))[:height, :width, None]

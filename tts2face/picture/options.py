@@ -124,13 +124,7 @@ def parse_size(size: str) -> tuple[int, int]:
 
 
 def parse_background(background: str) -> tuple[int, int, int] | Path | str:
-    """Colour (sRGB, 0-255), image path, or the word ``studio``, ``transparent`` or ``blur``.
-
-    Raises
-    ------
-    InputError
-        The text is none of these, or the image does not exist.
-    """
+    """Colour (sRGB, 0-255), image path, or the word ``studio``, ``transparent`` or ``blur``."""
     if background in (STUDIO, TRANSPARENT, BLUR):
         return background
     digits = COLOURS.get(background.lower(), background.removeprefix("#"))

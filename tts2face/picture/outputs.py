@@ -14,13 +14,7 @@ FOLDER = ""
 
 
 def output_kind(path: Path | str) -> str:
-    """Kind of an output path: one of `FILE_SUFFIXES`, or `FOLDER`.
-
-    Raises
-    ------
-    InputError
-        The suffix is unknown.
-    """
+    """Kind of an output path: one of `FILE_SUFFIXES`, or `FOLDER`."""
     suffix = Path(path).suffix.lower()
     if str(path).endswith(("/", os.sep)) or suffix == "" or (suffix not in FILE_SUFFIXES and Path(path).is_dir()):
         return FOLDER

@@ -28,7 +28,10 @@ class Pace:
     """
 
     def __init__(self, lead: Callable[[], float]) -> None:
-        self._lead, self._level, self._n_drawn, self._lead_before = lead, 0, 0, 0.0
+        self._lead = lead
+        self._level = 0
+        self._n_drawn = 0
+        self._lead_before = 0.0
 
     @property
     def quality(self) -> Quality:

@@ -128,14 +128,7 @@ def fit_background_video(appearance: Appearance, picture: Picture) -> tuple[Fram
 
 
 def _decode_video(plate: Plate) -> Iterator[NDArray[np.uint8]]:
-    """Pictures (H, W, 3) of a plate's video, one for each row of its points.
-
-    Raises
-    ------
-    DataError
-        The video cannot be decoded, its pictures are too large or change size, or their number is not that of the
-        points.
-    """
+    """Pictures (H, W, 3) of a plate's video, one for each row of its points."""
     import av
 
     n_frames = 0

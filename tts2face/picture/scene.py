@@ -30,7 +30,7 @@ from tts2face.picture.surface import Surface, build_surface
 from tts2face.processes.threads import available_cores
 from tts2face.storage.pictures import open_picture
 
-BACKS_SIDE_PX = 192  # pictures in which visible back faces are looked for; one band of rows
+BACKS_SIDE_PX = 192  # pictures that show which back faces are visible; one band of rows
 STUDIO_BRIGHT, STUDIO_DARK = (150.0, 146.0, 141.0), (62.0, 62.0, 65.0)  # sRGB at the centre of the wall and far from it
 STUDIO_CENTRE = (0.5, 0.42)  # of the bright area, as shares of width and height
 
@@ -119,15 +119,7 @@ def without_hidden_backs(face: Face, surface: Surface, view: CameraView) -> Surf
 
 
 def draw_background(picture: Picture, studio: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
-    """Background (H, W, 3) of a picture, sRGB; black for a transparent picture; a face may have its own studio.
-
-    Raises
-    ------
-    InputError
-        The background of a photograph shall be blurred, and there is none.
-    DataError
-        The image cannot be read or is too large.
-    """
+    """Background (H, W, 3) of a picture, sRGB; black for a transparent picture; a face may have its own studio."""
     kind = parse_background(picture.background)
     if kind == BLUR:
         raise InputError("--background blur is the background of a photograph, and the face is none; choose another")

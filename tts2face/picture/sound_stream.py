@@ -107,7 +107,9 @@ class _PcmEncoder:
     """Encoder without compression."""
 
     def __init__(self, rate: int, path: Path | None, *, has_header: bool) -> None:
-        self._rate, self._has_header, self._n_bytes = rate, has_header, 0
+        self._rate = rate
+        self._has_header = has_header
+        self._n_bytes = 0
         self._file = None if path is None else path.open("wb")
         self._header = wav_header(rate, None) if has_header else b""
 

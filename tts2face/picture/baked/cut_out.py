@@ -87,7 +87,10 @@ def compose_over(
     """
     pixels, samples, n_samples = fragments
     height, width, channels = picture.shape
-    part, half, zero, unit = np.float32(1) / np.float32(n_samples), np.float32(0.5), np.float32(0), np.float32(1)
+    part = np.float32(1) / np.float32(n_samples)
+    half = np.float32(0.5)
+    zero = np.float32(0)
+    unit = np.float32(1)
     most, least = np.float32(OPAQUE), np.float32(1e-3)
     pixel = 0
     for row in range(height):

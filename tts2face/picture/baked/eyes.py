@@ -60,7 +60,7 @@ def _angle(across: Any, ahead: Any) -> Any:
 
 
 @kernel
-def look_at_eyes(
+def place_eyes(
     found: tuple[Array, Array, Array, Array],
     surface: tuple[Array, Array, Array],
     eyes: tuple[Array, Array, Array],
@@ -84,7 +84,9 @@ def look_at_eyes(
     table, triangles, eye_of = surface
     of_eyes, texture, camera = eyes
     side = np.float32(len(texture))
-    unit, half, zero = np.float32(1), np.float32(0.5), np.float32(0)
+    unit = np.float32(1)
+    half = np.float32(0.5)
+    zero = np.float32(0)
     for n in range(rows.shape[1]):
         i = numbers[n]
         t = triangle[i]
@@ -130,7 +132,9 @@ def look_at_eyes(
 def mirror_lamps(camera: Array, lamps: Array, sky: Array, rows: Array) -> None:
     """Add the radiance of lamps (L, 17) and sky (3,) in the mirror direction, by Fresnel's share, to rows (13, M)."""
     n = rows.shape[1]
-    unit, zero, least = np.float32(1), np.float32(0), np.float32(-1e-4)
+    unit = np.float32(1)
+    zero = np.float32(0)
+    least = np.float32(-0.0001)
     x, y, z, share = rows[MIRROR], rows[MIRROR + 1], rows[MIRROR + 2], rows[MIRROR + 3]
     for i in range(n):
         a, b, c = rows[0, i] - camera[0], rows[1, i] - camera[1], rows[2, i] - camera[2]
@@ -205,7 +209,7 @@ def colour_eyes(
     Parameters
     ----------
     found, surface, eyes
-        As `look_at_eyes`; `found` without the numbers.
+        As `place_eyes`; `found` without the numbers.
     light
         Lamps, sky, and the table of the view transform.
     """
@@ -214,6 +218,6 @@ def colour_eyes(
     numbers = numbers[: find_eyes(found[0], count, surface[2], numbers)]
     if len(numbers):
         rows = np.zeros((N_ROWS, len(numbers)), np.float32)
-        look_at_eyes((numbers, *found), surface, eyes, colour, rows)
+        place_eyes((numbers, *found), surface, eyes, colour, rows)
         mirror_lamps(eyes[2], lamps, sky, rows)
         look_up(view, rows[LIGHT:], numbers, colour)

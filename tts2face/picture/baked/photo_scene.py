@@ -19,15 +19,7 @@ BLUR_MM = 12.0  # standard deviation, where the person is
 
 
 def build_photo_scene(face: Face, light: Photographed, picture: Picture) -> LitScene:
-    """Scene of a photographed face, in the size of the photograph where none is asked for.
-
-    Raises
-    ------
-    InputError
-        The camera does not see the face from where it was taken, or an opaque picture shall have another background.
-    DataError
-        The background image cannot be read, or the photograph does not fit its view.
-    """
+    """Scene of a photographed face, in the size of the photograph where none is asked for."""
     view, baked = light.view, light.baked
     _check(light, picture)
     if picture.size == AUTO_SIZE:

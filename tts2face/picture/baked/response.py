@@ -2,8 +2,8 @@
 
 Light depends on the shape that is posed, not on the names of its shapes: skin that turns from a lamp darkens whichever
 shape turns it. Fitted to all poses but one, that leaves half of the error of modes that are predicted from the shapes'
-weights. Teeth, gums and tongue are lit through the opening of the lips: by its form factor. Sources: Lambert 1760 (light from a polygon); Heitz, Dupuy, Hill and Neubelt 2016 (an edge's share of it without
-trigonometry).
+weights. Teeth, gums and tongue are lit through the opening of the lips: by its form factor. Sources: Lambert 1760
+(light from a polygon); Heitz, Dupuy, Hill and Neubelt 2016 (an edge's share of it without trigonometry).
 """
 
 from dataclasses import dataclass
@@ -165,7 +165,10 @@ def write_mouth_terms(points: Array, mouth: Array, table: Array, ring: Array, te
     The curve is flat where the opening is narrow or wide, as that of a display. `ways` (6, M) is scratch space: places,
     and ways to the corner before, of length 1.
     """
-    zero, unit, half, least = np.float32(0), np.float32(1), np.float32(0.5), np.float32(1e-7)
+    zero = np.float32(0)
+    unit = np.float32(1)
+    half = np.float32(0.5)
+    least = np.float32(1e-07)
     n = len(mouth)
     px, py, pz, bx, by, bz = ways[0], ways[1], ways[2], ways[3], ways[4], ways[5]
     right, up, ahead = terms[3], terms[4], terms[5]

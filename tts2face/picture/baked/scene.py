@@ -109,7 +109,9 @@ class LitScene:
 
     def allocate_buffers(self) -> LitBuffers:
         """Buffers for pictures of this scene."""
-        light, surface, picture = self.surface.light, self.surface, self.picture
+        light = self.surface.light
+        surface = self.surface
+        picture = self.picture
         side, n_triangles = picture.samples_per_side, len(surface.triangles)
         rows = max(1, BAND_PIXELS // picture.width)
         n_fragments = picture.width * rows * side * side

@@ -87,7 +87,9 @@ def list_fragments(
                     continue
                 own, depth = (keys[first] & TRIANGLE_MASK) - 1, keys[first] >> TRIANGLE_BITS
                 piece, reach = piece_of[own], depth >> SAME_DEPTH_BITS
-                n, total_right, total_below = 0, 0, 0
+                n = 0
+                total_right = 0
+                total_below = 0
                 for s in range(first, n_samples):
                     key = keys[s]
                     same = (piece_of[(key & TRIANGLE_MASK) - 1] == piece) & (key != 0)
@@ -119,7 +121,9 @@ def lay_planes(
     (F,), and the triangle of each plane: those of the last two that do not agree are of other fragments.
     """
     plane, plane_of, triangle_of = found
-    zero, third, n = np.float32(0), np.float32(1 / 3), 0
+    zero = np.float32(0)
+    third = np.float32(1 / 3)
+    n = 0
     for i in range(count):
         t = np.uint64(triangle[i])
         own = plane_of[t]
@@ -209,14 +213,25 @@ def compose(pixels: Array, samples: Array, n_samples: int, colour: Array, pictur
 
     Colours (3, N) are mixed as displayed.
     """
-    n_pixels, channels, line = len(pixels) - 1, picture.shape[2], flat_view(picture)
-    part, half, zero, most = np.float32(1) / np.float32(n_samples), np.float32(0.5), np.float32(0), np.float32(255)
-    first, unit, two, three = pixels[0], np.uint64(1), np.uint64(2), np.uint64(3)
+    n_pixels = len(pixels) - 1
+    channels = picture.shape[2]
+    line = flat_view(picture)
+    part = np.float32(1) / np.float32(n_samples)
+    half = np.float32(0.5)
+    zero = np.float32(0)
+    most = np.float32(255)
+    first = pixels[0]
+    unit = np.uint64(1)
+    two = np.uint64(2)
+    three = np.uint64(3)
     for pixel in range(n_pixels):
         end = pixels[pixel + 1]
         if first == end:
             continue
-        red, green, blue, seen = zero, zero, zero, 0
+        red = zero
+        green = zero
+        blue = zero
+        seen = 0
         for i in range(first, end):
             share = np.float32(samples[i]) * part
             seen += samples[i]

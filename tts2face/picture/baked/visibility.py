@@ -119,7 +119,9 @@ def find_nearest(
     for sample in range(len(line)):
         line[sample] = 0
     top_row, end_row = np.float32(first_row), np.float32(first_row + height - 1)
-    zero, left_end, right_end = np.float32(0), np.float32(0), np.float32(stride - BLOCK - 1)
+    zero = np.float32(0)
+    left_end = np.float32(0)
+    right_end = np.float32(stride - BLOCK - 1)
     beyond = right_end + np.float32(1)
     first_column, last_column = np.float32(stride), np.float32(-1)
     for t in order:

@@ -83,7 +83,9 @@ def draw_cutouts(
     depth, owner : (3, R, W)
         As `draw_band` writes them, changed in place; translucent layers behind a drawn sample are removed.
     """
-    vertex, triangles, lens = geometry.vertex, geometry.triangles, geometry.lens
+    vertex = geometry.vertex
+    triangles = geometry.triangles
+    lens = geometry.lens
     corners = batch.corners
     first_row, side, n_layers = place
     n_rows, width = depth.shape[1], depth.shape[2]

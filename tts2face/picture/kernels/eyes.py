@@ -1,4 +1,4 @@
-"""Look of eyeballs: a reflection of the lamps on the cornea, the dark ring of the iris, the lid's shadow, the wet line.
+"""Eyeballs: the lamps mirrored by the cornea, the dark ring of the iris, the lid's shadow, the wet line.
 
 Applies to parts of the kind "eye" that turn with one of the face's eyes. Lengths are for an eyeball of 12 mm radius.
 """
@@ -32,7 +32,7 @@ CATCHLIGHT, FILL_LIGHT = np.float32(1.2), np.float32(0.16)  # brightness of the 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EyeGeometry:
-    """What the look of a face's eyes takes: ``lids`` (E, 2, 9) rows of the landmarks, -1 without; ``iris`` (E,)."""
+    """Geometry of a face's eyes: ``lids`` (E, 2, 9) rows of the landmarks, -1 without; ``iris`` and ``radius`` (E,)."""
 
     rig: FaceRig
     corners: NDArray[np.int32]

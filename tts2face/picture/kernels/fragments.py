@@ -136,10 +136,16 @@ def is_same_surface(number: int, other: int, facets: Facets) -> bool:
 @kernel
 def find_fragments(band: Band, n_layers: int, facets: Facets, fragments: Fragments) -> int:
     """Write triangles, samples and pixels of the fragments of a band; returns the number of pixels."""
-    side, owner, through = band.side, band.owner, band.through
-    number_of, spread, pixels = fragments.number_of, fragments.spread, fragments.pixels
+    side = band.side
+    owner = band.owner
+    through = band.through
+    number_of = fragments.number_of
+    spread = fragments.spread
+    pixels = fragments.pixels
     n_fragments = n_pixels = 0
-    unit, n_samples, middle = np.float32(1), side * side, 0.5 * (side - 1)
+    unit = np.float32(1)
+    n_samples = side * side
+    middle = 0.5 * (side - 1)
     for r in range(band.n_rows // side):
         for x in range(owner.shape[2] // side):
             start = n_fragments
@@ -199,15 +205,27 @@ def evaluate_fragments(
     fragments: Fragments, n_fragments: int, vertex: Array, scene: Materials, lens: Array, side: int
 ) -> None:
     """Write attributes of fragments, interpolated at the centre of their samples (Moeller and Trumbore 1997)."""
-    number_of, spread, table = fragments.number_of, fragments.spread, fragments.table
-    triangles, part_of, materials, eyes = scene.triangles, scene.part_of, scene.materials, scene.eyes
-    texels, levels, linear = scene.texels, scene.levels, scene.linear
+    number_of = fragments.number_of
+    spread = fragments.spread
+    table = fragments.table
+    triangles = scene.triangles
+    part_of = scene.part_of
+    materials = scene.materials
+    eyes = scene.eyes
+    texels = scene.texels
+    levels = scene.levels
+    linear = scene.linear
     unit, zero = np.float32(1), np.float32(0)
     focal, middle_x, middle_y = np.float32(1 / lens[0]), np.float32(lens[1] - 0.5), np.float32(lens[2] - 0.5)
     pixel = np.float32((side / lens[0]) ** 2)
     sx = sy = sz = e1x = e1y = e1z = e2x = e2y = e2z = rx = ry = rz = zero
     ua = va = u1 = v1 = u2 = v2 = texel_area = zero
-    last, a, b, c, material, texture = NO_TRIANGLE, 0, 0, 0, 0, -1
+    last = NO_TRIANGLE
+    a = 0
+    b = 0
+    c = 0
+    material = 0
+    texture = -1
     for g in range(n_fragments):
         number = number_of[g]
         if number != last:  # fragments of one triangle often follow each other

@@ -151,7 +151,9 @@ def draw_surface(
     pose: Pose, surface: Surface, optics: CameraMatrices, buffers: DrawingBuffers, picture: NDArray[np.uint8]
 ) -> None:
     """Draw a surface over the background in `picture` (H, W, 3 or 4), sRGB, in place."""
-    lens, side, fragments = optics.lens, buffers.side, buffers.fragments
+    lens = optics.lens
+    side = buffers.side
+    fragments = buffers.fragments
     height, width = picture.shape[0] * side, picture.shape[1] * side
     members = project_surface(pose.points, surface, (optics.view, lens), buffers, (width, height))
     light_surface(pose, surface, lens, buffers)
@@ -182,7 +184,9 @@ def draw_surface(
 
 def light_surface(pose: Pose, surface: Surface, lens: NDArray[np.float64], buffers: DrawingBuffers) -> None:
     """Write normals and light of the projected vertices, and the strand table."""
-    vertex, skin, strands = buffers.vertex, surface.skin, surface.strands
+    vertex = buffers.vertex
+    skin = surface.skin
+    strands = surface.strands
     face_normals(vertex, surface.triangles, buffers.flat)
     vertex_normals(buffers.flat, surface.starts, surface.members, vertex)
     light_vertices(pose.exposure, pose.lights, surface.wrap, vertex)

@@ -245,7 +245,9 @@ def draw_band(geometry: Geometry, batch: Batch, first_row: int, depth: Array, ow
     `depth` and `owner` (3, R, W) become 1/z and triangle index of the opaque surface and of the two nearest translucent
     ones in front of it.
     """
-    corners, boxes, bounds = batch.corners, batch.boxes, batch.bounds
+    corners = batch.corners
+    boxes = batch.boxes
+    bounds = batch.bounds
     nearest_of = boxes.view(np.float32)
     n_rows, width = depth.shape[1], depth.shape[2]
     tiles = np.zeros(
@@ -287,7 +289,10 @@ def draw_band(geometry: Geometry, batch: Batch, first_row: int, depth: Array, ow
             right_0, right_1, right_2 = (y1 - y2) * GRID, (y2 - y0) * GRID, (y0 - y1) * GRID
             base = origin + along * (top + first_row + 0.5) + across * (left + 0.5)
             for r in range(top, bottom + 1):
-                e0, e1, e2, value = row_0, row_1, row_2, base
+                e0 = row_0
+                e1 = row_1
+                e2 = row_2
+                value = base
                 for x in range(left, right + 1):
                     if (e0 | e1 | e2) >= 0:
                         near = np.float32(min(max(value, least), most)) * bias

@@ -26,7 +26,9 @@ def write_pixel(light: tuple[Any, Any, Any], cover: Any, tables: tuple[Any, Any]
     """Composite light and coverage over a pixel (y, x); a picture of four channels stores the coverage."""
     linear, encoded = tables
     y, x = at
-    unit, zero, half = np.float32(1), np.float32(0), np.float32(0.5)
+    unit = np.float32(1)
+    zero = np.float32(0)
+    half = np.float32(0.5)
     top = np.float32(len(encoded) - 1)
     behind, scale = unit - cover, unit
     if picture.shape[2] == 4:
@@ -74,7 +76,10 @@ def compose_band(
     band: Band, facets: Facets, fragments: Fragments, n_pixels: int, picture: Array, tables: tuple[Array, Array]
 ) -> None:
     """Write the pixels of a band over the background in a picture; `tables` convert between 8 bits and linear light."""
-    rows, table, colour, through = fragments.pixels, fragments.table, fragments.colour, band.through
+    rows = fragments.pixels
+    table = fragments.table
+    colour = fragments.colour
+    through = band.through
     unit, zero = np.float32(1), np.float32(0)
     n_samples = band.side * band.side
     share = unit / np.float32(n_samples)
@@ -83,7 +88,11 @@ def compose_band(
         start, end = rows[p, PIXEL_ENDS], rows[p, PIXEL_ENDS + 3]
         x, y = rows[p, PIXEL_X], rows[p, PIXEL_Y]
         r = y - band.first_row // band.side
-        red, green, blue, rest, least = zero, zero, zero, unit, unit
+        red = zero
+        green = zero
+        blue = zero
+        rest = unit
+        least = unit
         if through.size > 0:
             rest, least = zero, through[r, x, 0]
             for s in range(n_samples):

@@ -62,14 +62,18 @@ def light_vertices(exposure: Array, lights: Array, wrap: Array, vertex: Array) -
     vertex : (V, N_VERTEX_COLUMNS)
         Vertex table: reads normals, writes diffuse light and exposure.
     """
-    zero, unit, half = np.float32(0), np.float32(1), np.float32(0.5)
+    zero = np.float32(0)
+    unit = np.float32(1)
+    half = np.float32(0.5)
     for v in range(len(vertex)):
         nx, ny, nz = vertex[v, NORMAL], vertex[v, NORMAL + 1], vertex[v, NORMAL + 2]
         around_edge = wrap[v]
         if around_edge < zero:
             around_edge = -unit - around_edge
             if nx * vertex[v, 0] + ny * vertex[v, 1] + nz * vertex[v, 2] > zero:
-                nx, ny, nz = -nx, -ny, -nz
+                nx = -nx
+                ny = -ny
+                nz = -nz
         up = nx * lights[UP_ROW, 0] + ny * lights[UP_ROW, 1] + nz * lights[UP_ROW, 2]
         for c in range(3):
             middle = half * (lights[SKY_ROW, c] + lights[FLOOR_ROW, c])

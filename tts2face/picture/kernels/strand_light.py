@@ -68,7 +68,9 @@ def light_strands(vertices: Array, normals: Array, tangents: Array, light: Any, 
         Out: all columns but the texture coordinates.
     """
     exposure, lights, lens = light
-    zero, unit, half = np.float32(0), np.float32(1), np.float32(0.5)
+    zero = np.float32(0)
+    unit = np.float32(1)
+    half = np.float32(0.5)
     for i in range(len(vertices)):
         v = vertices[i]
         px, py, pz = vertex[v, 0], vertex[v, 1], vertex[v, 2]
@@ -112,7 +114,9 @@ def light_strands(vertices: Array, normals: Array, tangents: Array, light: Any, 
 def shade_strands(fragments: StrandFragments, n: int, cards: Cards, lights: Array, colour: Array) -> None:
     """Add the display light of n fragments of strands to the pixels (R, W, 3)."""
     which, rows = fragments.which, fragments.rows
-    table, triangles, gloss = cards.table, cards.triangles, cards.gloss
+    table = cards.table
+    triangles = cards.triangles
+    gloss = cards.gloss
     unit, zero = np.float32(1), np.float32(0)
     for i in range(n):
         t = which[0, i]

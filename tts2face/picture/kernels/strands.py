@@ -165,7 +165,9 @@ def set_planes(a: Array, b: Array, c: Array, planes: Array) -> float:
 @kernel
 def draw_strands(cards: Cards, order: Array, scene: StrandScene, band: Covered, fragments: StrandFragments) -> None:
     """Blend the cards of a band of pixels; `order` (F,) are their triangles from front to back."""
-    table, triangles, through = cards.table, cards.triangles, band.through
+    table = cards.table
+    triangles = cards.triangles
+    through = band.through
     texels, levels = scene.texels, scene.levels
     first_row, side = band.first_row, band.side
     which, rows = fragments.which, fragments.rows
