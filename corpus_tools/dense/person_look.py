@@ -32,9 +32,9 @@ from corpus_tools.dense.skin_colour import (
 from corpus_tools.dense.texels import find_texels
 from lexicon.values.fields import check_fields
 from tts2face.models.face import Face, Hairdo
-from tts2face.models.face_file import tint_parts
-from tts2face.models.hair import EYE_COLOURS, HAIR_COLOURS, parse_eye_colour, parse_hair_colour
+from tts2face.models.face_tint import tint_parts
 from tts2face.models.landmarks import CHIN
+from tts2face.models.named_colours import EYE_COLOURS, HAIR_COLOURS, parse_eye_colour, parse_hair_colour
 
 Floats = NDArray[np.float64]
 

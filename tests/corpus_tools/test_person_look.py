@@ -39,8 +39,8 @@ from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import read_face
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_names import BALD
-from tts2face.models.hair import EYE_COLOURS, HAIR_COLOURS, parse_hair_colour
 from tts2face.models.landmarks import N_LANDMARKS, N_MESH_LANDMARKS
+from tts2face.models.named_colours import EYE_COLOURS, HAIR_COLOURS, parse_hair_colour
 from tts2face.numeric.arrays import decode_srgb, encode_srgb
 from tts2face.picture.camera import camera_matrices
 from tts2face.picture.camera_view import parse_camera

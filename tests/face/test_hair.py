@@ -12,8 +12,9 @@ from tests.picture.tiny_face import tiny_face
 from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import Identity, read_face, write_face
 from tts2face.models.face_loading import load_face
-from tts2face.models.hair import HAIR_COLOURS, Hair, attach_hair, fit_hair, parse_hair_colour
+from tts2face.models.hair import Hair, attach_hair, fit_hair
 from tts2face.models.hair_file import read_hair, write_hair
+from tts2face.models.named_colours import HAIR_COLOURS, parse_hair_colour
 from tts2face.picture.camera import camera_matrices
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import draw

@@ -10,13 +10,16 @@ from lexicon.errors import DataError, InputError
 from tests.face.test_hair import cap
 from tests.picture.film.lit_face import lit_tiny_face
 from tests.picture.tiny_face import tiny_face
-from tts2face.models.baked_light import BakedLight, HairLight, HairTint, table_levels
+from tts2face.models.baked_light import BakedLight, HairLight, HairTint
 from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.face_loading import load_face
-from tts2face.models.hair import parse_hair_colour
-from tts2face.models.hair_file import LitHair, read_hair, swing_shapes, tint_hair, wear_hair, write_hair, write_lit_hair
+from tts2face.models.hair_file import read_hair, write_hair, write_lit_hair
+from tts2face.models.hair_tint import tint_hair
 from tts2face.models.light import Baked
+from tts2face.models.lit_hair import LitHair, swing_shapes, wear_hair
+from tts2face.models.named_colours import parse_hair_colour
+from tts2face.models.view_transform import table_levels
 from tts2face.numeric.arrays import decode_srgb, encode_srgb
 from tts2face.storage.deflated import deflate, unpack_arrays
 from tts2face.storage.tensors import read_tensors, write_tensors

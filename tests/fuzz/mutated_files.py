@@ -27,7 +27,8 @@ from tts2face.interchange.characters.shapes import read_mapping
 from tts2face.models.face_file import Identity, read_face, write_face
 from tts2face.models.face_schema import WIDE_OPEN
 from tts2face.models.hair import attach_hair
-from tts2face.models.hair_file import read_hair, wear_hair, write_hair, write_lit_hair
+from tts2face.models.hair_file import read_hair, write_hair, write_lit_hair
+from tts2face.models.lit_hair import wear_hair
 from tts2face.models.palette_file import read_palette
 from tts2face.models.talker_file import read_talker
 from tts2face.serving.batch.cast import read_cast

@@ -10,9 +10,9 @@ from lexicon.errors import DataError, InputError
 from tests.face.test_hair import cap
 from tests.picture.tiny_face import tiny_face
 from tts2face.models.face_file import read_face, write_face
-from tts2face.models.face_schema import decode_occlusion, encode_occlusion
 from tts2face.models.hair import attach_hair
 from tts2face.models.hair_file import read_hair, write_hair
+from tts2face.models.mesh_coding import decode_occlusion, encode_occlusion
 from tts2face.picture import occlusion
 from tts2face.picture.occlusion import bake_hair, bake_occlusion
 from tts2face.picture.options import Picture

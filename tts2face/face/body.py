@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.models.hair_file import SWING_SHAPES
+from tts2face.models.lit_hair import SWING_SHAPES
 from tts2face.types import Trajectory
 
 BREATH_SHAPE = "breath"

@@ -3,21 +3,22 @@
 Colours are those of a display, 0 to 255, and are added to each other; those of eyeballs are linear light. Source:
 Theobald et al. 2007, equation 2 (an appearance is a mean and a sum of changes), with changes that each vertex finds in
 the shape of its pose.
-
-View transform: linear light to colours of a display, as a table over its logarithm.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.models.codec import Stored, StoredModel
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.models.view_transform import TABLE_SIDE
+from tts2face.storage.model_pictures import encode_colours
+from tts2face.storage.schema import MAX_MM, Tensor
 
 N_PAGES = 2
-TABLE_SIDE = 33  # entries of the view transform along each colour
 N_LAMP_NUMBERS = 17
 LIP_RING = (
     *INNER_LIP_UPPER,
@@ -27,6 +28,23 @@ N_TERMS, N_MOUTH_TERMS, N_BALL_TERMS = 10, 6, 3  # of `tts2face.picture.baked.re
 LIMIT_STEP = 2.0  # of 255
 BLACK_SHARE = 64  # of a page's height lies below both, black: the texels of parts without a page
 LEAST_SIDE = 2 * BLACK_SHARE  # of a page: two rows of black, of which one is read
+HAIR_QUALITY = 85  # of the JPEG pictures of haircuts; 92 takes 100 kB more of each
+MAX_FACTOR = 1e3  # of any weight or light
+
+
+def _factors(*shape: int | str, low: float = -MAX_FACTOR) -> Tensor:
+    return Tensor("float32", shape, low, MAX_FACTOR, may_be_empty=True)
+
+
+def _steps(*shape: int | str) -> Tensor:
+    return Tensor("int8", shape, may_be_empty=True)
+
+
+def _numbers(*shape: int | str) -> Tensor:
+    return Tensor("int32", shape, may_be_empty=True)
+
+
+LAMPS = Tensor("float32", ("lamps", N_LAMP_NUMBERS), -MAX_MM, MAX_MM, may_be_empty=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,8 +70,15 @@ class HairTint:
         _make_read_only(self)
 
 
+def _tint_picture(tint: HairTint) -> NDArray[np.uint8]:
+    return encode_colours(np.concatenate(list(tint.pages)), HAIR_QUALITY)
+
+
+TINT = Stored(Tensor("uint8", ("bytes of tint",), is_optional=True), encode=_tint_picture)
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class HairLight:
+class HairLight(StoredModel):
     """What of a face's light depends on its haircut.
 
     Attributes
@@ -82,15 +107,15 @@ class HairLight:
 
     pages: NDArray[np.uint8]
     triangles: NDArray[np.int32]
-    is_inside: NDArray[np.bool_]
-    base: NDArray[np.uint8]
-    turns_deg: NDArray[np.float32]
-    turn_weights: NDArray[np.float32]
-    turn_modes: NDArray[np.int8]
-    camera_yaws_deg: NDArray[np.float32]
-    camera_modes: NDArray[np.int8]
-    camera_sizes: NDArray[np.float32]
-    tint: HairTint | None = None
+    is_inside: Annotated[NDArray[np.bool_], Tensor("bool", ("drawn triangles",))]
+    base: Annotated[NDArray[np.uint8], Tensor("uint8", ("lit vertices", 3), may_be_empty=True)]
+    turns_deg: Annotated[NDArray[np.float32], Tensor("float32", ("turns", 2), -90.0, 90.0, may_be_empty=True)]
+    turn_weights: Annotated[NDArray[np.float32], _factors("turns", "turn modes")]
+    turn_modes: Annotated[NDArray[np.int8], _steps("turn modes", 3, "texels of change")]
+    camera_yaws_deg: Annotated[NDArray[np.float32], Tensor("float32", ("cameras",), -180.0, 180.0, may_be_empty=True)]
+    camera_modes: Annotated[NDArray[np.int8], _steps("cameras", 3, "texels from cameras")]
+    camera_sizes: Annotated[NDArray[np.float32], _factors("cameras")]
+    tint: Annotated[HairTint | None, TINT] = None
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
@@ -156,32 +181,32 @@ class BakedLight(HairLight):
     eye_edges : (2,)
         Angles from the gaze, rad, at which pupil and iris end in that texture.
     view : (33, 33, 33, 3)
-        Colours of linear light at `tts2face.models.baked_light.table_levels`.
+        Colours of linear light at `tts2face.models.view_transform.table_levels`.
     backdrop : (H, W, 3)
         The wall behind, from in front.
     """
 
     page_of: Mapping[str, int]
-    rows: NDArray[np.int32]
-    responses: NDArray[np.int8]
-    response_sizes: NDArray[np.float32]
-    limits: NDArray[np.int8]
-    partners: NDArray[np.int32]
-    mouth_rows: NDArray[np.int32]
-    mouth_base: NDArray[np.uint8]
-    mouth_responses: NDArray[np.int8]
-    mouth_sizes: NDArray[np.float32]
-    mouth_limits: NDArray[np.int8]
-    ball_rows: NDArray[np.int32]
-    ball_base: NDArray[np.float32]
-    ball_responses: NDArray[np.int8]
-    ball_sizes: NDArray[np.float32]
-    lamps: NDArray[np.float32]
+    rows: Annotated[NDArray[np.int32], _numbers("lit vertices")]
+    responses: Annotated[NDArray[np.int8], _steps(N_TERMS, 3, "lit vertices")]
+    response_sizes: Annotated[NDArray[np.float32], _factors(N_TERMS)]
+    limits: Annotated[NDArray[np.int8], _steps(2, 3, "lit vertices")]
+    partners: Annotated[NDArray[np.int32], _numbers("partners")]
+    mouth_rows: Annotated[NDArray[np.int32], _numbers("vertices of the mouth")]
+    mouth_base: Annotated[NDArray[np.uint8], Tensor("uint8", ("vertices of the mouth", 3), may_be_empty=True)]
+    mouth_responses: Annotated[NDArray[np.int8], _steps(N_MOUTH_TERMS, 3, "vertices of the mouth")]
+    mouth_sizes: Annotated[NDArray[np.float32], _factors(N_MOUTH_TERMS)]
+    mouth_limits: Annotated[NDArray[np.int8], _steps(2, 3, "vertices of the mouth")]
+    ball_rows: Annotated[NDArray[np.int32], _numbers("lit vertices of eyes")]
+    ball_base: Annotated[NDArray[np.float32], _factors("lit vertices of eyes", 3)]
+    ball_responses: Annotated[NDArray[np.int8], _steps(N_BALL_TERMS, 3, "lit vertices of eyes")]
+    ball_sizes: Annotated[NDArray[np.float32], _factors(N_BALL_TERMS)]
+    lamps: Annotated[NDArray[np.float32], LAMPS]
     head_lamps: int
-    sky: NDArray[np.float32]
+    sky: Annotated[NDArray[np.float32], _factors(3, low=0.0)]
     eye_gain: float
-    eye_edges: NDArray[np.float32]
-    view: NDArray[np.uint8]
+    eye_edges: Annotated[NDArray[np.float32], Tensor("float32", (2,), 0.01, 1.5)]
+    view: Annotated[NDArray[np.uint8], Tensor("uint8", (TABLE_SIDE, TABLE_SIDE, TABLE_SIDE, 3))]
     backdrop: NDArray[np.uint8]
 
     def of_drawn(self, triangles: NDArray[np.int32]) -> "BakedLight":
@@ -258,35 +283,3 @@ def _make_read_only(record: Any) -> None:
     for one in fields(record):
         if isinstance(array := getattr(record, one.name), np.ndarray):
             array.setflags(write=False)
-
-
-OFFSET, MOST = 0.004, 16.0  # of the logarithm, and the range of linear light
-SPAN = float(np.log2(MOST / OFFSET + 1))
-
-
-def table_levels() -> NDArray[np.float64]:
-    """(33,) levels of linear light, evenly in the logarithm of light plus an offset."""
-    levels: NDArray[np.float64] = OFFSET * 2 ** (np.linspace(0, 1, TABLE_SIDE) * SPAN) - OFFSET
-    return levels
-
-
-def grey_curves(view: NDArray[np.uint8]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Curves of a view transform (33, 33, 33, 3) along its greys, which undo and do it for each channel alone.
-
-    Returns
-    -------
-    light : (3, 256)
-        Linear light of each displayed level.
-    bounds : (3, 255)
-        Linear light from which the next level is displayed.
-    """
-    grey = np.arange(TABLE_SIDE)
-    at = np.arange(0.0, 255.5, 0.5)
-    found = []
-    for levels in view[grey, grey, grey].T.astype(np.float64):
-        rising = np.flatnonzero(np.diff(levels) > 0)
-        used = np.append(rising, rising[-1] + 1)  # the last entry of black and the first of white
-        place = np.interp(at, levels[used], used) / (TABLE_SIDE - 1)
-        found.append(OFFSET * 2 ** (place * SPAN) - OFFSET)
-    curves = np.array(found, np.float32)
-    return curves[:, ::2], curves[:, 1::2]

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.baked_light import BakedLight
-from tts2face.models.codec import stored_arrays
-from tts2face.models.face import VERTEX_COLOURS, Eye, Face, FacePart, Hairdo, Late, Texture
+from tts2face.models.codec import model_of, stored_arrays
+from tts2face.models.face import VERTEX_COLOURS, Eye, Face, FacePart, Hairdo, Texture
 from tts2face.models.face_schema import (
     FOLLOW,
     LIGHT,
@@ -23,18 +23,19 @@ from tts2face.models.face_schema import (
     SCORE_INPUTS,
     WIDE_OPEN,
     check_face,
-    decode_occlusion,
-    decode_tangents,
-    decode_uv,
-    encode_occlusion,
-    encode_tangents,
-    encode_uv,
     texture_number,
 )
+from tts2face.models.face_tint import tint_parts
+from tts2face.models.late import Late
 from tts2face.models.light import Baked, Lamps, Light, Photographed
-from tts2face.models.light_coding import decode_light, encode_light, pack_shapes, quantise, unpack_shapes
+from tts2face.models.light_coding import decode_light, encode_light
+from tts2face.models.mesh_coding import (
+    decode_occlusion,
+    encode_occlusion,
+)
 from tts2face.models.photo_view import PhotoView
 from tts2face.models.score_map import SCORES, score_map_of
+from tts2face.models.shape_coding import pack_shapes, quantise, unpack_shapes
 from tts2face.storage.model_pictures import (
     decode_colours,
     decode_coverage,
@@ -48,7 +49,7 @@ from tts2face.storage.tensors import read_tensors, write_tensors
 KIND = "face"
 FORMAT_VERSION = 1
 LEAST_STEP = 1.2e-5  # of shapes, of a face's extent: 0.004 mm of a head; finer ones are noise, which cannot be packed
-MAX_BRIGHTENED_LEVEL = 150  # upper limit of texels brightened by a tint: keeps skin colours at the edge of dark hair
+PACKED_LATE = ("uv", "tangents")  # after the shapes, as in all files: equal faces give equal bytes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,21 +76,12 @@ class Identity:
 
 def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None = None) -> None:
     """Write a ``.face`` file (docs/file-formats.md): shapes sparse in 16 bits, the texture as JPEG."""
-    arrays: dict[str, NDArray[Any]] = {
-        "vertices": face.vertices.astype(np.float32),
-        "triangles": face.triangles.astype(np.int32),
-        "limits": face.limits.astype(np.float32),
-        "colours": face.colours,
-        "landmarks": face.landmarks.astype(np.int32),
-        "landmark_vertices": face.landmark_vertices.astype(np.int32),
-        "landmark_weights": face.landmark_weights.astype(np.float32),
-        "pivot": face.pivot.astype(np.float32),
-    }
     least_mm = LEAST_STEP * float(np.ptp(face.vertices, axis=0).max())
-    arrays |= pack_shapes(face.shapes, least_mm)
-    arrays |= _picture_arrays(face)
-    if face.tangents is not None:
-        arrays["tangents"] = encode_tangents(face.tangents)
+    own = stored_arrays(face)
+    if not (face.textures or face.light.is_flat):
+        own.pop("uv", None)
+    late = {name: own.pop(name) for name in PACKED_LATE if name in own}
+    arrays = own | pack_shapes(face.shapes, least_mm) | late | _texture_arrays(face)
     if face.occlusion is not None:
         arrays["occlusion"] = encode_occlusion(face.occlusion)
     presets = dict(identities or {})
@@ -154,11 +146,8 @@ def read_face(path: Path, identity: str | None = None, *, checks_pictures: bool 
     return face if identity is None else _apply_identity(face, arrays, header, names.index(identity))
 
 
-def _picture_arrays(face: Face) -> dict[str, NDArray[Any]]:
-    """Textures of a face, and the places of its vertices in them or in a photograph."""
+def _texture_arrays(face: Face) -> dict[str, NDArray[Any]]:
     arrays: dict[str, NDArray[Any]] = {}
-    if face.uv is not None and (face.textures or face.light.is_flat):
-        arrays["uv"] = encode_uv(face.uv)
     for number, texture in enumerate(face.textures):
         pixels, alpha = texture_tensors(number)
         arrays[pixels] = encode_colours(texture.pixels)
@@ -256,42 +245,21 @@ def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, A
     ]
     textures = _read_textures(arrays, path)
     hairdo = header.get("hairdos", {}).get("")
-    return Face(
-        vertices=arrays["vertices"],
-        triangles=arrays["triangles"],
+    contents = Contents(path, KIND, arrays, header)
+    return model_of(
+        Face,
+        contents,
         parts=tuple(_read_part(part, len(textures)) for part in header["parts"]),
         shape_names=tuple(header["shape_names"]),
         shapes=unpack_shapes(arrays, len(arrays["vertices"])),
-        limits=arrays["limits"],
         eyes=tuple(eyes),
-        colours=arrays["colours"],
-        uv=decode_uv(arrays["uv"]) if "uv" in arrays else None,
         textures=textures,
-        tangents=decode_tangents(arrays["tangents"]) if "tangents" in arrays else None,
         hairdo=None if hairdo is None else Hairdo(*hairdo),
         occlusion=_read_occlusion(arrays, header, path),
-        landmarks=arrays["landmarks"],
-        landmark_vertices=arrays["landmark_vertices"],
-        landmark_weights=arrays["landmark_weights"],
-        pivot=arrays["pivot"],
         metadata=header["metadata"],
-        scores=score_map_of(Contents(path, KIND, arrays, header), tuple(header.get(SCORE_INPUTS, ()))),
+        scores=score_map_of(contents, tuple(header.get(SCORE_INPUTS, ()))),
         light=_read_light(arrays, header, path),
     )
-
-
-def _part_texel_levels(face: Face, part: FacePart, shape: tuple[int, ...]) -> NDArray[np.uint8]:
-    """Levels (H, W): 255 on the texels of a part, 0 elsewhere, with a soft edge."""
-    from PIL import Image, ImageDraw, ImageFilter
-    from scipy.ndimage import maximum_filter
-
-    mask = Image.new("L", (shape[1], shape[0]))
-    pen = ImageDraw.Draw(mask)
-    places = np.asarray(face.uv, np.float64) * [shape[1], shape[0]] - 0.5
-    for corners in places[face.triangles[part.first : part.first + part.count]].tolist():
-        pen.polygon([tuple(corner) for corner in corners], fill=255, outline=255)
-    wide = maximum_filter(np.asarray(mask), 9, mode="nearest")  # the bytes of Pillow's MaxFilter, 90 ms sooner
-    return np.asarray(Image.fromarray(wide).filter(ImageFilter.GaussianBlur(1.5)))
 
 
 def _apply_identity(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], number: int) -> Face:
@@ -311,38 +279,3 @@ def _apply_identity(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapp
         hairdo=face.hairdo if hairdo is None else Hairdo(*hairdo),
         metadata={**face.metadata, "identity": name},
     )
-
-
-def tint_parts(face: Face, tints: Mapping[str, Any]) -> Face:
-    """A face whose parts, by name, have their sRGB colours multiplied by three factors, of vertices and textures."""
-    colours = face.colours.copy()
-    for part in face.parts:
-        used = np.unique(face.triangles[part.first : part.first + part.count])
-        colours[used] = np.clip(face.colours[used] * _tint(tints, part), 0, 255).astype(np.uint8)
-    return replace(face, colours=colours, textures=Late(len(face.textures), lambda: _tinted(face, tints)))
-
-
-def _tint(tints: Mapping[str, Any], part: FacePart) -> NDArray[np.float32]:
-    return np.array(tints.get(part.name, (1.0, 1.0, 1.0)), np.float32)
-
-
-def _tinted_levels(tint: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Levels (3, 256, 256) of each channel that a tint (3,) makes, by those of the part's share and of the texel."""
-    share, own = np.arange(256, dtype=np.float32)[:, None] / np.float32(255), np.arange(256, dtype=np.float32)
-    tinted = own * (1 + share * (tint[:, None, None] - 1))
-    return np.clip(tinted, 0, np.maximum(own, MAX_BRIGHTENED_LEVEL)).astype(np.uint8)
-
-
-def _tinted(face: Face, tints: Mapping[str, Any]) -> Iterator[Texture]:
-    """The textures of a face in the tints of its parts."""
-    textures = [texture.pixels for texture in face.textures]
-    for part in face.parts:
-        tint = _tint(tints, part)
-        if part.is_textured and not np.all(tint == 1):
-            texture = textures[part.texture]
-            shares = 256 * _part_texel_levels(face, part, texture.shape).astype(np.int64)
-            levels = _tinted_levels(tint)
-            tinted = [levels[c].take(shares + texture[:, :, c]) for c in range(3)]
-            textures[part.texture] = np.stack(tinted, axis=2)
-    for pixels, old in zip(textures, face.textures, strict=True):
-        yield Texture(pixels, old.alpha)

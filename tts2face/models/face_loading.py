@@ -6,9 +6,12 @@ from lexicon.errors import DataError, InputError
 from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import KIND, read_face
 from tts2face.models.face_names import BALD
-from tts2face.models.hair import attach_hair, parse_hair_colour
-from tts2face.models.hair_file import LitHair, load_hair, tint_hair, wear_hair
+from tts2face.models.hair import attach_hair
+from tts2face.models.hair_file import load_hair
+from tts2face.models.hair_tint import tint_hair
 from tts2face.models.light import Lamps
+from tts2face.models.lit_hair import LitHair, wear_hair
+from tts2face.models.named_colours import parse_hair_colour
 from tts2face.processes.shared import Shared, file_state
 from tts2face.storage.shipped import SHIPPED_FOLDER, find_file
 

@@ -1,9 +1,4 @@
-"""Schema of ``.face`` files (docs/file-formats.md), checked when a file is read.
-
-Coding of occlusion bits in model files: deflated.
-
-Texture coordinates and tangents of meshes in files: whole numbers of 16 and of 8 bits.
-"""
+"""Schema of ``.face`` files (docs/file-formats.md), checked when a file is read."""
 
 import math
 from collections.abc import Mapping
@@ -15,33 +10,14 @@ from numpy.typing import NDArray
 
 from lexicon.values.checks import Check, choice, flag, free, list_of, number, record, row, table, text, whole
 from tts2face.models.baked_light import LIP_RING
-from tts2face.models.face import PART_KINDS
+from tts2face.models.codec import stored_tensors
+from tts2face.models.face import PART_KINDS, SUM_WITHIN, Face
 from tts2face.models.landmarks import N_LANDMARKS
-from tts2face.models.light_coding import MAX_STEP_MM, SHAPE_TENSORS, check_shapes
+from tts2face.models.mesh_coding import MAX_OCCLUSION_BYTES
 from tts2face.models.score_map import check_score_map
-from tts2face.storage.deflated import deflate, inflate
+from tts2face.models.shape_coding import MAX_STEP_MM, SHAPE_TENSORS, check_shapes
 from tts2face.storage.model_pictures import texture_tensors
-from tts2face.storage.schema import MAX_MM, Contents, ModelPlace, Tensor, millimetres
-
-Bits = NDArray[np.uint8]
-MAX_OCCLUSION_BYTES = 128  # of one vertex: 1,024 directions; planes of one bit for each direction take a third more
-
-
-def encode_occlusion(bits: Bits) -> Bits:
-    """Bytes (N,) of occlusion (P, V, D / 8)."""
-    return deflate(np.ascontiguousarray(bits).tobytes())
-
-
-def decode_occlusion(content: NDArray[Any], shape: tuple[int, int, int], path: Path) -> Bits:
-    """Occlusion (P, V, D / 8) of a given shape.
-
-    Raises
-    ------
-    DataError
-        The bytes are damaged or of another size.
-    """
-    return np.frombuffer(inflate(content, math.prod(shape), "occlusion", path), np.uint8).reshape(shape)
-
+from tts2face.storage.schema import MAX_MM, Contents, ModelPlace, Tensor
 
 SCORE_INPUTS = "score_inputs"  # key of the metadata: names of the shapes that the score map reads
 # Key of the metadata, and arrays, of the view of a photographed face.
@@ -50,10 +26,7 @@ PHOTO_LAYERS = PHOTO_ALPHA, PHOTO_BEHIND = "photo_alpha", "photo_behind"
 LIGHT = "light"  # array of baked light, and the key of the metadata that describes it
 MAX_TEXTURES = 16
 MAX_PHOTO_PX = 8192  # side of a photograph
-MAX_WEIGHT = 100.0  # of a shape; common shapes have 0 to 1, gesture modes up to about 30
 MIN_EXTENT_MM = 1.0  # least width and height of a face
-SUM_WITHIN = 1e-3  # tolerance of the sum of barycentric weights; 32-bit rounding is 1e-7
-N_CORNERS = 3
 # Triangles' area over that of the box around them: 0.5 of a head; shuffled vertices have 200, and take minutes to draw.
 MOST_AREA = 10.0
 MEASURED = 4000  # triangles, spread over all, of which the area is measured: all of a head would take 10 ms
@@ -92,22 +65,13 @@ METADATA: Mapping[str, Check] = {
     "identities": list_of(_IDENTITY),
     "metadata": free,
 }
+OWN = stored_tensors(Face, "", {})
 TENSORS: Mapping[str, Tensor] = {
-    "vertices": millimetres("vertices", 3),
-    "triangles": Tensor("int32", ("triangles", N_CORNERS)),
+    **{name: OWN[name] for name in ("vertices", "triangles")},
     **SHAPE_TENSORS,
-    "limits": Tensor("float32", ("shapes", 2), -MAX_WEIGHT, MAX_WEIGHT, may_be_empty=True),
-    "colours": Tensor("uint8", ("vertices", 3)),
-    "uv": Tensor("uint16", ("vertices", 2), is_optional=True),
-    "tangents": Tensor("int8", ("vertices", 3), is_optional=True),
-    "occlusion": Tensor("uint8", ("bytes of occlusion",), is_optional=True),
-    LIGHT: Tensor("uint8", ("bytes of light",), is_optional=True),
+    **OWN,
+    **{name: Tensor("uint8", (f"bytes of {name}",), is_optional=True) for name in ("occlusion", LIGHT, *PHOTO_LAYERS)},
     FOLLOW: Tensor("uint8", ("vertices",), is_optional=True),
-    **{name: Tensor("uint8", (f"bytes of {name}",), is_optional=True) for name in PHOTO_LAYERS},
-    "landmarks": Tensor("int32", ("landmarks",), may_be_empty=True),
-    "landmark_vertices": Tensor("int32", ("landmarks", N_CORNERS), may_be_empty=True),
-    "landmark_weights": Tensor("float32", ("landmarks", N_CORNERS), -SUM_WITHIN, 1 + SUM_WITHIN, may_be_empty=True),
-    "pivot": millimetres(3),
 }
 
 
@@ -256,35 +220,3 @@ def _check_area(contents: Contents) -> None:
         squared = (uy * vz - uz * vy) ** 2 + (uz * vx - ux * vz) ** 2 + (ux * vy - uy * vx) ** 2
         share = every * float(np.sqrt(squared).sum(dtype=np.float64)) / 2.0 / box
         contents.require(share <= MOST_AREA, f"triangles {pose} cover {share:.0f} times the box around the face")
-
-
-UV_STEPS = 65535
-PLACE_STEP = 6e-6  # of the extent of a mesh, 0.002 mm of a head
-TANGENT_STEPS = 127
-
-
-def round_places(vertices: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Vertices (V, 3) in steps of a power of two, whose last bits can be packed; those at one place stay there."""
-    step = 2.0 ** np.floor(np.log2(max(float(np.ptp(vertices, axis=0).max()), 1e-6) * PLACE_STEP))
-    rounded: NDArray[np.float32] = (np.rint(vertices / step) * step).astype(np.float32)
-    return rounded
-
-
-def encode_uv(uv: NDArray[np.float32]) -> NDArray[np.uint16]:
-    """Texture coordinates (V, 2); those outside 0 to 1 are cut there."""
-    return np.rint(np.clip(uv, 0, 1) * UV_STEPS).astype(np.uint16)
-
-
-def decode_uv(content: NDArray[Any]) -> NDArray[np.float32]:
-    """Texture coordinates (V, 2), the inverse of `encode_uv` but for rounding."""
-    return (content / UV_STEPS).astype(np.float32)
-
-
-def encode_tangents(tangents: NDArray[np.float32]) -> NDArray[np.int8]:
-    """Unit vectors (V, 3)."""
-    return np.rint(tangents * TANGENT_STEPS).astype(np.int8)
-
-
-def decode_tangents(content: NDArray[Any]) -> NDArray[np.float32]:
-    """Unit vectors (V, 3), the inverse of `encode_tangents` but for rounding."""
-    return (content / TANGENT_STEPS).astype(np.float32)

@@ -1,51 +1,21 @@
-"""Haircuts: hair cards that are fitted to a head and drawn in any colour.
+"""Haircuts: hair cards that are fitted to a head and drawn in any colour."""
 
-Colours of hair and eyes that have a name.
-"""
-
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import DataError, InputError
-from tts2face.models.face import Face, FacePart, Hairdo, Late, Texture
+from lexicon.errors import DataError
+from lexicon.values.checks import free, whole
+from tts2face.models.codec import InHeader, StoredModel
+from tts2face.models.face import Face, FacePart, Hairdo, Texture
+from tts2face.models.late import Late
+from tts2face.models.mesh_coding import TANGENTS, UV
+from tts2face.models.named_colours import parse_hair_colour
 from tts2face.numeric.arrays import decode_srgb, encode_srgb
-
-HAIR_COLOURS: Mapping[str, str] = {
-    "black": "14100e", "dark-brown": "2b1d14", "brown": "463326", "light-brown": "66503d", "auburn": "5a2a1a",
-    "red": "8a3f1d", "dark-blond": "7f6950", "blond": "a69378", "grey": "8f8c89", "white": "a29e98",
-}  # fmt: skip  # sRGB
-EYE_COLOURS: Mapping[str, str] = {
-    "dark-brown": "3a281f", "brown": "58402f", "hazel": "6a5a3e", "green": "67705a", "grey": "6d7274", "blue": "60788c",
-}  # fmt: skip
-
-
-def parse_hair_colour(colour: str) -> NDArray[np.float64]:
-    """Hair colour (3,), sRGB in [0, 1], of a name of `HAIR_COLOURS` or #rrggbb.
-
-    Raises
-    ------
-    InputError
-        There is no such colour.
-    """
-    return _parsed(colour, "hair", HAIR_COLOURS)
-
-
-def parse_eye_colour(colour: str) -> NDArray[np.float64]:
-    """Colour (3,) of an iris, as `parse_hair_colour` of `EYE_COLOURS`."""
-    return _parsed(colour, "eye", EYE_COLOURS)
-
-
-def _parsed(colour: str, kind: str, names: Mapping[str, str]) -> NDArray[np.float64]:
-    digits = names.get(colour, colour.removeprefix("#"))
-    if not re.fullmatch(r"[0-9a-fA-F]{6}", digits):
-        raise InputError(f"there is no {kind} colour {colour!r}; give #rrggbb or one of {', '.join(names)}")
-    return np.array([int(digits[at : at + 2], 16) for at in (0, 2, 4)]) / 255.0
-
+from tts2face.storage.schema import Tensor, millimetres
 
 HAIR_PART = "hair"
 MEAN_RELIEF = 128.0  # relief at which a strand has the colour of the hair
@@ -53,7 +23,7 @@ MATERIAL = FacePart(HAIR_PART, 0, 0, specular=0.3, shininess=24.0, wrap=0.3, cut
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Hair:
+class Hair(StoredModel):
     """A haircut for heads of one layout, those whose vertices correspond to the shipped head's.
 
     Parameters
@@ -80,15 +50,15 @@ class Hair:
         (`tts2face.picture.occlusion`); None where they are not computed.
     """
 
-    vertices: NDArray[np.float32]
-    triangles: NDArray[np.int32]
-    uv: NDArray[np.float32]
-    tangents: NDArray[np.float32]
+    vertices: Annotated[NDArray[np.float32], millimetres("vertices", 3)]
+    triangles: Annotated[NDArray[np.int32], Tensor("int32", ("triangles", 3))]
+    uv: Annotated[NDArray[np.float32], UV]
+    tangents: Annotated[NDArray[np.float32], TANGENTS]
     pictures: Sequence[NDArray[np.uint8]]
-    anchors: NDArray[np.int32]
-    anchor_places: NDArray[np.float32]
-    n_face_vertices: int
-    metadata: Mapping[str, Any] = field(default_factory=dict)
+    anchors: Annotated[NDArray[np.int32], Tensor("int32", ("anchors",))]
+    anchor_places: Annotated[NDArray[np.float32], millimetres("anchors", 3)]
+    n_face_vertices: Annotated[int, InHeader(whole(1, 2**31 - 1))]
+    metadata: Annotated[Mapping[str, Any], InHeader(free, encode=dict)] = field(default_factory=dict)
     occlusion: NDArray[np.uint8] | None = None
     skin_occlusion: NDArray[np.uint8] | None = None
 

@@ -21,12 +21,12 @@ from tts2face.models.baked_light import (
     N_MOUTH_TERMS,
     N_PAGES,
     N_TERMS,
-    TABLE_SIDE,
     BakedLight,
     equal_limits,
     quantised,
 )
 from tts2face.models.landmarks import LEFT_LIDS, OUTER_LIP_LOWER, OUTER_LIP_UPPER, RIGHT_LIDS
+from tts2face.models.view_transform import TABLE_SIDE
 from tts2face.numeric.arrays import LUMINANCE, decode_srgb, smoothstep, vertex_normals
 from tts2face.photo.lines import LEAST_BLUR_PX, colours_at, grey_at
 from tts2face.photo.mesh import PhotoMesh

@@ -223,7 +223,7 @@ def haircuts_of(face: str) -> tuple[HaircutEntry, ...]:
 
 def hair_colors() -> tuple[HairColorEntry, ...]:
     """The hair colours that have a name."""
-    from tts2face.models.hair import HAIR_COLOURS
+    from tts2face.models.named_colours import HAIR_COLOURS
 
     return tuple(HairColorEntry(name, f"#{digits}") for name, digits in HAIR_COLOURS.items())
 

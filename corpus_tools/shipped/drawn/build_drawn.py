@@ -40,7 +40,7 @@ from corpus_tools.training.calibrate_face import calibrate_face_file
 from tts2face.face.body import BREATH_SHAPE, LIMIT_RAD, PUPIL_SHAPE
 from tts2face.models.face import Face, Hairdo, Texture
 from tts2face.models.face_file import write_face
-from tts2face.models.hair_file import SWING_SHAPES
+from tts2face.models.lit_hair import SWING_SHAPES
 
 CAST: Mapping[str, DrawnCharacter] = {
     one.name: one for one in (WOMAN, MAN, ELDER, GIRL, REALISTIC_WOMAN, REALISTIC_MAN)

@@ -12,7 +12,7 @@ from corpus_tools.shipped.drawn.character import CharacterColours, Curls, Hairst
 from corpus_tools.shipped.drawn.fields import arc_length, hair_tiles, in_tile, profile, smooth_rows, wind_outward
 from corpus_tools.shipped.head.mesh import HeadPart, MaterialSpan, grid_triangles, triangulate
 from corpus_tools.shipped.head.skin import HeadSkin, vertex_normals
-from tts2face.models.hair_file import swing_shapes
+from tts2face.models.lit_hair import swing_shapes
 from tts2face.numeric.arrays import smoothstep, unit_vectors
 
 Floats = NDArray[np.float64]

@@ -25,7 +25,7 @@ from corpus_tools.shipped.head.mesh import Eyeball, HeadPart, MaterialSpan, grid
 from corpus_tools.shipped.head.skin import HeadSkin
 from tts2face.models.baked_light import HairLight
 from tts2face.models.face import Face
-from tts2face.models.hair_file import LitHair, swing_shapes
+from tts2face.models.lit_hair import LitHair, swing_shapes
 from tts2face.numeric.arrays import smoothstep, unit_vectors
 
 Place = tuple[float, float, float]

@@ -21,7 +21,7 @@ from corpus_tools.shipped.drawn.hair import OtherHair
 from corpus_tools.shipped.film.materials import white
 from corpus_tools.shipped.film.poses import CAMERA_YAWS_DEG, FAR, FRONT, MOUTH, SKIN, LitPose, PoseLight
 from corpus_tools.shipped.film.scene import FilmScene
-from tts2face.models.baked_light import table_levels
+from tts2face.models.view_transform import table_levels
 
 Float32Array = NDArray[np.float32]
 

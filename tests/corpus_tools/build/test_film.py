@@ -16,11 +16,11 @@ from corpus_tools.shipped.film.fit_light import fit_light
 from corpus_tools.shipped.film.look import LAMPS, Look
 from corpus_tools.shipped.film.poses import EXPRESSIONS, LitPose, PoseLight, expression_pose, farthest
 from tests.interchange.characters.makehuman import makehuman
-from tts2face.models.baked_light import table_levels
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.face_loading import load_face
-from tts2face.models.hair_file import tint_hair
+from tts2face.models.hair_tint import tint_hair
 from tts2face.models.light import Baked
+from tts2face.models.view_transform import table_levels
 from tts2face.picture.camera_view import CameraView, parse_camera
 
 SIDE, SAMPLES = 96, 2

@@ -11,7 +11,8 @@ from tts2face.models.face_file import read_face
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_names import haircut_names
 from tts2face.models.hair import Hair, fit_hair
-from tts2face.models.hair_file import SWING_SHAPES, load_hair
+from tts2face.models.hair_file import load_hair
+from tts2face.models.lit_hair import SWING_SHAPES
 from tts2face.session.catalogue import haircuts, identities
 from tts2face.storage.shipped import SHIPPED_FOLDER, find_file
 

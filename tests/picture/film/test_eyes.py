@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 
-from tts2face.models.baked_light import table_levels
+from tts2face.models.view_transform import table_levels
 from tts2face.picture.baked.eyes import LAMP_LIGHT, N_ROWS, REFRACTION, look_up, mirror_lamps
 
 CAMERA = np.zeros(15, np.float32)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.models.baked_light import OFFSET, SPAN
+from tts2face.models.view_transform import OFFSET, SPAN
 from tts2face.numeric.kernels import inlined_kernel, kernel, vectorized_kernel
 from tts2face.picture.baked.visibility import NEAR, X, Y
 

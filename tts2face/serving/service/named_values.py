@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from tts2face.models.face_names import default_face
-from tts2face.models.hair import parse_hair_colour
+from tts2face.models.named_colours import parse_hair_colour
 from tts2face.picture.options import BLUR, COLOURS, STUDIO, TRANSPARENT
 from tts2face.request import OWN_FACE
 from tts2face.serving.service.errors import RefusedError

@@ -14,7 +14,7 @@ from fastapi import Request as HttpRequest
 from fastapi.responses import JSONResponse, Response
 from starlette.datastructures import FormData, UploadFile
 
-from tts2face.models.hair import EYE_COLOURS, parse_eye_colour
+from tts2face.models.named_colours import EYE_COLOURS, parse_eye_colour
 from tts2face.serving.service.access import require_scope
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey

@@ -12,7 +12,7 @@ from typing import Any
 
 from nicegui import events, ui
 
-from tts2face.models.hair import EYE_COLOURS
+from tts2face.models.named_colours import EYE_COLOURS
 from tts2face.serving.service.sent_resources import (
     AVATAR,
     MAX_CONSENT,
