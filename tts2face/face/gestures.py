@@ -165,13 +165,7 @@ def mouth_response(expression: FloatArray) -> FloatArray:
 def check_gestures(
     gestures: Mapping[str, Float32Array], gains: Mapping[str, float], n_frames: int, regions: Mapping[str, int]
 ) -> None:
-    """Check gestures and gains against the frames and the palette; `regions` holds the number of modes per region.
-
-    Raises
-    ------
-    InputError
-        A feature or gain does not exist, is not finite, or has the wrong shape.
-    """
+    """Check gestures and gains against the frames and the palette; `regions` holds the number of modes per region."""
     widths = {name: len(channels) for name, channels in FIXED_CHANNELS.items()} | dict(regions)
     for name, values in gestures.items():
         if name not in widths:

@@ -230,15 +230,7 @@ def model_of(model: type[Model], contents: Contents, prefix: str = "", **others:
 def read_model(
     path: Path, kind: str, version: int, model: type[Model], header: Mapping[str, Check] | None = None
 ) -> Model:
-    """Model of a file, whose metadata hold values beside those of the model, which are checked, too.
-
-    Raises
-    ------
-    InputError
-        The file does not exist.
-    DataError
-        The file is damaged, of another kind or version, or invalid.
-    """
+    """Model of a file, whose metadata hold values beside those of the model, which are checked, too."""
     arrays, metadata = read_tensors(path, kind, version)
     contents = Contents(path, kind, arrays, metadata)
     contents.metadata({**(header or {}), **header_checks(model)})

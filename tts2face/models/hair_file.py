@@ -95,13 +95,6 @@ def read_hair(path: Path, *, checks_pictures: bool = True) -> Hair | LitHair:
     """Read a ``.hair`` file: hair cards for heads, or a haircut of a face with baked light.
 
     Pictures are decoded at once where the file may be damaged (`checks_pictures`), otherwise when hair is first drawn.
-
-    Raises
-    ------
-    InputError
-        The file does not exist.
-    DataError
-        The file is damaged, of another kind or version, or invalid.
     """
     arrays, header = read_tensors(path, HAIR_KIND, FORMAT_VERSION)
     if LIGHT in arrays:
@@ -183,13 +176,6 @@ def load_hair(name: str, face: str = "", own: str = BALD) -> Hair | LitHair:
         Shipped face with baked light whose haircut it is; empty for one of cards, for heads.
     own
         Haircut that such a face has without a file.
-
-    Raises
-    ------
-    InputError
-        There is no such haircut.
-    DataError
-        As `read_hair`.
     """
     known = haircut_names(face)
     if not (name in known or Path(name).suffix):

@@ -19,15 +19,7 @@ OTHER_COLOUR, GLOSS_TINT = 0.15, 0.3  # distance from the hair's own colour at w
 
 
 def tint_hair(face: Face, colour: str) -> Face:
-    """A face with light of its own whose hair has a colour.
-
-    Raises
-    ------
-    InputError
-        There is no such hair colour.
-    DataError
-        The hair of the face has one colour only.
-    """
+    """A face with light of its own whose hair has a colour."""
     srgb, light = parse_hair_colour(colour), face.light
     tint = None if isinstance(light, Lamps) else light.baked.tint
     if isinstance(light, Lamps) or tint is None:

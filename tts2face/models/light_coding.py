@@ -83,13 +83,7 @@ def _encoded(light: BakedLight | HairLight, pictures: Mapping[str, Any]) -> tupl
 def decode_light(
     content: NDArray[np.uint8], stored: Mapping[str, Any], sizes: Mapping[str, int], path: Path
 ) -> BakedLight:
-    """Light of what `encode_light` returned, for a face with these numbers of vertices and triangles.
-
-    Raises
-    ------
-    DataError
-        It is damaged, or does not fit the face.
-    """
+    """Light of what `encode_light` returned, for a face with these numbers of vertices and triangles."""
     FIELDS(stored, ModelPlace(f"{path}: metadata: light"))
     arrays = unpack_arrays(content, stored["arrays"], "light", path)
     n_partners = len(arrays.get("rows", ())) + len(arrays.get("ball_rows", ()))
@@ -112,13 +106,7 @@ def decode_light(
 def decode_hair_light(
     content: NDArray[np.uint8], stored: Mapping[str, Any], sizes: Mapping[str, int], path: Path
 ) -> HairLight:
-    """Light of what `encode_hair_light` returned, for a face with so many vertices and triangles with the haircut.
-
-    Raises
-    ------
-    DataError
-        It is damaged.
-    """
+    """Light of what `encode_hair_light` returned, for a face with so many vertices and triangles with the haircut."""
     HAIR_FIELDS(stored, ModelPlace(f"{path}: metadata: light"))
     contents = Contents(path, "haircut", unpack_arrays(content, stored["arrays"], "light", path), {})
     contents.tensors(OF_HAIR)

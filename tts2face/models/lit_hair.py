@@ -83,13 +83,7 @@ def swing_shapes(
 
 
 def wear_hair(face: Face, hair: LitHair) -> Face:
-    """A face with another haircut in its own colour.
-
-    Raises
-    ------
-    DataError
-        It is a haircut of another face.
-    """
+    """A face with another haircut in its own colour."""
     n, name = hair.n_face_vertices, str(hair.metadata.get("name", ""))
     own = face.parts[-1]
     fits = own.name == HAIR_PART and own.first == hair.n_face_triangles and face.triangles[: own.first].max() < n

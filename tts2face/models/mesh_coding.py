@@ -24,13 +24,7 @@ def encode_occlusion(bits: Bits) -> Bits:
 
 
 def decode_occlusion(content: NDArray[Any], shape: tuple[int, int, int], path: Path) -> Bits:
-    """Occlusion (P, V, D / 8) of a given shape.
-
-    Raises
-    ------
-    DataError
-        The bytes are damaged or of another size.
-    """
+    """Occlusion (P, V, D / 8) of a given shape."""
     return np.frombuffer(inflate(content, math.prod(shape), "occlusion", path), np.uint8).reshape(shape)
 
 

@@ -103,13 +103,7 @@ def fit_interpolant(
 
 
 def check_centres(centres: NDArray[np.floating], displacements: NDArray[np.floating]) -> tuple[FloatArray, FloatArray]:
-    """Centres (N, D) and displacements (N, E) as float64, checked.
-
-    Raises
-    ------
-    InputError
-        Their numbers differ or are 0, or a value is not finite.
-    """
+    """Centres (N, D) and displacements (N, E) as float64, checked."""
     points, targets = np.asarray(centres, np.float64), np.asarray(displacements, np.float64)
     if points.ndim != 2 or targets.ndim != 2 or len(points) != len(targets) or not len(points):
         raise InputError(

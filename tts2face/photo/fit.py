@@ -46,11 +46,6 @@ class PhotoFit:
     ``seam`` is the line between lips that touch; the edges of parted ones, and those of the lids of the person's right
     and left eye, are ``upper`` and ``lower``. ``teeth`` is the middle of the edge of the upper teeth, ``pivot`` the
     point about which the head turns.
-
-    Raises
-    ------
-    InputError
-        A line has too few points, runs backwards, or is given twice, or two lines do not meet in their corners.
     """
 
     lines: Mapping[tuple[str, str], Floats]
@@ -115,15 +110,7 @@ def parse_fit(content: Any, name: str = "the fit") -> PhotoFit:
 
 
 def read_fit(path: Path) -> PhotoFit:
-    """A fit from a file.
-
-    Raises
-    ------
-    InputError
-        There is no such file.
-    DataError
-        It is not JSON, or no fit.
-    """
+    """A fit from a file."""
     try:
         return parse_fit(read_json(path), str(path))
     except OSError as refused:

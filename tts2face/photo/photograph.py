@@ -65,14 +65,7 @@ class Photograph:
 
 
 def read_photograph(path: Path) -> Photograph:
-    """Read a picture file: upright by its EXIF data, in sRGB by its colour profile, reduced if it is very large.
-
-    Raises
-    ------
-    DataError
-        It is no picture that can be read, has a side below `MIN_SIDE_PX`, or more than `MAX_FILE_PIXELS`; HEIC needs
-        pillow-heif.
-    """
+    """Read a picture file: upright by its EXIF data, in sRGB by its colour profile, reduced if it is very large."""
     from PIL import ImageOps
 
     with open_photograph(path) as file:

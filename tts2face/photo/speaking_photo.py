@@ -143,11 +143,6 @@ def speaking_photo(
         Of the person in another picture; those in this one, or the head's, if omitted.
     fit
         Corrections by a person. The places that were used are those of the fit in the metadata of the face.
-
-    Raises
-    ------
-    DataError
-        The fit is not that of this picture and face.
     """
     traced = _trace(seen, head, fit)
     skinned = _cover_with_skin(traced)

@@ -157,13 +157,7 @@ def find_teeth(
 
 
 def read_teeth(reader: PhotoReader, smile: str | Path, photo: str | Path, face: FoundFace, head: Face) -> OwnTeeth:
-    """Upper teeth of a person in a second picture, a smile, beside the face that was found in a photo.
-
-    Raises
-    ------
-    DataError
-        The smile shows no face, plainly another one, or too little of the teeth.
-    """
+    """Upper teeth of a person in a second picture, a smile, beside the face that was found in a photo."""
     seen = reader.read(smile, with_open_eyes=False)
     pixels, found = seen.picture.pixels, seen.found
     apart_deg = float(np.hypot(*np.subtract(found.angles_deg, face.angles_deg)[:2]))
