@@ -140,7 +140,7 @@ def test_a_drive_that_lost_a_part_is_refused() -> None:
     stored = StoredAudioMap.of(learn_linear_map(lessons(), feature="mfcc"))
     inner, outer = stored.weights
     with pytest.raises(DataError, match="do not fit each other"):
-        replace(stored, weights=(inner[:, :2], outer)).audio_map(25.0)
+        replace(stored, weights=(inner[:, :2], outer)).audio_map()
 
 
 def test_features_of_another_number_are_refused() -> None:

@@ -62,7 +62,7 @@ class StoredAudioMap(StoredModel):
 
     mean: Annotated[Floats, Tensor("float32", ("{prefix} features",), -MAX_WEIGHT, MAX_WEIGHT)]
     spread: Annotated[Floats, Tensor("float32", ("{prefix} features",), 0.0, MAX_WEIGHT)]
-    fps: Annotated[NDArray[np.float64] | None, Tensor("float64", (1,), *FPS_LIMITS, is_optional=True)]
+    fps: Annotated[NDArray[np.float64], Tensor("float64", (1,), *FPS_LIMITS)]
     weights: Annotated[tuple[Floats, ...], Numbered((INNER,), _n_layers, _weight_names)]
     biases: Annotated[tuple[Floats, ...], Numbered((OUTER,), _n_layers, _bias_names)]
     context: Annotated[NDArray[np.int32], Tensor("int32", (3,), 0, MAX_CONTEXT)]
@@ -107,8 +107,8 @@ class StoredAudioMap(StoredModel):
         is_positive = bool((contents.arrays[f"{prefix}.spread"] > 0).all())
         contents.require(is_positive, f"{prefix}.spread holds 0; it must be above 0")
 
-    def audio_map(self, fps: float) -> AudioMap:
-        """The audio map; one of a file without a rate has that of the talker."""
+    def audio_map(self) -> AudioMap:
+        """The audio map."""
         before, after, activation = (int(number) for number in self.context)
         return AudioMap(
             self.feature,
@@ -120,7 +120,7 @@ class StoredAudioMap(StoredModel):
             self.biases,
             ACTIVATIONS[activation],
             float(self.loudness[0]),
-            fps if self.fps is None else float(self.fps[0]),
+            float(self.fps[0]),
         )
 
 
@@ -142,6 +142,6 @@ def check_audio_maps(contents: Contents) -> None:
         check_model(StoredAudioMap, contents, f"{DRIVE}.{name}")
 
 
-def audio_maps_of(contents: Contents, fps: float) -> dict[str, AudioMap]:
+def audio_maps_of(contents: Contents) -> dict[str, AudioMap]:
     """Audio maps of a checked talker file by name."""
-    return {name: model_of(StoredAudioMap, contents, f"{DRIVE}.{name}").audio_map(fps) for name in _names(contents)}
+    return {name: model_of(StoredAudioMap, contents, f"{DRIVE}.{name}").audio_map() for name in _names(contents)}

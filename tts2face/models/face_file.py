@@ -179,8 +179,7 @@ def _hairdos(face: Face, presets: Mapping[str, Identity]) -> dict[str, list[str]
 
 def _read_part(fields: Mapping[str, Any], n_textures: int) -> FacePart:
     number = texture_number(fields)
-    known = {key: value for key, value in fields.items() if key != "textured"}
-    return FacePart(**known | {"texture": number if number < n_textures else VERTEX_COLOURS})
+    return FacePart(**{**fields, "texture": number if number < n_textures else VERTEX_COLOURS})
 
 
 def _read_occlusion(

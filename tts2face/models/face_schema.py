@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lexicon.values.checks import Check, choice, flag, free, list_of, number, record, row, table, text, whole
 from tts2face.models.baked_light import LIP_RING
 from tts2face.models.codec import stored_tensors
-from tts2face.models.face import PART_KINDS, SUM_WITHIN, Face
+from tts2face.models.face import PART_KINDS, SUM_WITHIN, VERTEX_COLOURS, Face
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.mesh_coding import MAX_OCCLUSION_BYTES
 from tts2face.models.score_map import check_score_map
@@ -43,7 +43,6 @@ _PART = record(
         "texture": whole(-1, MAX_TEXTURES - 1),
         "cutout": flag,
         "kind": choice(*PART_KINDS),
-        "textured": flag,  # of files of earlier versions, which have one texture
     },
 )
 _EYE = record(
@@ -153,8 +152,8 @@ def _check_photograph(contents: Contents) -> None:
 
 
 def texture_number(part: Mapping[str, Any]) -> int:
-    """Number of the texture of a part in a file; earlier versions say whether it has the only one."""
-    return int(part.get("texture", 0 if part.get("textured") else -1))
+    """Number of the texture of a part in a file."""
+    return int(part.get("texture", VERTEX_COLOURS))
 
 
 def _check_scores(contents: Contents) -> None:

@@ -228,7 +228,7 @@ def _talker_of(contents: Contents) -> Talker:
         metadata={key: value for key, value in header.items() if key not in OF_FORMAT},
         appearance=appearance,
         network=model_of(PhoneNetwork, contents, NETWORK) if has_part(contents, NETWORK) else None,
-        audio_maps=audio_maps_of(contents, fps),
+        audio_maps=audio_maps_of(contents),
         scores=score_map_of(contents, speech_channels(model)),
     )
 
