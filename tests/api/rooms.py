@@ -26,12 +26,12 @@ def contract_layers(contract: str) -> list[list[str]]:
 
 
 @cache
-def room_of(path: Path) -> str:
+def room_of(path: Path, root: Path = ROOT) -> str:
     """Dotted name of the room of a file: a folder of tts2face, serving and corpus_tools, or a package.
 
     The modules of tts2face beside its rooms, and those of corpus_tools and cli beside their folders, are a room.
     """
-    parts = path.resolve().relative_to(ROOT).with_suffix("").parts
+    parts = path.resolve().relative_to(root).with_suffix("").parts
     depth = {"tts2face": 2, "corpus_tools": 2, "tests": 2}.get(parts[0], 1)
     if parts[:2] in {("tts2face", "serving"), ("tts2face", "interchange")}:
         depth = 3
