@@ -3,7 +3,6 @@
 They replace recordings of a person in tests that need a speaking face, but no figures about real people. The
 folder has the layout of the GRID corpus: ``clips/NAME.mkv``, ``align/NAME.align`` and ``manifest.csv``; a name spells
 its sentence in GRID's code, ``bbaf2n`` is "bin blue at F two now".
-
 ``python -m tests.rendered_takes`` makes them again in 54 s of CPU time: tests read those of the folder ``takes``, which
 ``tests/build/test_rendered_takes.py`` compares with new ones.
 """

@@ -27,7 +27,7 @@ Functions = (ast.FunctionDef, ast.AsyncFunctionDef)
 
 # A sentence ends before another one; "e.g. x", "et al. 2007" and "J. Acoust." end none.
 SENTENCE_END = re.compile(
-    r"(?<!\be\.g)(?<!\bi\.e)(?<!\bal)(?<!\bcf)(?<!\bvs)(?<!\b[A-Z])[.?!][)\"'`]*\s+(?=[A-Z`\"(0-9])"
+    r"(?<!\be\.g)(?<!\bi\.e)(?<!\bal)(?<!\bcf)(?<!\beq)(?<!\bFig)(?<!\bvs)(?<!\b[A-Z])[.?!][)\"'`]*\s+(?=[A-Z`\"(0-9])"
 )
 LIST_ITEM = re.compile(r"^\s*(?:[-*]|\d+[.)]|``.*``\s|.*::$)")
 DETERMINER = r"\b(?:a|an|the|its|their|each|every|no|from|at|between|two)\s"

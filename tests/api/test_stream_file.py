@@ -23,6 +23,12 @@ TEXT = (
     "<speak>Bob may move. <break time='300ms'/> We were away, loud and <prosody volume='+4dB'>clear</prosody>.</speak>"
 )
 SMALL = tts2face.Picture(size="64x64", supersampling=1)
+BEYOND = [
+    {"nods": [{"time": 50}]}, {"brow_raises": [{"time": 50}]}, {"listens": [{"start": 50}]},
+    {"gaze": [{"down_deg": 1, "left_deg": 1, "start": 50}]},
+    {"expressions": [{"expression": "happy", "weight": 0.5, "start": 0.5, "end": 50}]},
+    {"spans": [{"feature": "head", "style": "neutral", "start": 50}]},
+]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -168,14 +174,6 @@ def test_a_complete_file_is_not_left_behind(
     assert next(chunks).content == b""
     chunks.close()  # type: ignore[attr-defined]
     assert list(tmp_path.iterdir()) == []
-
-
-BEYOND = [
-    {"nods": [{"time": 50}]}, {"brow_raises": [{"time": 50}]}, {"listens": [{"start": 50}]},
-    {"gaze": [{"down_deg": 1, "left_deg": 1, "start": 50}]},
-    {"expressions": [{"expression": "happy", "weight": 0.5, "start": 0.5, "end": 50}]},
-    {"spans": [{"feature": "head", "style": "neutral", "start": 50}]},
-]  # fmt: skip
 
 
 @pytest.mark.parametrize("elements", BEYOND, ids=lambda one: next(iter(one)))

@@ -1,8 +1,7 @@
 """What a short request of another key waits for while clients vanish, flood a live stream or fill the queue.
 
-The last line is the longest step of the server's event loop in seconds of its processor, after the first request.
-
-``PYTHONPATH=. python tests/bench/bench_attacks.py --processes 2``
+``PYTHONPATH=. python tests/bench/bench_attacks.py --processes 2``; the last line is the longest step of the server's
+event loop in seconds of its processor, after the first request.
 """
 
 import argparse

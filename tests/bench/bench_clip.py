@@ -29,6 +29,24 @@ COMMAND = "from cli.main import main; main()"
 HOMES = ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")  # other places of compiled kernels
 SHORT = "We were away a year ago, but Bob may move five big maps."
 TEN_SECONDS = f"{SHORT} Peter Piper picked a peck of pickled peppers, and she sells sea shells by the shore."
+FIRST_FRAME = """
+import os, sys, time
+from tts2face.picture.renderer import MeshRenderer
+frames = MeshRenderer.frames
+def first(*arguments, **options):
+    for _ in frames(*arguments, **options):
+        print(time.process_time(), flush=True)
+        os._exit(0)
+MeshRenderer.frames = first
+from cli.main import run
+run(sys.argv[1:])
+"""
+STARTS = {
+    "wav": ("start.wav", COMMAND),
+    "csv": ("start.csv", COMMAND),
+    "first frame": ("start.mp4", FIRST_FRAME),
+    "clip": ("start.mp4", COMMAND),
+}
 
 
 def reference_s() -> float:
@@ -62,26 +80,6 @@ def whole_clip(folder: Path, n_runs: int = 3) -> None:
     spent = time.perf_counter() - began
     print(f"drawing and encoding alone: {frames / spent:.0f} frames/s")
     print(f"reference loop: {before:.2f} s before, {reference_s():.2f} s after")
-
-
-FIRST_FRAME = """
-import os, sys, time
-from tts2face.picture.renderer import MeshRenderer
-frames = MeshRenderer.frames
-def first(*arguments, **options):
-    for _ in frames(*arguments, **options):
-        print(time.process_time(), flush=True)
-        os._exit(0)
-MeshRenderer.frames = first
-from cli.main import run
-run(sys.argv[1:])
-"""
-STARTS = {
-    "wav": ("start.wav", COMMAND),
-    "csv": ("start.csv", COMMAND),
-    "first frame": ("start.mp4", FIRST_FRAME),
-    "clip": ("start.mp4", COMMAND),
-}
 
 
 def start_cpu(folder: Path, trees: list[Path], n_runs: int = 7) -> None:

@@ -39,6 +39,7 @@ from tts2face.video.media import read_sound
 PLAIN = ("formants", "lpc", "lsf", "mfcc")
 FRAMES = (50, 100, 200, 300, 500, 700, 1000, 1500, 2000, 3000)
 COLOURS = {"formants": "#2a8c3c", "lpc": "#2457c5", "lsf": "#111111", "mfcc": "#c8281e"}
+COLUMNS = ("r_opening", "r_width", "rmse_z", "dtw_cost", "range_ratio", "closure", "false_closure")
 
 
 def main() -> None:
@@ -212,9 +213,6 @@ class Bench:
             rows.append(f"| {name} | " + " | ".join(f"{value:.3f}" for value in means) + " |")
         head()
         print("\n".join(rows))
-
-
-COLUMNS = ("r_opening", "r_width", "rmse_z", "dtw_cost", "range_ratio", "closure", "false_closure")
 
 
 def head() -> None:

@@ -46,6 +46,14 @@ from tts2face.video.streaming import StreamingTracker
 
 PICTURES_OF = 3  # every third recording's pictures are tracked again
 TRIMMED_S = 0.21  # of the beginning; no whole number of steps
+SOUNDS: dict[str, Callable[[Samples], Samples]] = {
+    "MP3, 64 kb/s": through_mp3,
+    "AAC, 64 kb/s": lambda sound: through_codec(sound, "adts", "aac"),
+    "level -12 dB": lambda sound: sound / 4,
+    "noise at -10 dB": lambda sound: add_noise(sound, 10),
+    "trimmed by 0.21 s": lambda sound: sound[round(TRIMMED_S * SOUND_RATE) :],
+    "noise, MP3, trimmed": lambda sound: through_mp3(add_noise(sound, 10))[round(TRIMMED_S * SOUND_RATE) :],
+}
 
 
 def with_sound(one: Observation, samples: Samples) -> Fingerprint:
@@ -55,16 +63,6 @@ def with_sound(one: Observation, samples: Samples) -> Fingerprint:
     level = intensity(sound, np.arange(n_frames) / one.fps)
     motion = motion_changes(face_modes(one.landmarks[:n_frames]), one.head[:n_frames], level, one.fps)
     return Fingerprint(one.name, sound_changes(sound), motion, one.phones)
-
-
-SOUNDS: dict[str, Callable[[Samples], Samples]] = {
-    "MP3, 64 kb/s": through_mp3,
-    "AAC, 64 kb/s": lambda sound: through_codec(sound, "adts", "aac"),
-    "level -12 dB": lambda sound: sound / 4,
-    "noise at -10 dB": lambda sound: add_noise(sound, 10),
-    "trimmed by 0.21 s": lambda sound: sound[round(TRIMMED_S * SOUND_RATE) :],
-    "noise, MP3, trimmed": lambda sound: through_mp3(add_noise(sound, 10))[round(TRIMMED_S * SOUND_RATE) :],
-}
 
 
 def encoded(pictures: Pictures, crf: int) -> Pictures:

@@ -4,7 +4,6 @@
 time; without an attack the same load is measured before it. The table has the seconds to the first byte, or to the
 first event of a live sentence; processor time is that of the server and its processes.
 `tests/serving/service/server/test_keys_under_attack.py` is a run of five minutes.
-
 Another tree is measured in the same way by its path in PYTHONPATH.
 """
 

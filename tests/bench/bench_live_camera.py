@@ -1,8 +1,8 @@
 """Time of an answer and processor time for a picture of a live camera, of `camera_process` alone.
 
-    python tests/bench/bench_live_camera.py ../shared/recordings [--pictures 250]
+Pictures of GRID s1 as JPEG of 480 x 360 pixels are sent one after the other, each after the answer to the last one:
 
-Pictures of GRID s1 as JPEG of 480 x 360 pixels are sent one after the other, each after the answer to the last one.
+    python tests/bench/bench_live_camera.py ../shared/recordings [--pictures 250]
 """
 
 import argparse

@@ -1,12 +1,12 @@
 """Curves of OpenFaceFX for the phones of a talker and of test people, as tracks for ``corpus evaluate --people``.
 
+By default its channels are opening and width of the shipped head's lips moved by its ARKit weights, as its users see
+them; with `--visemes`, the weights of its 15 visemes. `corpus evaluate` maps either to lips by a regression on the
+talker's own recordings: with visemes, it thereby learns their shapes from the talker:
+
     pip install openfacefx
     python tests/bench/bench_peers.py grid_s1 ../shared/recordings/fadg0_tracks --out peers.csv
     tts2face corpus evaluate --people ../shared/recordings/fadg0_tracks --tracks peers.csv
-
-By default its channels are opening and width of the shipped head's lips moved by its ARKit weights, as its users see
-them; with `--visemes`, the weights of its 15 visemes. `corpus evaluate` maps either to lips by a regression on the
-talker's own recordings: with visemes, it thereby learns their shapes from the talker.
 """
 
 import argparse

@@ -4,7 +4,6 @@
 processes and workers are killed, the data folder is filled (it lies on a file system of its own), the clock of the
 server goes back by an hour (with a C compiler), the database is away for a minute (with PostgreSQL). What cannot be
 done here is said and left out. `tests/serving/work/server/test_soak.py` is a short run of the same.
-
 Memory, threads, descriptors and temporary files at the end are compared with those after 1,000 requests, before the
 attacks; every job that was accepted has ended once and its webhook has come, and no log line is a defect.
 """

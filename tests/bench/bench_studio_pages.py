@@ -1,10 +1,9 @@
 """Opening the studio's example, from Enter to speech, and from a moved edge to its curves.
 
 Run: ``PYTHONPATH=. python tests/bench/bench_studio_pages.py``.
-
 A service that has been started before (its face is made and kept, its processes have spoken) and headless Chromium
 without a GPU. The page is loaded cold: each round has a browser of its own. Times hold for the load of the machine,
-which the script's slowness tells.
+of which the script's slowness is a measure.
 """
 
 import statistics

@@ -16,6 +16,8 @@ from tts2face.models.talker import ShapeModel
 INVENTORY = ("a", "b", "i", SILENCE, "ʃ")
 PHONES = PhoneSequence([SILENCE, "a", "ʃ", "i", "b", SILENCE], [0.0, 0.3, 0.5, 0.6, 0.8, 0.9, 1.2])
 TIMES = np.arange(30) / 25
+PRIOR = BaseMap(INVENTORY, np.eye(2, 3), np.zeros(2), np.zeros((N_OFFSETS, len(INVENTORY), 2)))
+UNIT = (np.ones(3), np.ones(2))
 
 
 def made_map(seed: int = 0, n_base: int = 3, n_own: int = 2) -> BaseMap:
@@ -55,10 +57,6 @@ def many_frames(n: int = 4000) -> FrameTerms:
     labels = rng.integers(0, len(INVENTORY), (n // 5 + N_OFFSETS,)).repeat(5)
     windows = np.lib.stride_tricks.sliding_window_view(labels, N_OFFSETS)[:n]
     return FrameTerms(windows.copy(), rng.normal(size=(n, 3)), np.arange(n) // 80)
-
-
-PRIOR = BaseMap(INVENTORY, np.eye(2, 3), np.zeros(2), np.zeros((N_OFFSETS, len(INVENTORY), 2)))
-UNIT = (np.ones(3), np.ones(2))
 
 
 def test_a_linear_relation_is_found_from_much_material() -> None:

@@ -1,3 +1,5 @@
+"""Parts of the shipped head: modelling targets, sheets, spheres, arches of teeth, and the files they are made of."""
+
 import gzip
 import hashlib
 import zipfile

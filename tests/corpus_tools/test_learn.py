@@ -1,3 +1,5 @@
+"""Talkers that are learnt from observations with known directions of motion."""
+
 from dataclasses import replace
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Measures of lips: opening, width, closures and their times."""
+
 import numpy as np
 import pytest
 

@@ -54,6 +54,8 @@ SKINS = ((232, 190, 172), (198, 134, 102), (141, 85, 60), (84, 52, 39))  # light
 WHITE = (188, 182, 176)
 NO_COLOUR = np.full(3, np.nan)
 SHORT, LONG = ("bald", "cropped", "flat", "short"), ("bob", "long")
+WORN = {"erik": ("short02", "dark-blond"), "mei": ("bob02", "blond"), "kofi": ("cropped", "black")}
+WARM, COLD = (1.25, 1.0, 0.6), (0.9, 1.0, 1.35)
 
 
 @pytest.fixture(scope="module")
@@ -218,10 +220,6 @@ def test_drawn_peoples_hair_is_found(
         found = log_colour(255.0 * parse_hair_colour(look.hairdo.colour))
         off = {name: np.linalg.norm(found - log_colour(255.0 * parse_hair_colour(name))) for name in HAIR_COLOURS}
         assert min(off, key=off.__getitem__) in names
-
-
-WORN = {"erik": ("short02", "dark-blond"), "mei": ("bob02", "blond"), "kofi": ("cropped", "black")}
-WARM, COLD = (1.25, 1.0, 0.6), (0.9, 1.0, 1.35)
 
 
 @pytest.mark.parametrize(

@@ -1,3 +1,5 @@
+"""Prompts are selected by their coverage of phones and triphones."""
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st

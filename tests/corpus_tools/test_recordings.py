@@ -1,3 +1,5 @@
+"""Recordings of a folder, their words, and how these are pronounced."""
+
 import pytest
 
 from corpus_tools.recordings.folder import (

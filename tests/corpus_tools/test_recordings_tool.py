@@ -1,3 +1,5 @@
+"""Answers of the tool that checks takes."""
+
 from corpus_tools.recordings.limits import OUT_OF_SYNC, REFUSAL, UNUSABLE, WARNING, Finding
 from corpus_tools.tools import recordings
 from tests.processes.answered import answered

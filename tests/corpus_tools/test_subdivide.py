@@ -1,3 +1,5 @@
+"""Subdivision of meshes of quads and triangles."""
+
 import numpy as np
 
 from corpus_tools.shipped.head.mesh import catmull_clark, triangulate

@@ -21,6 +21,7 @@ from tts2face.request import Request, option_fields
 
 COMMAND = [sys.executable, "-c", "from cli.main import main; main()"]
 SMALL = ["--size", "64x64", "--fps", "5"]
+WROTE = r"wrote .*: \d+\.\d s, \d+ frames, made in \d+\.\d s \(\d+\.\d x real time\)"
 
 
 def test_help_names_every_option_and_is_quick(capsys: pytest.CaptureFixture[str]) -> None:
@@ -112,9 +113,6 @@ def test_a_folder_that_cannot_be_written_is_named(here: Path, capsys: pytest.Cap
     locked.mkdir(mode=0o555)
     assert run(["Hi.", "--out", "locked/x.mp4"]) == 4
     assert "cannot write locked/x.mp4" in capsys.readouterr().err
-
-
-WROTE = r"wrote .*: \d+\.\d s, \d+ frames, made in \d+\.\d s \(\d+\.\d x real time\)"
 
 
 def test_text_from_a_file(tones: World, here: Path, capsys: pytest.CaptureFixture[str]) -> None:

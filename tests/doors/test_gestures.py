@@ -10,7 +10,9 @@ import pytest
 
 from cli.main import run
 from lexicon.errors import InputError
-from tests.world import VOICE, World, made_style
+from tests.made_models import made_style
+from tests.tones import VOICE
+from tests.world import World
 from tts2face.face.deformation import moved_landmarks
 from tts2face.face.gestures import gesture_face
 from tts2face.models.face import Face

@@ -8,7 +8,8 @@ import pytest
 
 from cli.main import run
 from lexicon.sequence import SILENCE
-from tests.world import RATE_HZ, World
+from tests.tones import RATE_HZ
+from tests.world import World
 from tts2face.gestures.elements import StyleSpan
 from tts2face.picture.options import Picture
 from tts2face.request import Request

@@ -40,6 +40,8 @@ CHANGES = {
     "listen": 0.5,
     "expression": "happy=0.6@0.2-0.9",
 }
+# tests/doors/test_audio.py changes these; idle animation and delivery below
+ELSEWHERE = {"audio", "audio_map", "idle", "partner", "plain_delivery"}
 
 
 @pytest.fixture(scope="module")
@@ -56,10 +58,6 @@ def clip(session: Session) -> Clip:
 def digest(clip: Clip) -> str:
     parts = (clip.motion.values, clip.head.values, clip.speech.waveform.samples, clip.speech.phones.edges)
     return hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()
-
-
-# tests/doors/test_audio.py changes these; idle animation and delivery below
-ELSEWHERE = {"audio", "audio_map", "idle", "partner", "plain_delivery"}
 
 
 @pytest.mark.parametrize("name", [name for name in OPTIONS if name not in ELSEWHERE])

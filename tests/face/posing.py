@@ -1,3 +1,5 @@
+"""Vertices of a posed face in plain numpy."""
+
 import numpy as np
 from numpy.typing import NDArray
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from tests.world import World, made_style
+from tests.made_models import made_style
+from tests.world import World
 from tts2face.models.palette import Derivation, FeatureChange, Palette
 from tts2face.models.palette_file import load_palette
 

@@ -43,6 +43,11 @@ PROJECT = {
 DROPPED = frozenset({"cheekPuff", "noseSneerLeft", "noseSneerRight", "mouthLeft", "mouthRight", "jawLeft", "jawRight"})
 # Parts of a batch's manifest that name the program's version, its models and the time of its work, or repeat the film.
 VOLATILE = {"program", "segments", "address", "took_s", "sha256", "bytes"}
+NEEDS: Mapping[str, Sequence[str]] = {
+    "http_clip": ("fastapi", "httpx", "prometheus_client"),
+    "http_job": ("fastapi", "httpx", "prometheus_client", "dbos"),
+    "similarity": ("matplotlib", "sklearn"),
+}
 
 
 def batch(folder: Path) -> Fingerprint:
@@ -212,8 +217,3 @@ DOORS: Mapping[str, Callable[[Path], Fingerprint]] = {
     "project": project, "live": live, "http_clip": http_clip, "http_job": http_job, "batch": batch,
     "character": character, "own_files": own_files, "similarity": similarity,
 }  # fmt: skip
-NEEDS: Mapping[str, Sequence[str]] = {
-    "http_clip": ("fastapi", "httpx", "prometheus_client"),
-    "http_job": ("fastapi", "httpx", "prometheus_client", "dbos"),
-    "similarity": ("matplotlib", "sklearn"),
-}

@@ -1,3 +1,5 @@
+"""Messages of errors show the beginning of long values."""
+
 from lexicon.errors import DataError, InputError
 
 

@@ -1,3 +1,5 @@
+"""Codes, tags and names of languages."""
+
 import subprocess
 import sys
 

@@ -11,6 +11,7 @@ from lexicon.marked_text import MAX_NESTING, MarkedText, NameMark, NodMark, Paus
 from lexicon.text_marks import parse_marks
 
 PLAIN = st.text(st.characters(blacklist_characters="[]<"))
+BILLION = "".join(f'<!ENTITY l{n} "{f"&l{n - 1};" * 10}">' for n in range(1, 10))
 
 
 @given(st.text(st.characters(blacklist_characters="[<")))
@@ -168,9 +169,6 @@ def test_ssml_outside_the_subset_is_refused(inside: str, reason: str) -> None:
 def test_a_refusal_names_the_line() -> None:
     with pytest.raises(InputError, match=r"^SSML, line 3: the element <audio> is not supported"):
         ssml("a\nb\n<audio/>")
-
-
-BILLION = "".join(f'<!ENTITY l{n} "{f"&l{n - 1};" * 10}">' for n in range(1, 10))
 
 
 @pytest.mark.parametrize(

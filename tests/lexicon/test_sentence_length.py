@@ -27,6 +27,13 @@ TEXTS = (
     ("a" + "😀" * 20, "de"), ("$1" * 900, "en-us"), ("." * 5000 + "a", "en-us"), ("a-" * 2500, "en-us"),
     ("x'" * 2500, "en-us"), ("Donaudampfschifffahrt" * 100, "de"), ("1," * 2500, "fr-fr"), ("³" * 3000, "en-us"),
 )  # fmt: skip
+SLOW = '<prosody rate="50%">{}</prosody>'
+PAUSED = (
+    "a<break time='10s'/>" * 1000, "word <break time='9s'/>" * 1000, "Yes. <break time='10s'/>" * 1000,
+    "a<break time='100ms'/>" * 4000, SLOW.format("word " * 3000), SLOW.format("1" * 900),
+    '<prosody rate="50%">a<break time="10s"/></prosody>' * 500,
+    "<phoneme ph='a'>a</phoneme><break time='10s'/>" * 300, "漢字<break time='10s'/>" * 500,
+)  # fmt: skip
 
 
 def voiced(sentence: Sentence) -> int:
@@ -98,15 +105,6 @@ def test_the_first_piece_is_short_also_where_everything_is_a_number(unit: str) -
     first, second = islice(split_sentences(parse_marks(text), "en-us"), 2)
     assert len(first.utterances[0].text) <= FIRST_SPOKEN_LETTERS + 10
     assert len(second.utterances[0].text) <= MOST_VOICED
-
-
-SLOW = '<prosody rate="50%">{}</prosody>'
-PAUSED = (
-    "a<break time='10s'/>" * 1000, "word <break time='9s'/>" * 1000, "Yes. <break time='10s'/>" * 1000,
-    "a<break time='100ms'/>" * 4000, SLOW.format("word " * 3000), SLOW.format("1" * 900),
-    '<prosody rate="50%">a<break time="10s"/></prosody>' * 500,
-    "<phoneme ph='a'>a</phoneme><break time='10s'/>" * 300, "漢字<break time='10s'/>" * 500,
-)  # fmt: skip
 
 
 def letters_of_silence(sentence: Sentence) -> float:

@@ -21,6 +21,25 @@ from lexicon.ssml_values import MAX_ATTRIBUTE_CHARACTERS, VOICES
 from lexicon.text_marks import parse_marks
 from tts2face.sound.voice_pool import SHIPPED_VOICES
 
+ELEMENTS = (
+    "speak", "p", "s", "break", "emphasis", "prosody", "mark", "sub", "express-as", "mstts:express-as", "phoneme",
+    "say-as", "voice", "lang", "audio",
+)  # fmt: skip
+ATTRIBUTES = (
+    "time", "strength", "level", "rate", "volume", "pitch", "name", "alias", "style", "alphabet", "ph", "interpret-as",
+    "format", "gender", "language", "xml:lang", "xmlns", "foo",
+)  # fmt: skip
+VALUES = st.one_of(
+    st.text(st.characters(blacklist_categories=["Cs", "Cc"]), max_size=20),
+    st.sampled_from(
+        ["ipa", "x-arpabet", "kæt", "AH0", "date", "mdy", "ordinal", "male", "de", "en-US", "ja", "1s", "50%"]
+    ),
+    st.builds(
+        lambda piece, n: piece * n, st.sampled_from(["a", "ˈ", "1", "a.", "=", " ", "-"]), st.integers(1, 300_000)
+    ),
+)
+PLAIN = st.text(st.characters(blacklist_categories=["Cs", "Cc"]), max_size=20).map(escape)
+
 
 def ssml(inside: str, language: str = "en-us") -> MarkedText:
     return parse_marks(f"<speak>{inside}</speak>", language)
@@ -283,31 +302,11 @@ def test_what_cannot_be_done_is_refused_with_its_line(inside: str, reason: str) 
         ssml(f"a\nb\n{inside}")
 
 
-ELEMENTS = (
-    "speak", "p", "s", "break", "emphasis", "prosody", "mark", "sub", "express-as", "mstts:express-as", "phoneme",
-    "say-as", "voice", "lang", "audio",
-)  # fmt: skip
-ATTRIBUTES = (
-    "time", "strength", "level", "rate", "volume", "pitch", "name", "alias", "style", "alphabet", "ph", "interpret-as",
-    "format", "gender", "language", "xml:lang", "xmlns", "foo",
-)  # fmt: skip
-VALUES = st.one_of(
-    st.text(st.characters(blacklist_categories=["Cs", "Cc"]), max_size=20),
-    st.sampled_from(
-        ["ipa", "x-arpabet", "kæt", "AH0", "date", "mdy", "ordinal", "male", "de", "en-US", "ja", "1s", "50%"]
-    ),
-    st.builds(
-        lambda piece, n: piece * n, st.sampled_from(["a", "ˈ", "1", "a.", "=", " ", "-"]), st.integers(1, 300_000)
-    ),
-)
-
-
 def _written(tag: str, attributes: dict, content: str) -> str:
     given_ = "".join(f" {name}={quoteattr(value)}" for name, value in attributes.items())
     return f"<{tag}{given_}>{content}</{tag}>"
 
 
-PLAIN = st.text(st.characters(blacklist_categories=["Cs", "Cc"]), max_size=20).map(escape)
 TREES = st.recursive(
     PLAIN,
     lambda inner: st.builds(

@@ -10,6 +10,8 @@ from tts2face.models.palette import FEATURES
 N, LENGTH, N_SHOWN = 12, 60, 200
 H = 10  # preceding frames
 N_BEST = 4  # "a small number (2 to 4 in our experiments) of good candidates"
+MOMENTS = np.array([moment for moment in range(N * LENGTH) if moment % LENGTH >= H])
+BEFORE = MOMENTS[:, None] - H + np.arange(H)  # the h frames before each in its recording
 
 
 def recordings(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -18,10 +20,6 @@ def recordings(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     steps = generator.normal(size=(3, N * LENGTH))
     smooth = np.stack([np.convolve(row, np.hanning(9), "same") for row in steps], axis=1).astype(np.float32)
     return smooth[:, :2], smooth[:, 2:], np.full(N, LENGTH, np.int32)
-
-
-MOMENTS = np.array([moment for moment in range(N * LENGTH) if moment % LENGTH >= H])
-BEFORE = MOMENTS[:, None] - H + np.arange(H)  # the h frames before each in its recording
 
 
 def distances(made: Field, shown: np.ndarray, loudness: np.ndarray) -> dict[int, float]:

@@ -25,6 +25,7 @@ SMILE = {
     **{f"mouthLowerDown{side}": 0.5 for side in SIDES},
     "jawOpen": 0.12,
 }  # whose upper teeth are seen
+_SPEAKING: dict[tuple[object, ...], Face] = {}
 
 
 def still(name: str, side: int, *, head: tuple[float, ...] = (0, 0, 0), **weights: float) -> np.ndarray:
@@ -71,9 +72,6 @@ def speaking(picture: Photograph, found: FoundFace) -> Face:
         metadata = {"name": "Ada", "consent": {"statement": "drawn"}}
         _SPEAKING[key] = speaking_photo(photographed(picture, found), load_face("head", hair="bald"), metadata)
     return _SPEAKING[key]
-
-
-_SPEAKING: dict[tuple[object, ...], Face] = {}
 
 
 def photographed(picture: Photograph, found: FoundFace, smile: float = 0.0) -> PhotographedFace:

@@ -22,6 +22,8 @@ pytestmark = ONE_PROCESS
 
 SIDE, NAME, REDUCED_BY = 400, "head", 2.0
 SHIFT = np.array([0.0, 6.0])  # pixels of the file, three of the picture
+LINE = [[300, 500], [400, 520], [500, 500]]
+EYE = [[250, 300], [300, 280], [350, 300]]
 
 
 def face_with(fit: PhotoFit, **weights: float) -> Face:
@@ -117,10 +119,6 @@ def test_lips_are_parted_and_closed_by_a_person(face: Face, found: dict[str, Any
     assert parted.metadata["fit"]["teeth"][1] > face.metadata["fit"]["teeth"][1]  # behind the lip, which meets lower
     opened = face_with(parse_fit({"lips": {"seam": seam.tolist()}}), jawOpen=0.4)
     assert set(opened.metadata["fit"]["lips"]) == {"seam"}
-
-
-LINE = [[300, 500], [400, 520], [500, 500]]
-EYE = [[250, 300], [300, 280], [350, 300]]
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,8 @@ import pytest
 
 from lexicon.sentence_length import n_letters
 from lexicon.sequence import SILENCE
-from tests.world import PHONE_S, World
+from tests.tones import PHONE_S
+from tests.world import World
 from tts2face.request import Request
 from tts2face.session.joining import CUT_SILENCE_S, Excerpt
 from tts2face.session.prepared import PreparedRequest, prepare

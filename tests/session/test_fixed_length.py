@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import tts2face
-from tests.world import LEAD_S, PHONE_S, TRAIL_S, LetterVoice, World
+from tests.tones import LEAD_S, PHONE_S, TRAIL_S, LetterVoice
+from tests.world import World
 from tts2face.session.fixed_length import OPENING_S, ease_weights
 from tts2face.sound import voice_pool
 from tts2face.sound.voice_pool import VoicePool

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import tts2face
-from tests.world import World, WorldVoices
+from tests.tones import WorldVoices
+from tests.world import World
 from tts2face.session.live import LiveSpeech
 from tts2face.session.speech_stream import Piece
 from tts2face.sound.voice_pool import VoicePool

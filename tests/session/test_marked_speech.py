@@ -13,7 +13,7 @@ from lexicon.marked_text import MAX_PAUSE_S, NodMark
 from lexicon.sentences import Sentence, index_by_letters, split_sentences
 from lexicon.sequence import SILENCE
 from lexicon.text_marks import parse_marks
-from tests.world import LEAD_S, LEVEL, PHONE_S, RATE_HZ, TRAIL_S, LetterVoice
+from tests.tones import LEAD_S, LEVEL, PHONE_S, RATE_HZ, TRAIL_S, LetterVoice
 from tts2face.gestures.elements import Nod, StyleSpan
 from tts2face.request import Request
 from tts2face.session.joining import join_utterances, silent_speech, trim_silence
@@ -29,6 +29,11 @@ from tts2face.session.speech import (
 from tts2face.session.speech_stream import SpeechModels, spoken_pieces
 from tts2face.session.text_marks import check_marks, marked_styles
 from tts2face.sound.voice_pool import load_voice
+
+WORDS = st.lists(
+    st.sampled_from(["one", "seven", "cat", "it's", "25", "$3.50", "Dr. Who", "well-known"]), min_size=1, max_size=8
+)
+BITS = st.one_of(st.text(max_size=8), st.sampled_from(["[nod]", "[pause 0.5]", ". ", "Ab", "\n\n"]))
 
 
 def synthesise_sentences(text: str, voice: object | None = None, **options: object) -> list[SpokenSentence]:
@@ -231,11 +236,6 @@ def test_given_phones_reach_the_voice(name: str) -> None:
     assert (found["We"], found["saw"]) == ("wi", "sɔ")
 
 
-WORDS = st.lists(
-    st.sampled_from(["one", "seven", "cat", "it's", "25", "$3.50", "Dr. Who", "well-known"]), min_size=1, max_size=8
-)
-
-
 @settings(deadline=None)  # the first example imports scipy's filters
 @given(WORDS, st.data(), st.booleans())
 def test_times_of_marks_increase_and_lie_in_the_sound(texts: list, data: st.DataObject, splits: bool) -> None:
@@ -255,9 +255,6 @@ def test_sentences_hold_the_same_words_with_pauses(texts: list, data: st.DataObj
     parts = list(split_sentences(parse_marks(text), "en-us"))
     spoken = "".join("".join(part.source.split()) for sentence in parts for part in sentence.utterances)
     assert spoken == "".join("".join(texts).split())
-
-
-BITS = st.one_of(st.text(max_size=8), st.sampled_from(["[nod]", "[pause 0.5]", ". ", "Ab", "\n\n"]))
 
 
 @given(st.lists(BITS, max_size=12))

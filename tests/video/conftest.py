@@ -1,3 +1,5 @@
+"""Files of videos for tests."""
+
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,3 +1,5 @@
+"""Reading of sound and pictures from media files."""
+
 import os
 import struct
 import subprocess

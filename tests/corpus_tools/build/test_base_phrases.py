@@ -40,6 +40,15 @@ from tts2face.models.talker_file import read_talker, write_talker
 PASSES = TrainingOptions(hidden=(24, 16), n_epochs=60, weight_decay=1e-4)
 FEW_PASSES = replace(PASSES, n_epochs=4)  # where it does not matter what the networks have learnt
 HIDDEN = "ɑ"  # the widest of the artificial phones; no other shares its features
+OTHER_MACHINE = """
+import sys
+from pathlib import Path
+from corpus_tools.training import phone_network
+from corpus_tools.training.pooling import speech
+from tests.corpus_tools.build.test_base_phrases import FEW_PASSES, network_bytes
+speech.N_PHRASES, phone_network.MIN_FRAMES, phone_network.TRAINING = 40, 100, FEW_PASSES
+print(network_bytes(Path(sys.argv[1])))
+"""
 
 
 @pytest.fixture(autouse=True)
@@ -175,17 +184,6 @@ def network_bytes(path: Path) -> str:
     trained = add_phone_network(replace(talker, network=None), base_speech(talker))
     assert trained.network is not None
     return hashlib.sha256(b"".join(one.tobytes() for one in trained.network.weights)).hexdigest()
-
-
-OTHER_MACHINE = """
-import sys
-from pathlib import Path
-from corpus_tools.training import phone_network
-from corpus_tools.training.pooling import speech
-from tests.corpus_tools.build.test_base_phrases import FEW_PASSES, network_bytes
-speech.N_PHRASES, phone_network.MIN_FRAMES, phone_network.TRAINING = 40, 100, FEW_PASSES
-print(network_bytes(Path(sys.argv[1])))
-"""
 
 
 def test_networks_have_the_same_bytes_on_another_processor_and_with_other_numbers_of_threads(

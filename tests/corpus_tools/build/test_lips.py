@@ -22,6 +22,7 @@ from lexicon.sequence import SILENCE
 
 KNOWN = ("b", "aɪ", "p", SILENCE)
 N_SHOWN = 3
+OPTIONS = TrainingOptions(hidden=(24, 16), n_epochs=40, weight_decay=0.0)
 
 
 @pytest.fixture
@@ -48,9 +49,6 @@ def samples(stream: np.random.Generator, n_speakers: int = 1) -> WindowSamples:
     opening = np.array([0.0, 1.0, 0.2, -1.0], np.float32)[shown[:, 1]]
     targets = np.stack([opening, opening * position[:, 0]], axis=1)
     return WindowSamples(shown, position, targets, stream.integers(0, n_speakers, 2000))
-
-
-OPTIONS = TrainingOptions(hidden=(24, 16), n_epochs=40, weight_decay=0.0)
 
 
 def test_a_network_learns_what_phones_show(stream: np.random.Generator) -> None:

@@ -31,6 +31,17 @@ from tts2face.models.talker import Talker
 from tts2face.models.talker_file import read_talker, write_talker
 
 ERROR_BEFORE_S = 0.3  # of the times given with a track
+PHONE_ROWS = "\n".join(
+    (
+        "start_s\tend_s\tphone\tword",
+        "0.0\t0.4\tSIL\t",
+        "0.4\t0.5\tAH\tabout,",
+        "0.5\t0.6\tB\tabout,",
+        "0.6\t0.8\tAW\tabout,",
+        "0.8\t0.9\tT\tabout,",
+        "",
+    )
+)
 
 
 @pytest.fixture(scope="module")
@@ -177,19 +188,6 @@ def test_features_of_parameters_are_those_of_their_landmarks(talker: Talker) -> 
     parameters = talker.utterances[0].shape[:, : talker.model.n_speech]
     expected = landmark_features(talker.model.shapes(parameters), talker.model.mean)
     np.testing.assert_allclose(parameter_features(parameters, talker.model), expected, atol=1e-6)  # float32 landmarks
-
-
-PHONE_ROWS = "\n".join(
-    (
-        "start_s\tend_s\tphone\tword",
-        "0.0\t0.4\tSIL\t",
-        "0.4\t0.5\tAH\tabout,",
-        "0.5\t0.6\tB\tabout,",
-        "0.6\t0.8\tAW\tabout,",
-        "0.8\t0.9\tT\tabout,",
-        "",
-    )
-)
 
 
 def write_track(folder: Path, rows: str = PHONE_ROWS, points: np.ndarray | None = None) -> Path:

@@ -1,3 +1,5 @@
+"""Errors of weights of basis expressions."""
+
 import numpy as np
 from numpy.typing import NDArray
 

@@ -18,14 +18,12 @@ from corpus_tools.studies.gestures.measures import (
 )
 
 FPS = 10.0
+# Shut from 0 to 1 in two frames, to 0 again in four; open before and after.
+ONE_BLINK = np.array([0, 0, 0, 0.5, 1, 0.75, 0.5, 0.25, 0, 0, 0])
 
 
 def lengths(*frames: int) -> np.ndarray:
     return np.array(frames, np.int32)
-
-
-# Shut from 0 to 1 in two frames, to 0 again in four; open before and after.
-ONE_BLINK = np.array([0, 0, 0, 0.5, 1, 0.75, 0.5, 0.25, 0, 0, 0])
 
 
 def test_a_blink_by_hand():

@@ -15,6 +15,17 @@ from corpus_tools.studies.plots import FIRST, PNG_SCALE, Tip, draw_png, draw_svg
 from lexicon.errors import BackendError
 from lexicon.phones import PHONES
 
+SCRIPT = """
+import os, sys
+import corpus_tools.studies.evaluation.page, corpus_tools.studies.recordings_page
+import corpus_tools.studies.similarity.write, corpus_tools.studies.gestures.write
+assert "matplotlib" not in sys.modules and "sklearn" not in sys.modules
+before = dict(os.environ)
+from corpus_tools.studies.plots import draw_png
+draw_png(lambda figure: figure.subplots() and (), 100, 100)
+assert dict(os.environ) == before and "matplotlib.pyplot" not in sys.modules
+"""
+
 
 def diagonal(figure):
     """A line from (0, 0) to (10, 1) across the axes, and three tips."""
@@ -85,18 +96,6 @@ def test_without_matplotlib_the_extra_is_named(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(BackendError, match=r"plots need matplotlib, .*; run: pip install 'tts2face\[report\]'"):
         draw_svg(diagonal, 300, 200, "")
-
-
-SCRIPT = """
-import os, sys
-import corpus_tools.studies.evaluation.page, corpus_tools.studies.recordings_page
-import corpus_tools.studies.similarity.write, corpus_tools.studies.gestures.write
-assert "matplotlib" not in sys.modules and "sklearn" not in sys.modules
-before = dict(os.environ)
-from corpus_tools.studies.plots import draw_png
-draw_png(lambda figure: figure.subplots() and (), 100, 100)
-assert dict(os.environ) == before and "matplotlib.pyplot" not in sys.modules
-"""
 
 
 @pytest.mark.needs("matplotlib")

@@ -18,6 +18,8 @@ from corpus_tools.recordings.observe import Observations
 from tests.corpus_tools.speaking import OwnVoice, observation, with_words
 from tests.packages import needs
 
+PLAIN = ("--recordings", "all", "--hold-out", "4")
+
 
 @pytest.fixture(scope="module")
 def seen() -> list[Observation]:
@@ -69,9 +71,6 @@ def evaluate(*more: str) -> int:
 def evaluation_bytes(out: str, *more: str) -> bytes:
     assert evaluate(*more, "--out", out) == 0
     return Path(out).read_bytes()
-
-
-PLAIN = ("--recordings", "all", "--hold-out", "4")
 
 
 @pytest.mark.parametrize(

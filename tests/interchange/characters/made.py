@@ -22,6 +22,7 @@ EYES = ("LeftEye", "RightEye")
 CODES = {"float32": 5126, "uint32": 5125, "uint16": 5123, "int16": 5122, "int8": 5120, "uint8": 5121}
 KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 HEAD_BONES = ("Hips", "Neck", "Head", *EYES)
+QUANTUM = 0.5 / 32767  # metres of an integer step of quantised positions
 
 
 @cache
@@ -163,9 +164,6 @@ def write_character_file(path: Path, variant: Variant | None = None, face: Face 
         maker.json["extensionsRequired"] = ["KHR_mesh_quantization"]
     path.write_bytes(maker.content())
     return path
-
-
-QUANTUM = 0.5 / 32767  # metres of an integer step of quantised positions
 
 
 def _add_materials(maker: GltfMaker, face: Face) -> None:

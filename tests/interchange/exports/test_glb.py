@@ -28,6 +28,23 @@ from tts2face.types import HEAD_CHANNELS, Clip, Trajectory
 DTYPES = {5121: "u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 TOLERANCE_M = 1e-6  # of 32-bit metres
+PAGE = """<html><body><script type="importmap">{"imports": {"three": "/three/build/three.module.js",
+"three/addons/": "/three/examples/jsm/"}}</script><script type="module">
+import * as THREE from 'three'; import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
+const answer = document.createElement('pre');
+try {
+  const file = await new GLTFLoader().loadAsync('a.glb'), mixer = new THREE.AnimationMixer(file.scene);
+  mixer.clipAction(file.animations[0]).play(); mixer.setTime(FRAME / 30); file.scene.updateMatrixWorld(true);
+  const meshes = [], point = new THREE.Vector3();
+  file.scene.traverse(mesh => { if (mesh.isSkinnedMesh) {
+    mesh.skeleton.update(); const places = [];
+    for (let at = 0; at < mesh.geometry.attributes.position.count; at += 7) {
+      mesh.getVertexPosition(at, point); places.push([point.x, point.y, point.z]); }
+    meshes.push({material: mesh.material.name, names: Object.keys(mesh.morphTargetDictionary), places}); } });
+  answer.textContent = JSON.stringify({duration: file.animations[0].duration, meshes});
+} catch (error) { answer.textContent = JSON.stringify({error: String(error.stack)}); }
+document.body.append(answer);
+</script></body></html>"""
 
 
 class GltfFile:
@@ -227,25 +244,6 @@ def test_parts_with_holes_are_masked_by_the_alpha_of_the_texture(tmp_path):
     content = file.binary_blob()[view.byteOffset : view.byteOffset + view.byteLength]
     pixels = np.array(Image.open(io.BytesIO(content)))
     assert np.array_equal(pixels, np.dstack([face.textures[0].pixels, alpha]))
-
-
-PAGE = """<html><body><script type="importmap">{"imports": {"three": "/three/build/three.module.js",
-"three/addons/": "/three/examples/jsm/"}}</script><script type="module">
-import * as THREE from 'three'; import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
-const answer = document.createElement('pre');
-try {
-  const file = await new GLTFLoader().loadAsync('a.glb'), mixer = new THREE.AnimationMixer(file.scene);
-  mixer.clipAction(file.animations[0]).play(); mixer.setTime(FRAME / 30); file.scene.updateMatrixWorld(true);
-  const meshes = [], point = new THREE.Vector3();
-  file.scene.traverse(mesh => { if (mesh.isSkinnedMesh) {
-    mesh.skeleton.update(); const places = [];
-    for (let at = 0; at < mesh.geometry.attributes.position.count; at += 7) {
-      mesh.getVertexPosition(at, point); places.push([point.x, point.y, point.z]); }
-    meshes.push({material: mesh.material.name, names: Object.keys(mesh.morphTargetDictionary), places}); } });
-  answer.textContent = JSON.stringify({duration: file.animations[0].duration, meshes});
-} catch (error) { answer.textContent = JSON.stringify({error: String(error.stack)}); }
-document.body.append(answer);
-</script></body></html>"""
 
 
 def test_three_js_shows_the_vertices_of_the_renderer(tmp_path):

@@ -16,6 +16,9 @@ from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.interchange.exports.pronunciation import FORMATS, NOMINAL_NOTE
 from tts2face.interchange.exports.textgrid import textgrid
 
+PHONES = PhoneSequence(["sil", "p", "ɑ", "sil", "y", "sil"], [0.0, 0.1, 0.25, 0.4, 0.5, 0.75, 1.0])
+WORDS = (WordSpan('pa "x"', 1, 3), WordSpan("ü", 4, 5))
+
 
 def _tier(grid: Any, number: int) -> list[tuple[float, float, str]]:
     count = int(call(grid, "Get number of intervals", number))
@@ -33,10 +36,6 @@ def _read(text: str, folder: Path) -> Any:
     path = folder / "made.TextGrid"
     path.write_text(text, encoding="utf-8")
     return parselmouth.read(str(path))
-
-
-PHONES = PhoneSequence(["sil", "p", "ɑ", "sil", "y", "sil"], [0.0, 0.1, 0.25, 0.4, 0.5, 0.75, 1.0])
-WORDS = (WordSpan('pa "x"', 1, 3), WordSpan("ü", 4, 5))
 
 
 def test_praat_reads_times_and_labels_back(tmp_path: Path) -> None:

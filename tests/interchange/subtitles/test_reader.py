@@ -117,6 +117,7 @@ ASS: dict[str, tuple[str, list[tuple[float, float, str]], list[int]]] = {
 
 TT = '<tt xmlns="http://www.w3.org/ns/ttml" xmlns:ttp="http://www.w3.org/ns/ttml#parameter" {}>\n'
 PA, PB = '<p begin="1s" end="2s">Hi.</p>\n', '<p begin="3s" end="4.5s">Bye.</p>\n'
+LONG = ["<", "[", "(", "{", "A", "♪", "1\n", " ", "<i ", "# ", "A:", "&", "A ", "- ", "([", ". - A ", '." - "']
 
 
 def tt(*paragraphs: str, attributes: str = "", head: str = "", div: str = "") -> str:
@@ -341,9 +342,6 @@ def test_what_pysubs2_writes_is_read_as_pysubs2_reads_it(suffix: str, tmp_path: 
     read = read_subtitles(path)
     assert [(round(cue.begin_s * 1000), round(cue.end_s * 1000), cue.text) for cue in read.cues] == theirs
     assert not read.warnings
-
-
-LONG = ["<", "[", "(", "{", "A", "♪", "1\n", " ", "<i ", "# ", "A:", "&", "A ", "- ", "([", ". - A ", '." - "']
 
 
 @pytest.mark.parametrize("unit", LONG)

@@ -1,3 +1,5 @@
+"""Checks of numbers against their limits."""
+
 import pytest
 
 from lexicon.errors import InputError

@@ -1,3 +1,5 @@
+"""Checks of the values of dataclasses by the types of their fields."""
+
 import math
 from dataclasses import dataclass
 from fractions import Fraction

@@ -1,3 +1,5 @@
+"""Files are read to a size and no further."""
+
 import os
 import socket
 from pathlib import Path

@@ -1,3 +1,5 @@
+"""JSON is parsed to a depth, and refused by its line."""
+
 import pytest
 
 from lexicon.errors import DataError

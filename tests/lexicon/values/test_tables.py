@@ -1,3 +1,5 @@
+"""Tables of comma-separated values."""
+
 from pathlib import Path
 
 import pytest

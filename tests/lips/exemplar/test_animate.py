@@ -1,3 +1,5 @@
+"""Lip motion of an exemplar model for phone sequences."""
+
 import json
 from dataclasses import fields, replace
 
@@ -23,6 +25,7 @@ from tts2face.models.talker import Talker
 from tts2face.types import frame_count
 
 LABELS = [SILENCE, "p", "b", "m", "f", "s", "t", "i", "ɑ", "u", "h", "ɔɪ", "ʃ"]
+OF_OTHERS = {"network", "articulation"}  # this talker has no network; faces articulate (tests/lips/retargeting)
 
 
 def sequence(labels, durations):
@@ -143,9 +146,6 @@ def test_one_exemplar_of_a_recorded_sentence_gives_the_recording_back(voice: Exe
     inner = slice(int(phone_sequences.phones.edges[1] * 25) + 1, int(phone_sequences.phones.edges[-2] * 25))
     # mm; straight lines between knots cut the corners of a curve with 25 frames a second
     assert np.abs(made[inner, 0] - phone_sequences.shape[inner, 0]).max() < 0.6
-
-
-OF_OTHERS = {"network", "articulation"}  # this talker has no network; faces articulate (tests/lips/retargeting)
 
 
 @pytest.mark.parametrize("name", [field.name for field in fields(SynthesisOptions) if field.name not in OF_OTHERS])

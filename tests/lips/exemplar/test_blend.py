@@ -1,3 +1,5 @@
+"""Averages, joins, smoothing and contacts of chosen exemplars."""
+
 from dataclasses import replace
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Tokens of recorded phones, their contexts and targets."""
+
 import numpy as np
 
 from lexicon.sequence import SILENCE, PhoneSequence

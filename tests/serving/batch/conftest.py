@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.world import LetterVoice
+from tests.tones import LetterVoice
 from tts2face.picture.options import Picture
 from tts2face.request import Request
 from tts2face.serving.batch.options import BatchOptions

@@ -5,6 +5,9 @@ import pytest
 from tests.serving.batch.conftest import Planner
 from tts2face.serving.batch.cue_sentences import continues, spoken_part
 
+FIRST, SECOND, THIRD = "When I was a boy", "my father told me", "a story. It was long."
+CUE = "{n}\n00:00:0{n},000 --> 00:00:0{n},900\n{text}\n"
+
 
 @pytest.mark.parametrize(
     ("text", "following"),
@@ -62,10 +65,6 @@ def test_a_missing_mark_decides_in_a_file_of_capitals() -> None:
 def test_the_dots_by_which_a_sentence_goes_on_are_not_spoken() -> None:
     assert spoken_part("...to the market...", is_first=False, is_last=False) == "to the market"
     assert spoken_part("...to the market...", is_first=True, is_last=True) == "...to the market..."
-
-
-FIRST, SECOND, THIRD = "When I was a boy", "my father told me", "a story. It was long."
-CUE = "{n}\n00:00:0{n},000 --> 00:00:0{n},900\n{text}\n"
 
 
 def srt(*texts: str) -> str:

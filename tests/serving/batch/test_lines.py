@@ -8,7 +8,8 @@ import pytest
 from cli.main import run
 from lexicon.errors import DataError
 from tests.serving.batch.conftest import SMALL, SRT
-from tests.world import LetterVoice, World
+from tests.tones import LetterVoice
+from tests.world import World
 from tts2face.request import Request
 from tts2face.serving.batch.lines import COLUMNS, read_lines, write_lines
 from tts2face.serving.batch.options import BatchOptions

@@ -11,7 +11,8 @@ from cli.main import run
 from lexicon.errors import DataError, InputError
 from tests.packages import needs
 from tests.serving.batch.conftest import Planner
-from tests.world import LetterVoice, World
+from tests.tones import LetterVoice
+from tests.world import World
 from tts2face.serving.batch.prune import MIN_AGE_S, prune_segments
 from tts2face.serving.batch.run import SEGMENT_FOLDER, run_batch
 from tts2face.serving.batch.segment_result import SegmentResult

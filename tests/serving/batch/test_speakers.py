@@ -13,6 +13,13 @@ from tts2face.session.named_models import Models
 from tts2face.sound.voice_pool import find_voice
 
 TWO = "1\n00:00:01,000 --> 00:00:04,000\n- Good morning. - Hello there.\n"
+SIGNS = """[Events]
+Format: Start, End, Style, Name, Text
+Dialogue: 0:00:01.00,0:00:03.00,Default,,Hello there.
+Dialogue: 0:00:01.50,0:00:03.50,Sign - Door,,Keep out.
+Dialogue: 0:00:04.00,0:00:06.00,Default,,Subtitles by Somebody
+Dialogue: 0:00:07.00,0:00:08.00,Default,,Good morning.
+"""
 
 
 def cast_of(tmp_path: Path, text: str) -> object:
@@ -78,15 +85,6 @@ def test_all_speakers_are_listed_with_face_and_voice(plan_of: Planner, tmp_path:
         ("(no name)", 2, None, "ada", "heart"),
         ("ANN", 1, 1, "head kofi", "espeak"),
     ]
-
-
-SIGNS = """[Events]
-Format: Start, End, Style, Name, Text
-Dialogue: 0:00:01.00,0:00:03.00,Default,,Hello there.
-Dialogue: 0:00:01.50,0:00:03.50,Sign - Door,,Keep out.
-Dialogue: 0:00:04.00,0:00:06.00,Default,,Subtitles by Somebody
-Dialogue: 0:00:07.00,0:00:08.00,Default,,Good morning.
-"""
 
 
 def test_signs_and_credits_are_left_out_and_take_no_time(plan_of: Planner, tmp_path: Path) -> None:

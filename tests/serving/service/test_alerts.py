@@ -23,6 +23,8 @@ RULES: Mapping[str, dict[str, Any]] = {
 INTERVAL_S = 15
 DEFECTS = 'tts2face_failures_total{kind="internal",instance="a"}'
 BUCKETS = '{path="/v1/clips",instance="a",le="%s"}'
+A = {"instance": "a"}
+DEFECT = A | {"kind": "internal"}
 
 
 def requests(status: int, path: str = "/v1/clips") -> str:
@@ -39,8 +41,6 @@ class Case:
     labels: Mapping[str, str] | None
 
 
-A = {"instance": "a"}
-DEFECT = A | {"kind": "internal"}
 CASES = {
     "the first defect": Case("Tts2faceDefect", {DEFECTS: "0x40 1x40"}, 12, DEFECT),
     "no defect": Case("Tts2faceDefect", {DEFECTS: "0x80"}, 12, None),

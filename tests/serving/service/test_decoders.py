@@ -41,6 +41,18 @@ FORMATS: Mapping[str, Mapping[str, Any]] = {
     "PNG": {}, "WEBP": {"lossless": True}, "JPEG": {}, "progressive": {"format": "JPEG", "progressive": True},
     "BMP": {}, "TIFF": {},
 }  # fmt: skip
+MEASURE_HERE = """
+import resource, sys
+from PIL import Image
+from tts2face.storage.pictures import decoding_bytes
+with Image.open(sys.argv[2]) as small:
+    small.load()
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+with Image.open(sys.argv[1]) as picture:
+    expected = decoding_bytes(picture)
+    picture.load()
+print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) << 10, expected)
+"""
 
 
 def one_colour(name: str, side: int) -> bytes:
@@ -202,20 +214,6 @@ def test_a_picture_is_measured_by_its_head_and_format(tmp_path: Path) -> None:
     transparent = io.BytesIO()
     Image.new("RGBA", (200, 200)).save(transparent, "PNG")
     assert (measure(transparent.getvalue()) - CHILD_BYTES) / 200**2 == 8  # its copy as RGB
-
-
-MEASURE_HERE = """
-import resource, sys
-from PIL import Image
-from tts2face.storage.pictures import decoding_bytes
-with Image.open(sys.argv[2]) as small:
-    small.load()
-before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-with Image.open(sys.argv[1]) as picture:
-    expected = decoding_bytes(picture)
-    picture.load()
-print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) << 10, expected)
-"""
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="ru_maxrss is in KB on Linux only")

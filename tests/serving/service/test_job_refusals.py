@@ -11,6 +11,7 @@ from starlette.testclient import TestClient
 
 from tests.serving.service.in_process import TableProcess, decoding_here, service_client, with_key
 from tests.serving.service.job_requests import CLIP, SMALL, submit
+from tts2face.serving.service.job_kinds.table import JOB_KINDS
 from tts2face.serving.service.keys import add_key
 from tts2face.serving.service.settings import ServiceSettings
 
@@ -75,7 +76,7 @@ def test_waiting_jobs_of_a_key_are_limited(idle: Clients) -> None:
 @pytest.mark.parametrize(
     ("body", "status", "reason"),
     [
-        ({"kind": "fly"}, 422, "no job of kind 'fly' here; the kinds are clip, subtitles, talker"),
+        ({"kind": "fly"}, 422, f"no job of kind 'fly' here; the kinds are {', '.join(JOB_KINDS)}"),
         ({"kind": "clip"}, 400, "nothing to say"),
         ({"kind": "clip", "request": {**CLIP, "speed": 2}}, 422, "speed: Extra inputs are not permitted"),
         ({"kind": "clip", "request": {**CLIP, "voice": "../x.onnx"}}, 400, "no voice '../x.onnx'"),

@@ -19,6 +19,8 @@ from tts2face.serving.service.logs import LOG, LineFormatter, log_event
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
 
+HOSTILE = 'a\r\n{"event": "forged"}\x1b[31m\u2028'
+
 
 def record(message: str, *, name: str = LOG.name, **fields: Any) -> logging.LogRecord:
     made = logging.LogRecord(name, logging.INFO, "file.py", 1, message, None, None)
@@ -32,9 +34,6 @@ def raised(error: Exception) -> Exception:
         raise error
     except type(error) as caught:
         return caught
-
-
-HOSTILE = 'a\r\n{"event": "forged"}\x1b[31m\u2028'
 
 
 @pytest.mark.parametrize("format", ["json", "text"])

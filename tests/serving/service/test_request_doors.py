@@ -23,6 +23,11 @@ DOORS: list[tuple[type[BaseModel], Mapping[str, str], set[str]]] = [
     (SubtitlesRequest, NOT_IN_SUBTITLES, {*BATCH_FIELDS, "cast"}),
     (TextOptions, NOT_IN_LIVE_TEXT, {"type", "input", "with_idle"}),
 ]  # fmt: skip
+# Fields of protocols of others, and the options that they are.
+SAME: list[tuple[type[BaseModel], Mapping[str, str]]] = [
+    (Speech, {name: name for name in SAME_NAMES}),
+    (HeadTtsRequest, {"language": "language", "dictionary": "dictionary"}),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("door", "left_out", "own"), DOORS, ids=lambda one: getattr(one, "__name__", ""))
@@ -33,13 +38,6 @@ def test_a_door_takes_every_option_or_says_why_not(
     assert taken.isdisjoint(left_out)
     assert taken | set(left_out) == OPTIONS
     assert all(left_out.values())
-
-
-# Fields of protocols of others, and the options that they are.
-SAME: list[tuple[type[BaseModel], Mapping[str, str]]] = [
-    (Speech, {name: name for name in SAME_NAMES}),
-    (HeadTtsRequest, {"language": "language", "dictionary": "dictionary"}),
-]  # fmt: skip
 
 
 @pytest.mark.parametrize(("door", "names"), SAME, ids=lambda one: getattr(one, "__name__", ""))

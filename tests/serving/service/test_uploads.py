@@ -16,6 +16,7 @@ from tts2face.serving.service.decoders import Decoders
 from tts2face.serving.work.uploaded_file import PICTURE, SOUND, SUBTITLES, VIDEO
 
 RATE = 16_000
+PLAYLIST = b"#EXTM3U\n#EXT-X-TARGETDURATION:10\n#EXTINF:10,\nfile:///etc/passwd\n#EXT-X-ENDLIST\n"
 
 
 def decode(kind: str, content: bytes, folder: Path, limit: float, **options: bool) -> tuple[str, Path]:
@@ -96,9 +97,6 @@ def test_a_picture_is_refused_for_what_it_is(tmp_path: Path, content: bytes, rea
 @pytest.mark.parametrize("kind", [SOUND, VIDEO])
 def test_an_empty_file_is_refused_as_such(tmp_path: Path, kind: str) -> None:
     assert decode(kind, b"", tmp_path, 10.0)[0] == "it is empty"
-
-
-PLAYLIST = b"#EXTM3U\n#EXT-X-TARGETDURATION:10\n#EXTINF:10,\nfile:///etc/passwd\n#EXT-X-ENDLIST\n"
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from tts2face.serving.service.browser_key import COOKIE, cookie_key, set_cookie
 from tts2face.serving.service.page_addresses import POLICY
 
 HTML = {"Accept": "text/html"}
+CONNECTIONS = ("/_nicegui_ws/socket.io/?EIO=4&transport=websocket", "/api/takes/live")
 
 
 @contextmanager
@@ -156,9 +157,6 @@ def test_styles_and_scripts_are_in_the_package() -> None:
     folder = Path(tts2face.serving.studio.__file__).parent
     assert (folder / "pages" / "studio.css").is_file()
     assert {"stage.js", "timeline.js", "clock.js", "preview.js"} <= {one.name for one in folder.glob("components/*.js")}
-
-
-CONNECTIONS = ("/_nicegui_ws/socket.io/?EIO=4&transport=websocket", "/api/takes/live")
 
 
 @pytest.mark.parametrize("path", CONNECTIONS)

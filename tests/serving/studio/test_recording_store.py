@@ -1,3 +1,5 @@
+"""The store of the studio's recordings."""
+
 import json
 import threading
 from dataclasses import replace

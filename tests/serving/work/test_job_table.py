@@ -26,6 +26,14 @@ from tts2face.serving.work.queues import WORKFLOWS
 from tts2face.serving.work.run import JobRunner, job_blobs
 from tts2face.serving.work.table import OtherBodyError, QueueFullError
 
+OLD_TABLE = """CREATE TABLE tts2face_jobs (
+    id VARCHAR(64) PRIMARY KEY, key_name VARCHAR(200) NOT NULL, kind VARCHAR(40) NOT NULL, state VARCHAR(10) NOT NULL,
+    request TEXT NOT NULL, idempotency_key VARCHAR(255), body_hash VARCHAR(64) NOT NULL,
+    created DOUBLE PRECISION NOT NULL, started DOUBLE PRECISION, finished DOUBLE PRECISION,
+    n_done INTEGER NOT NULL DEFAULT 0, n_all INTEGER NOT NULL DEFAULT 0, error TEXT,
+    webhook TEXT, webhook_state VARCHAR(10), webhook_due DOUBLE PRECISION, webhook_tries INTEGER NOT NULL DEFAULT 0,
+    UNIQUE (key_name, idempotency_key))"""
+
 
 @pytest.fixture
 def client(database: str, tmp_path: Path) -> Iterator[JobClient]:
@@ -159,15 +167,6 @@ def test_whether_a_job_waits_or_runs_is_what_the_engine_says(client: JobClient, 
     assert [one.state for one in found if one is not None] == ["running", "waiting", "running"]
     assert len({one.started for one in found if one is not None}) == 1  # when the first worker took it
     assert [one.content["state"] for one in client.table.events(name, 0)[0]] == ["waiting", "running"]
-
-
-OLD_TABLE = """CREATE TABLE tts2face_jobs (
-    id VARCHAR(64) PRIMARY KEY, key_name VARCHAR(200) NOT NULL, kind VARCHAR(40) NOT NULL, state VARCHAR(10) NOT NULL,
-    request TEXT NOT NULL, idempotency_key VARCHAR(255), body_hash VARCHAR(64) NOT NULL,
-    created DOUBLE PRECISION NOT NULL, started DOUBLE PRECISION, finished DOUBLE PRECISION,
-    n_done INTEGER NOT NULL DEFAULT 0, n_all INTEGER NOT NULL DEFAULT 0, error TEXT,
-    webhook TEXT, webhook_state VARCHAR(10), webhook_due DOUBLE PRECISION, webhook_tries INTEGER NOT NULL DEFAULT 0,
-    UNIQUE (key_name, idempotency_key))"""
 
 
 def test_a_database_whose_jobs_had_states_of_their_own_is_brought_up_to_date(database: str, tmp_path: Path) -> None:

@@ -1,3 +1,5 @@
+"""Steadying of tracked heads."""
+
 from pathlib import Path
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Tracking of faces in videos."""
+
 from pathlib import Path
 
 import numpy as np

@@ -36,6 +36,7 @@ from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
 FPS, N_FRAMES = 25.0, 10
 TOLERANCE_MM = 0.05
+SHARED = {"plain": Variant(), "skinned": Variant(is_skinned=True), "forward": Variant(turn_deg=0.0)}
 
 
 def made_clip(face: Face, poses: dict[str, float], head: tuple[float, ...] = (0.0,) * 6) -> Clip:
@@ -89,9 +90,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def imported(folder: Path, name: str, variant: Variant) -> Face:
     character = write_character_file(folder / f"{name}.glb", variant)
     return import_face(character, landmarks=write_landmarks(folder / "landmarks.tsv")).face
-
-
-SHARED = {"plain": Variant(), "skinned": Variant(is_skinned=True), "forward": Variant(turn_deg=0.0)}
 
 
 @pytest.fixture(scope="module")

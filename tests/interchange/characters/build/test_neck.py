@@ -26,6 +26,45 @@ POSE = (0.25, -0.4, 0.1)  # pitch, yaw, roll of the last frame, rad
 NECK = np.array([0.0, -0.12, -0.09])  # of the made character, metres
 HEAD_ABOVE, NECK_BELOW = -0.115, -0.205  # heights, metres, beyond which vertices follow one bone only
 WITHIN = 2e-5  # metres
+PAGE = """<html><body><script type="importmap">{"imports": {"three": "/three/build/three.module.js",
+"three/addons/": "/three/examples/jsm/"}}</script><script type="module">
+import * as THREE from 'three'; import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
+const answer = document.createElement('pre');
+try {
+  const file = await new GLTFLoader().loadAsync('a.glb'), mixer = new THREE.AnimationMixer(file.scene);
+  const point = new THREE.Vector3();
+  const read = () => { file.scene.updateMatrixWorld(true); const places = [];
+    file.scene.traverse(mesh => { if (!mesh.isSkinnedMesh || !mesh.morphTargetInfluences) return;
+      mesh.skeleton.update();
+      for (let at = 0; at < mesh.geometry.attributes.position.count; at += 5) {
+        mesh.getVertexPosition(at, point).applyMatrix4(mesh.matrixWorld);
+        places.push([point.x, point.y, point.z]); } });
+    return places; };
+  const rest = read();
+  const action = mixer.clipAction(file.animations[0]); action.setLoop(THREE.LoopOnce); action.clampWhenFinished = true;
+  action.play(); mixer.setTime(SECONDS);
+  answer.textContent = JSON.stringify({rest, shown: read()});
+} catch (error) { answer.textContent = JSON.stringify({error: String(error.stack)}); }
+document.body.append(answer);
+</script></body></html>"""
+SCRIPT = """
+import json, sys
+import bpy, numpy
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.context.scene.render.fps = 25
+bpy.ops.import_scene.gltf(filepath=sys.argv[1])
+mesh = next(one for one in bpy.data.objects if one.type == "MESH" and one.data.shape_keys)
+answer = {}
+for name, frame in (("rest", 0), ("shown", int(sys.argv[2]))):
+    bpy.context.scene.frame_set(frame)
+    shown = mesh.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    places = numpy.zeros(3 * len(shown.data.vertices), numpy.float32)
+    shown.data.vertices.foreach_get("co", places)
+    world = numpy.array(shown.matrix_world)
+    x, y, z = (places.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3]).T
+    answer[name] = numpy.column_stack([x, z, -y])[::5].tolist()  # z is up in Blender
+print("ANSWER" + json.dumps(answer))
+"""
 
 
 @pytest.fixture(scope="module")
@@ -83,29 +122,6 @@ def test_a_share_of_a_rotation_has_its_axis() -> None:
     np.testing.assert_array_equal(share_of_rotation(np.eye(3), 0.3), np.eye(3))
 
 
-PAGE = """<html><body><script type="importmap">{"imports": {"three": "/three/build/three.module.js",
-"three/addons/": "/three/examples/jsm/"}}</script><script type="module">
-import * as THREE from 'three'; import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
-const answer = document.createElement('pre');
-try {
-  const file = await new GLTFLoader().loadAsync('a.glb'), mixer = new THREE.AnimationMixer(file.scene);
-  const point = new THREE.Vector3();
-  const read = () => { file.scene.updateMatrixWorld(true); const places = [];
-    file.scene.traverse(mesh => { if (!mesh.isSkinnedMesh || !mesh.morphTargetInfluences) return;
-      mesh.skeleton.update();
-      for (let at = 0; at < mesh.geometry.attributes.position.count; at += 5) {
-        mesh.getVertexPosition(at, point).applyMatrix4(mesh.matrixWorld);
-        places.push([point.x, point.y, point.z]); } });
-    return places; };
-  const rest = read();
-  const action = mixer.clipAction(file.animations[0]); action.setLoop(THREE.LoopOnce); action.clampWhenFinished = true;
-  action.play(); mixer.setTime(SECONDS);
-  answer.textContent = JSON.stringify({rest, shown: read()});
-} catch (error) { answer.textContent = JSON.stringify({error: String(error.stack)}); }
-document.body.append(answer);
-</script></body></html>"""
-
-
 def test_three_js_turns_neck_and_head(spoken: Path, tmp_path: Path) -> None:
     packages = programs.node_package("three")
     programs.browser()
@@ -117,26 +133,6 @@ def test_three_js_turns_neck_and_head(spoken: Path, tmp_path: Path) -> None:
     answer = json.loads(html.unescape(re.search("<pre>(.*)</pre>", document, re.DOTALL)[1]))
     assert "error" not in answer, answer
     check_places(np.array(answer["rest"]), np.array(answer["shown"]))
-
-
-SCRIPT = """
-import json, sys
-import bpy, numpy
-bpy.ops.wm.read_factory_settings(use_empty=True)
-bpy.context.scene.render.fps = 25
-bpy.ops.import_scene.gltf(filepath=sys.argv[1])
-mesh = next(one for one in bpy.data.objects if one.type == "MESH" and one.data.shape_keys)
-answer = {}
-for name, frame in (("rest", 0), ("shown", int(sys.argv[2]))):
-    bpy.context.scene.frame_set(frame)
-    shown = mesh.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    places = numpy.zeros(3 * len(shown.data.vertices), numpy.float32)
-    shown.data.vertices.foreach_get("co", places)
-    world = numpy.array(shown.matrix_world)
-    x, y, z = (places.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3]).T
-    answer[name] = numpy.column_stack([x, z, -y])[::5].tolist()  # z is up in Blender
-print("ANSWER" + json.dumps(answer))
-"""
 
 
 def test_blender_turns_neck_and_head(spoken: Path) -> None:

@@ -12,7 +12,8 @@ from lexicon.sentence_length import n_letters
 from tests.serving.batch.build.test_run import AAC_SMEAR_S, decoded, manifest, spans
 from tests.serving.batch.build.test_tracks import write_wav
 from tests.serving.batch.conftest import FPS, SMALL, Planner
-from tests.world import PHONE_S, LetterVoice, World
+from tests.tones import PHONE_S, LetterVoice
+from tests.world import World
 from tts2face.models.face_loading import load_face
 from tts2face.picture.scene import draw_background
 from tts2face.request import DRAWN_FACE, Request
@@ -30,6 +31,10 @@ SENTENCE = (
     "2\n00:00:02,500 --> 00:00:04,000\nmy father told me\n\n"
     "3\n00:00:04,200 --> 00:00:05,700\na story.\n"
 )
+OVERLAP = (
+    "1\n00:00:01,000 --> 00:00:01,500\nBOB: abcdefgh ijklmno.\n\n2\n00:00:01,500 --> 00:00:03,000\nEVE: abcdefgh ijk.\n"
+)
+RECORDED = ((0.9, 0.0, 0.0), (1.2, 0.2, 0.0), (1.6, 0.3, 0.3))  # seconds spoken in a slot of 1 s, sounding on, cut
 
 
 @pytest.mark.parametrize("per", ["file", "cue"])
@@ -55,11 +60,6 @@ def test_one_rate_for_all_cues_of_a_sentence(plan_of: Planner, voices: list[Lett
     rates = [cue["rate"] for cue in output["cues"]]
     assert rates[0] > 1.0
     assert len(set(rates)) == 1
-
-
-OVERLAP = (
-    "1\n00:00:01,000 --> 00:00:01,500\nBOB: abcdefgh ijklmno.\n\n2\n00:00:01,500 --> 00:00:03,000\nEVE: abcdefgh ijk.\n"
-)
 
 
 def sound_of(path: Path) -> np.ndarray:
@@ -143,9 +143,6 @@ def test_faces_without_a_studio_stand_before_that_of_the_drawn_faces(
     green = replace(segment, picture={"background": "green"})
     shown = _writer(world.session(), green, Request(text="Hello."), (tmp_path / "b.mov", 10))
     assert len(np.unique(shown._renderer.scene.background.reshape(-1, 3), axis=0)) == 1
-
-
-RECORDED = ((0.9, 0.0, 0.0), (1.2, 0.2, 0.0), (1.6, 0.3, 0.3))  # seconds spoken in a slot of 1 s, sounding on, cut
 
 
 @pytest.mark.parametrize("case", RECORDED)

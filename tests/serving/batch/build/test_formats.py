@@ -13,7 +13,7 @@ from lexicon.errors import BackendError, InputError
 from tests.picture.tiny_talker import own_talker
 from tests.serving.batch.build.test_run import AAC_SMEAR_S, decoded, manifest, spans
 from tests.serving.batch.conftest import FPS, SMALL, SRT, Planner
-from tests.world import PHONE_S, LetterVoice
+from tests.tones import PHONE_S, LetterVoice
 from tts2face import load_clip
 from tts2face.interchange.exports import table
 from tts2face.interchange.exports.table import batch_format, sound_name

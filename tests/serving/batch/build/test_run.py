@@ -16,7 +16,8 @@ import pytest
 from cli.main import run
 from lexicon.errors import BackendError, InputError
 from tests.serving.batch.conftest import FPS, SRT, Planner
-from tests.world import PHONE_S, LetterVoice, World
+from tests.tones import PHONE_S, LetterVoice
+from tests.world import World
 from tts2face.processes.parent import ChildEndedError
 from tts2face.serving.batch import engine as engines
 from tts2face.serving.batch.engine import LocalEngine, Rendered

@@ -31,7 +31,7 @@ from tests.serving.batch.emulators import (
     start_azurite,
     start_moto,
 )
-from tests.world import LetterVoice
+from tests.tones import LetterVoice
 from tts2face.serving.batch import engine as engines
 from tts2face.serving.batch import store
 from tts2face.serving.batch.run import run_batch

@@ -19,6 +19,32 @@ from tests.running import RunningService
 
 TEXT = "Hello there. This is a test."
 ADJUSTED = "x-tts2face-adjusted"
+NODE_CLIENT = """
+const OpenAI = require("openai");
+const client = new OpenAI({baseURL: process.argv[1] + "/v1", apiKey: "unused", maxRetries: 0});
+(async () => {
+  const speech = {model: "kokoro", voice: "af_bella", input: "Hello there.", response_format: "wav", speed: 4};
+  const answer = await client.audio.speech.create(speech);
+  const models = [];
+  for await (const one of client.models.list()) models.push(one.id);
+  let refused = "";
+  try { await client.audio.speech.create({...speech, voice: "nobody"}); } catch (error) { refused = error.message; }
+  console.log(JSON.stringify({
+    bytes: (await answer.arrayBuffer()).byteLength, adjusted: answer.headers.get("x-tts2face-adjusted"), models,
+    model: (await client.models.retrieve("tts-1-hd")).id, refused,
+  }));
+})();
+"""
+KOKORO = {  # the documented request of Kokoro-FastAPI with all its fields
+    "model": "kokoro", "input": TEXT, "voice": "af_bella(2)+af_sky(1)", "response_format": "mp3", "speed": 1.0,
+    "stream": True, "return_download_link": False, "lang_code": "a", "volume_multiplier": 1.0,
+    "normalization_options": {"normalize": True, "unit_normalization": False},
+}  # fmt: skip
+TIMED = {
+    "en-us": TEXT, "en-gb": TEXT, "de": "Guten Morgen, liebe Welt.", "fr-fr": "Bonjour tout le monde.",
+    "ru": "Привет, мир.", "ar": "مرحبا بالعالم", "hi": "नमस्ते दुनिया", "cmn": "你好，世界。", "ko": "안녕하세요 여러분",
+    "ja": "こんにちは、みなさん。", "th": "สวัสดีครับ", "sw": "Habari ya dunia.",
+}  # fmt: skip
 
 
 def seconds(content: bytes) -> float:
@@ -42,24 +68,6 @@ def test_the_language_is_guessed_and_can_be_given(client: httpx.Client, text: st
     given = ask(client, input=text, language=language, response_format="pcm")
     assert given.headers[ADJUSTED] == "voice alloy is espeak-female"
     assert len(guessed.content) == len(given.content)
-
-
-NODE_CLIENT = """
-const OpenAI = require("openai");
-const client = new OpenAI({baseURL: process.argv[1] + "/v1", apiKey: "unused", maxRetries: 0});
-(async () => {
-  const speech = {model: "kokoro", voice: "af_bella", input: "Hello there.", response_format: "wav", speed: 4};
-  const answer = await client.audio.speech.create(speech);
-  const models = [];
-  for await (const one of client.models.list()) models.push(one.id);
-  let refused = "";
-  try { await client.audio.speech.create({...speech, voice: "nobody"}); } catch (error) { refused = error.message; }
-  console.log(JSON.stringify({
-    bytes: (await answer.arrayBuffer()).byteLength, adjusted: answer.headers.get("x-tts2face-adjusted"), models,
-    model: (await client.models.retrieve("tts-1-hd")).id, refused,
-  }));
-})();
-"""
 
 
 def test_the_openai_client_of_node(service: RunningService) -> None:
@@ -103,13 +111,6 @@ def test_sillytavern_speaks(client: httpx.Client) -> None:
     assert seconds(answer.content) > 0.3
 
 
-KOKORO = {  # the documented request of Kokoro-FastAPI with all its fields
-    "model": "kokoro", "input": TEXT, "voice": "af_bella(2)+af_sky(1)", "response_format": "mp3", "speed": 1.0,
-    "stream": True, "return_download_link": False, "lang_code": "a", "volume_multiplier": 1.0,
-    "normalization_options": {"normalize": True, "unit_normalization": False},
-}  # fmt: skip
-
-
 def test_kokoros_clients_speak_and_ask(client: httpx.Client) -> None:
     assert seconds(client.post("/v1/audio/speech", json=KOKORO).content) > 1.0
     assert client.get("/health").json() == {"status": "healthy"}
@@ -137,13 +138,6 @@ def test_captioned_speech_has_the_times_of_words(client: httpx.Client, is_stream
     assert all(0 <= word["start_time"] < word["end_time"] < length for word in words)
     none = client.post("/dev/captioned_speech", json=KOKORO | {"return_timestamps": False, "stream": False}).json()
     assert none["timestamps"] == []
-
-
-TIMED = {
-    "en-us": TEXT, "en-gb": TEXT, "de": "Guten Morgen, liebe Welt.", "fr-fr": "Bonjour tout le monde.",
-    "ru": "Привет, мир.", "ar": "مرحبا بالعالم", "hi": "नमस्ते दुनिया", "cmn": "你好，世界。", "ko": "안녕하세요 여러분",
-    "ja": "こんにちは、みなさん。", "th": "สวัสดีครับ", "sw": "Habari ya dunia.",
-}  # fmt: skip
 
 
 @pytest.mark.parametrize("language", TIMED)

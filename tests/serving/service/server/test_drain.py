@@ -17,6 +17,17 @@ from tests.serving.service.table_synthesis import FILM
 from tests.started import children, running_processes
 
 CLIP = {"text": "We were away a year ago.", "size": "128x128"}
+HELD_PROGRAM = """
+import sys, threading
+from concurrent.futures import ThreadPoolExecutor
+from cli.main import main
+from tts2face.serving.service import server, warm_process
+
+warm_process.PROGRAM = "tests.serving.service.table_synthesis:handlers"
+server.EXIT_S = 0.5
+ThreadPoolExecutor(1).submit(threading.Event().wait)  # is joined at the exit of Python
+main()
+"""
 
 
 def wait_until_gone(pids: list[int]) -> None:
@@ -150,19 +161,6 @@ def test_websockets_get_a_message_and_the_code_of_a_restart(own: RunningService)
     assert asyncio.run(run()) == [([("draining", "the service is shutting down; connect again")], 1012)] * 2
     assert own.process.wait(60) == 0
     assert not any(event["event"] == "defect" for event in own.events())
-
-
-HELD_PROGRAM = """
-import sys, threading
-from concurrent.futures import ThreadPoolExecutor
-from cli.main import main
-from tts2face.serving.service import server, warm_process
-
-warm_process.PROGRAM = "tests.serving.service.table_synthesis:handlers"
-server.EXIT_S = 0.5
-ThreadPoolExecutor(1).submit(threading.Event().wait)  # is joined at the exit of Python
-main()
-"""
 
 
 def test_a_drained_server_ends_whatever_its_threads_wait_for() -> None:

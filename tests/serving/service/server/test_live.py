@@ -16,6 +16,7 @@ from tts2face.interchange.exports.arkit import arkit_projection
 from tts2face.serving.service.live import AHEAD_S
 
 WORDS = ["Hello", "there,", "how", "are", "you?", "I", "am", "well.", "And"]
+LONG = "The garden behind the old house near the river had been green for years. "
 
 
 class Live:
@@ -107,9 +108,6 @@ def test_cancel_forgets_the_text_that_waits(service: RunningService) -> None:
     spoken = [one["text"] for one in live.events("speech")]
     assert spoken[-1] == "A new one."
     assert len(spoken) < 20
-
-
-LONG = "The garden behind the old house near the river had been green for years. "
 
 
 @pytest.mark.parametrize("name", ["cancel", "interrupt"])

@@ -1,4 +1,4 @@
-"""More requests at once than may wait: nothing but 200 and 429. Leaks: `tests/serving/work/server/test_soak.py`."""
+"""More requests at once than may wait are answered by 200 and 429, and by nothing else."""
 
 import asyncio
 from collections import Counter

@@ -39,6 +39,7 @@ from tts2face.video.networks import MissingModelError
 WORDS = b"Siobhan  SH IH0 V AO1 N\n"
 OTHER_WORDS = b"Nguyen  N UW1 Y EH0 N\n"
 Ask = Callable[..., httpx.Response]
+GLB = b"glTF" + bytes(20)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -184,9 +185,6 @@ def test_heads_of_photos_are_refused_as_photos_are(ask: Ask, ask_with_photos: As
     assert refusal(refused) == (403, "forbidden")
     assert "its operator allows them with the setting photos" in refused.text
     assert ask_with_photos("ann", "POST", "/v1/faces", **form("tom", content)).status_code == 201
-
-
-GLB = b"glTF" + bytes(20)
 
 
 @pytest.mark.parametrize("makes", ["picture", "avatar"])

@@ -21,6 +21,23 @@ from tests.running import RunningService
 TEXT = "Hello there. This is a test."
 NODE_MODULES = Path(os.environ.get("TTS2FACE_NODE_MODULES", "node_modules"))
 HEADTTS = NODE_MODULES / "@met4citizen" / "headtts" / "modules" / "headtts.mjs"
+HEADTTS_SCRIPT = """
+globalThis.window = globalThis;
+globalThis.location = {href: process.argv[2]};
+globalThis.AudioContext = class { async decodeAudioData(bytes) { return bytes.byteLength; } };
+const {HeadTTS} = await import(process.argv[3]);
+const client = new HeadTTS({endpoints: [process.argv[2]], audioCtx: new AudioContext()});
+await client.connect();
+client.setup({voice: "af_bella", language: "en-us", speed: 1, audioEncoding: "wav"});
+const answers = [
+  ...await client.synthesize({input: "This is an example. And one more."}),
+  ...await client.synthesize({input: ["We saw ", {type: "speech", value: "two hundred ", subtitles: ">199 "},
+    {type: "phonetic", value: "\\u02c8\\u0254\\u0279\\u026an\\u02a4\\u0259z", subtitles: "oranges "},
+    {type: "break", value: 700}, "on sale."]}),
+];
+console.log(JSON.stringify(answers));
+process.exit(0);
+"""
 
 
 @pytest.fixture
@@ -88,25 +105,6 @@ def test_a_clip_arrives_while_it_is_made(client: httpx.Client) -> None:
         assert sum(1 for _ in movie.decode(video=0)) > 60
     with av.open(io.BytesIO(b"".join(parts[: len(parts) // 2]))) as movie:
         assert sum(1 for _ in movie.decode(video=0)) > 10
-
-
-HEADTTS_SCRIPT = """
-globalThis.window = globalThis;
-globalThis.location = {href: process.argv[2]};
-globalThis.AudioContext = class { async decodeAudioData(bytes) { return bytes.byteLength; } };
-const {HeadTTS} = await import(process.argv[3]);
-const client = new HeadTTS({endpoints: [process.argv[2]], audioCtx: new AudioContext()});
-await client.connect();
-client.setup({voice: "af_bella", language: "en-us", speed: 1, audioEncoding: "wav"});
-const answers = [
-  ...await client.synthesize({input: "This is an example. And one more."}),
-  ...await client.synthesize({input: ["We saw ", {type: "speech", value: "two hundred ", subtitles: ">199 "},
-    {type: "phonetic", value: "\\u02c8\\u0254\\u0279\\u026an\\u02a4\\u0259z", subtitles: "oranges "},
-    {type: "break", value: 700}, "on sale."]}),
-];
-console.log(JSON.stringify(answers));
-process.exit(0);
-"""
 
 
 @pytest.mark.parametrize("scheme", ["http", "ws"])

@@ -23,6 +23,29 @@ needs("opentelemetry.sdk")
 TEXT = "Zebras graze quietly."
 TRACE, PARENT = "0af7651916cd43dd8448eb211c80319c", "b7ad6b7169203331"
 ENDPOINT = "OTEL_EXPORTER_OTLP_ENDPOINT"
+# FastAPI itself imports OpenTelemetry's interface, which does nothing alone.
+IMPORTS = """
+import sys
+from tts2face.serving.service.server import create_app
+from tts2face.serving.service.settings import ServiceSettings
+app = create_app(ServiceSettings(processes=1))
+assert app.state.service.tracing is None
+assert not [name for name in sys.modules if name.startswith(("opentelemetry.sdk", "opentelemetry.exporter"))]
+"""
+AUDITED = """
+import sys
+LOCAL = {"127.0.0.1", "localhost", "::1", None}
+def look(event, arguments):
+    if event in {"socket.connect", "socket.sendto", "socket.sendmsg"}:
+        print("NETWORK", event, arguments[1:], file=sys.stderr)
+    if event in {"socket.getaddrinfo", "socket.bind"}:
+        host = arguments[0] if event == "socket.getaddrinfo" else arguments[1][0]
+        if host not in LOCAL:
+            print("NETWORK", event, host, file=sys.stderr)
+sys.addaudithook(look)
+from cli.main import main
+main()
+"""
 
 
 class Collector:
@@ -163,36 +186,9 @@ def test_missing_libraries_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
         tracing_from_environment({ENDPOINT: "http://127.0.0.1:4318"})
 
 
-# FastAPI itself imports OpenTelemetry's interface, which does nothing alone.
-IMPORTS = """
-import sys
-from tts2face.serving.service.server import create_app
-from tts2face.serving.service.settings import ServiceSettings
-app = create_app(ServiceSettings(processes=1))
-assert app.state.service.tracing is None
-assert not [name for name in sys.modules if name.startswith(("opentelemetry.sdk", "opentelemetry.exporter"))]
-"""
-
-
 def test_nothing_is_imported_without_the_variables() -> None:
     kept = {name: value for name, value in os.environ.items() if not name.startswith("OTEL_")}
     subprocess.run([sys.executable, "-c", IMPORTS], env=kept, check=True, timeout=120)
-
-
-AUDITED = """
-import sys
-LOCAL = {"127.0.0.1", "localhost", "::1", None}
-def look(event, arguments):
-    if event in {"socket.connect", "socket.sendto", "socket.sendmsg"}:
-        print("NETWORK", event, arguments[1:], file=sys.stderr)
-    if event in {"socket.getaddrinfo", "socket.bind"}:
-        host = arguments[0] if event == "socket.getaddrinfo" else arguments[1][0]
-        if host not in LOCAL:
-            print("NETWORK", event, host, file=sys.stderr)
-sys.addaudithook(look)
-from cli.main import main
-main()
-"""
 
 
 def test_the_server_opens_no_connection(tmp_path: object) -> None:

@@ -9,6 +9,42 @@ from tests.running import eventually
 from tests.serving.studio.served import HARNESS, Page
 
 SILENCE_S, SPEECH_S = (0.01, 0.03), (0.55, 0.95, 2.0, 2.4, 2.6)  # of the harness's sentence
+COUNT_FRAMES = """window.called = 0;
+    const next = window.requestAnimationFrame;
+    window.requestAnimationFrame = (call) => next((now) => (window.called++, call(now)));"""
+CHANGE_FACE = """
+    const id = document.querySelector('.studio-stage').id.slice(1), first = window.fetch;
+    const later = (seconds) => new Promise((done) => setTimeout(done, 1000 * seconds));
+    window.late = 0;
+    window.fetch = async (url, options) => {
+      if (!String(url).includes('slow')) return first(url, options);
+      await later(1.0); // by then the other face is shown
+      window.late++;
+      return first(url.replace('slow', arguments[0]), options);
+    };
+    const { props } = mounted_app.elements[id];
+    window.stage = getElement(id);
+    props.face = '/studio/files/face.glb?slow';
+    await later(0.1);
+    props.face = '/studio/files/face.glb?second'"""
+MERGE = """
+    const { Preview } = await import('tts2face-studio/preview.js');
+    const bundle = (header, motion, pcm) => {
+      const text = new TextEncoder().encode(JSON.stringify({fps: 30, channels: ['a'], rate: 8, words: [], phones: [],
+        sentences: [], duration: 1, ...header}));
+      const parts = [new Uint32Array([text.length]), text, new Float32Array(motion),
+        new Float32Array(6 * motion.length), new Int16Array(pcm)];
+      return new Blob(parts).arrayBuffer();
+    };
+    const preview = new Preview(), changes = [];
+    preview.on('change', (change) => changes.push([change.sound, change.motion]));
+    const first = {revision: 1, n_frames: 4, first_frame: 0, n: 4, n_samples: 4, sound_first: 0};
+    preview.merge(await bundle(first, [1, 2, 3, 4], [10, 20, 30, 40]));
+    const longer = {revision: 2, n_frames: 5, first_frame: 1, n: 2, n_samples: 5, sound_first: 1};
+    preview.merge(await bundle(longer, [9, 8], [50, 60]));
+    preview.merge(await bundle({...longer, revision: 3, first_frame: 4, n: 1, sound_first: 0}, [7], []));
+    return [[...preview.motion], [...preview.pcm], preview.revision, changes];
+"""
 
 
 @pytest.fixture
@@ -67,11 +103,6 @@ def test_time_follows_the_sound_and_measures_are_reported(page):
     assert stopped < 4.1
 
 
-COUNT_FRAMES = """window.called = 0;
-    const next = window.requestAnimationFrame;
-    window.requestAnimationFrame = (call) => next((now) => (window.called++, call(now)));"""
-
-
 def test_a_page_at_rest_does_nothing_until_it_plays_or_changes(page):
     def rests() -> bool:
         before = page.browser.run("return window.called")
@@ -88,23 +119,6 @@ def test_a_page_at_rest_does_nothing_until_it_plays_or_changes(page):
     page.browser.press("Right")
     eventually(lambda: page.measure("frames") > drawn, 10, "the head is drawn at another time")
     eventually(rests, 20, "the page rests")
-
-
-CHANGE_FACE = """
-    const id = document.querySelector('.studio-stage').id.slice(1), first = window.fetch;
-    const later = (seconds) => new Promise((done) => setTimeout(done, 1000 * seconds));
-    window.late = 0;
-    window.fetch = async (url, options) => {
-      if (!String(url).includes('slow')) return first(url, options);
-      await later(1.0); // by then the other face is shown
-      window.late++;
-      return first(url.replace('slow', arguments[0]), options);
-    };
-    const { props } = mounted_app.elements[id];
-    window.stage = getElement(id);
-    props.face = '/studio/files/face.glb?slow';
-    await later(0.1);
-    props.face = '/studio/files/face.glb?second'"""
 
 
 @pytest.mark.parametrize("answer", ["late", "/../nothing.glb?"])
@@ -212,26 +226,6 @@ def test_ten_minutes_zoom(browser, address):
     page.focus()
     browser.press("Right", "+", "+", "+", "+", "+", "+", "+", "+", "+", "+", "+", "+")
     assert page.measure("view")["scale"] > 20 * fitted
-
-
-MERGE = """
-    const { Preview } = await import('tts2face-studio/preview.js');
-    const bundle = (header, motion, pcm) => {
-      const text = new TextEncoder().encode(JSON.stringify({fps: 30, channels: ['a'], rate: 8, words: [], phones: [],
-        sentences: [], duration: 1, ...header}));
-      const parts = [new Uint32Array([text.length]), text, new Float32Array(motion),
-        new Float32Array(6 * motion.length), new Int16Array(pcm)];
-      return new Blob(parts).arrayBuffer();
-    };
-    const preview = new Preview(), changes = [];
-    preview.on('change', (change) => changes.push([change.sound, change.motion]));
-    const first = {revision: 1, n_frames: 4, first_frame: 0, n: 4, n_samples: 4, sound_first: 0};
-    preview.merge(await bundle(first, [1, 2, 3, 4], [10, 20, 30, 40]));
-    const longer = {revision: 2, n_frames: 5, first_frame: 1, n: 2, n_samples: 5, sound_first: 1};
-    preview.merge(await bundle(longer, [9, 8], [50, 60]));
-    preview.merge(await bundle({...longer, revision: 3, first_frame: 4, n: 1, sound_first: 0}, [7], []));
-    return [[...preview.motion], [...preview.pcm], preview.revision, changes];
-"""
 
 
 def test_previews_keep_what_lies_before_and_after_a_change(page):

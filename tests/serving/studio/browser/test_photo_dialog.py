@@ -1,4 +1,4 @@
-"""A photo is dropped, its lips and lids are corrected with the mouse, and the face shows on the stage. In Chromium."""
+"""In Chromium a photo is dropped, its lips and lids are corrected with the mouse, and the face shows on the stage."""
 
 import base64
 import io

@@ -1,4 +1,4 @@
-"""A person before a fake camera: the head follows, a take is recorded, and becomes a style. In Chromium."""
+"""In Chromium a person is before a fake camera: the head follows, a take is recorded, and becomes a style."""
 
 from pathlib import Path
 

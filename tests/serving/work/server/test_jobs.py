@@ -32,6 +32,18 @@ from tts2face.serving.work.workers import DEAD_AFTER_S, Workers
 
 Segments = Callable[..., dict[str, Segment]]
 Rendered = Callable[[], list[tuple[str, int]]]
+OFFLINE = """
+import sys
+def look(event, arguments):
+    if event == "socket.connect" or event == "socket.getaddrinfo":
+        print("NETWORK", event, arguments[1:], file=sys.stderr)
+sys.addaudithook(look)
+from tests.serving.work.stub_worker import Stub
+from tts2face.serving.work.worker import Worker
+from pathlib import Path
+worker = Worker(sys.argv[1], sys.argv[2], renderer=Stub(Path(sys.argv[3]), 0.0))
+worker.run(until=lambda: worker.n_rendered == 1)
+"""
 
 
 def queue(database: str, segments: dict[str, Segment], priority: int = 10) -> None:
@@ -278,20 +290,6 @@ def test_the_commands_list_show_cancel_retry_and_prune(
         assert run(["jobs", *words, "--database", database]) == 0
         printed = capsys.readouterr()
         assert expected in printed.out + printed.err
-
-
-OFFLINE = """
-import sys
-def look(event, arguments):
-    if event == "socket.connect" or event == "socket.getaddrinfo":
-        print("NETWORK", event, arguments[1:], file=sys.stderr)
-sys.addaudithook(look)
-from tests.serving.work.stub_worker import Stub
-from tts2face.serving.work.worker import Worker
-from pathlib import Path
-worker = Worker(sys.argv[1], sys.argv[2], renderer=Stub(Path(sys.argv[3]), 0.0))
-worker.run(until=lambda: worker.n_rendered == 1)
-"""
 
 
 def test_a_worker_of_a_file_opens_no_connection(segments: Segments, tmp_path: Path) -> None:
