@@ -3,7 +3,7 @@
 `make_source` makes one of the options by name that flags, files and clients give (`SourceOptions`).
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import Field, dataclass, fields
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -105,19 +105,29 @@ def parse_articulation(given: str) -> float:
     return factor
 
 
-def _check(source: "Source | FromPhones | FromSound") -> None:
-    """Refuse values of other types and numbers outside the limits of the options (`InputError`)."""
-    check_fields(source)
-    for name, value in source.as_options().items():
-        limits = SOURCE_OPTIONS[name].metadata["limits"]
-        if limits is not None and value is not None:
-            check_limits(name, value, limits)
-    if source.articulation is not None:
-        parse_articulation(source.articulation)
+class CheckedOptions:
+    """Options of one source, which refuse values of other types and numbers outside the limits (`InputError`)."""
+
+    __slots__ = ()
+    __dataclass_fields__: ClassVar[dict[str, "Field[Any]"]]
+
+    def __post_init__(self) -> None:
+        """Refuse them by the names and limits of `SourceOptions`."""
+        check_fields(self)
+        for name, value in self.as_options().items():
+            limits = SOURCE_OPTIONS[name].metadata["limits"]
+            if limits is not None and value is not None:
+                check_limits(name, value, limits)
+            if name == "articulation" and value is not None:
+                parse_articulation(value)
+
+    def as_options(self) -> dict[str, Any]:
+        """Its options by name."""
+        return {declared.name: getattr(self, declared.name) for declared in fields(self)}
 
 
 @dataclass(frozen=True, slots=True)
-class Spoken:
+class Spoken(CheckedOptions):
     """A text that a voice speaks; ``lead`` is None where the voice's own silence is kept."""
 
     text: str
@@ -128,61 +138,31 @@ class Spoken:
     volume: float = 1.0
     articulation: str | None = None
 
-    def __post_init__(self) -> None:
-        """Refuse values of other types and numbers outside their range."""
-        _check(self)
-
-    def as_options(self) -> dict[str, Any]:
-        """Its options by name."""
-        return {declared.name: getattr(self, declared.name) for declared in fields(self)}
-
 
 @dataclass(frozen=True, slots=True)
-class FromPhones:
+class FromPhones(CheckedOptions):
     """Lips of a recording that follow its phones: of its words, or recognised where these are not known."""
 
     text: str = ""
     articulation: str | None = None
 
-    def __post_init__(self) -> None:
-        """Refuse values of other types and numbers outside their range."""
-        _check(self)
-
-    def as_options(self) -> dict[str, Any]:
-        """Its options by name."""
-        return {"text": self.text, "articulation": self.articulation}
-
 
 @dataclass(frozen=True, slots=True)
-class FromSound:
+class FromSound(CheckedOptions):
     """Lips of a recording that follow its sound, by one of the talker's maps."""
 
     audio_map: str
     text: ClassVar[str] = ""
     articulation: ClassVar[str | None] = None
 
-    def __post_init__(self) -> None:
-        """Refuse other names."""
-        _check(self)
-        if self.audio_map not in AUDIO_MAP_NAMES[1:]:
-            raise InputError(f"there is no audio map {self.audio_map!r}; choose {', '.join(AUDIO_MAP_NAMES[1:])}")
-
-    def as_options(self) -> dict[str, Any]:
-        """Its options by name."""
-        return {"audio_map": self.audio_map}
-
 
 @dataclass(frozen=True, slots=True)
-class Recorded:
+class Recorded(CheckedOptions):
     """Recorded speech, which the lips follow."""
 
     audio: Path
     lips: FromPhones | FromSound = FromPhones()
     volume: float = 1.0
-
-    def __post_init__(self) -> None:
-        """Refuse values of other types and numbers outside their range."""
-        _check(self)
 
     @property
     def text(self) -> str:
@@ -200,16 +180,12 @@ class Recorded:
 
 
 @dataclass(frozen=True, slots=True)
-class Idle:
+class Idle(CheckedOptions):
     """Seconds of idle animation."""
 
     seconds: float
     text: ClassVar[str] = ""
     articulation: ClassVar[str | None] = None
-
-    def __post_init__(self) -> None:
-        """Refuse values of other types and numbers outside their range."""
-        _check(self)
 
     def as_options(self) -> dict[str, Any]:
         """Its options by name."""
@@ -217,16 +193,12 @@ class Idle:
 
 
 @dataclass(frozen=True, slots=True)
-class Listening:
+class Listening(CheckedOptions):
     """Seconds for which the face listens, to the sound of a partner if there is one, and the text that follows."""
 
     seconds: float
     partner: Path | None = None
     then: Spoken | None = None
-
-    def __post_init__(self) -> None:
-        """Refuse values of other types and numbers outside their range."""
-        _check(self)
 
     @property
     def text(self) -> str:

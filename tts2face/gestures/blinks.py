@@ -10,8 +10,9 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.gestures.presentation import FloatArray, FrameContext
+from tts2face.gestures.presentation import FrameContext
 from tts2face.models.palette import GESTURE_FPS, Style
+from tts2face.numeric.arrays import Float32Array, FloatArray, IntArray
 
 OPEN, SHUT = 0.2, 0.5  # closures below which lids count as open, and above which as shut
 HALF_OPEN = 0.25  # largest closure between blinks
@@ -31,9 +32,6 @@ EARLY_SHARE = 0.6  # of the interval after which a phrase end is used
 PATIENCE_S = 1.6  # an overdue blink waits this long for a pause
 PAUSE_DB = -20.0  # intensity of a pause, relative to the mean level of speech
 PHRASE_END_FRAMES = 3  # of a pause, after which a phrase has ended; most closures of plosives are shorter
-
-Float32Array = NDArray[np.float32]
-IntArray = NDArray[np.int64]
 
 
 def find_blinks(closure: FloatArray, lengths: NDArray[np.integer]) -> IntArray:

@@ -12,14 +12,14 @@ from types import MappingProxyType
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from lexicon.errors import InputError
 from lexicon.marked_text import NOD_SIZE_LIMITS
 from lexicon.values.checks import check_limits
 from lexicon.values.fields import check_fields
 from tts2face.models.palette import EXPRESSIONS, FEATURES
-from tts2face.numeric.arrays import smoothstep
+from tts2face.numeric.arrays import FloatArray, smoothstep
 
 EXPRESSION_WEIGHT_LIMITS = (-0.5, 1.5)  # -e to 1 + e with e = 0.5, the middle of what Ju and Lee 2008 (section 4) allow
 GAIN_LIMITS = (0.0, 3.0)  # beyond three times as far, lids and brows of any face are at their limits
@@ -27,7 +27,6 @@ GAIN_NAMES = (*FEATURES, "jaw", "lips")
 GAZE_LIMITS_DEG = (-35.0, 35.0)  # farther, people turn the head (Stahl 1999, Experimental Brain Research 126)
 CHANNEL_OFFSET_LIMITS = (-1000.0, 1000.0)  # weights lie within 2; the head's position is in millimetres
 MAX_KEYS = 100_000  # of one curve: a key at each frame of half an hour
-FloatArray = NDArray[np.float64]
 Keys = tuple[Annotated[tuple[float, float], "[seconds, value]"], ...]
 
 

@@ -21,7 +21,7 @@ from tts2face.gestures.field_kernels import (
     search_space,
 )
 from tts2face.models.palette import GESTURE_FPS
-from tts2face.numeric.arrays import principal_axes
+from tts2face.numeric.arrays import Float32Array, principal_axes
 from tts2face.numeric.kd_tree import KdTree, build_tree, count_nodes
 from tts2face.storage.array_cache import computed_once
 
@@ -31,7 +31,6 @@ CACHE_KIND, CACHE_VERSION = "field", 2  # raised when the index of the same reco
 MIN_CACHED_MOMENTS = 5000  # fewer are indexed as fast as a file is read
 TREE_ARRAYS = tuple(field.name for field in fields(KdTree))
 N_DISTANCE_SAMPLES = 200  # moments from which the median nearest distance is estimated
-Float32Array = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

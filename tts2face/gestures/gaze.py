@@ -16,7 +16,7 @@ from tts2face.gestures.blinks import PAUSE_DB
 from tts2face.gestures.presentation import FrameContext
 from tts2face.models.gaze import FACE_DEG, LISTENING, SPEAKING, GazeHabit, GazeModel, LogNormal
 from tts2face.models.palette import GESTURE_FPS
-from tts2face.numeric.arrays import smoothstep
+from tts2face.numeric.arrays import Float32Array, FloatArray, smoothstep
 
 # Saccades last 21 ms and 2.2 ms a degree (Carpenter 1988, Movements of the Eyes; Bahill et al. 1975).
 SACCADE_S, SACCADE_S_PER_DEG = 0.021, 0.0022
@@ -35,9 +35,6 @@ SHORTEST_S = 0.1  # of a look and a fixation: what the recordings could show
 # about to return (Oommen, Smith and Stahl 2004, Vision Research 44), as in conversation. Eyes go first.
 HEAD_ONSET_DEG, HEAD_SHARE = 10.0, 0.4
 HEAD_RATE = 7.0  # 1/s of a critically damped follower: half of the way after .24 s
-
-FloatArray = NDArray[np.float64]
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +110,7 @@ class GazeProcess:
             elif self._rest.fixation_s <= 0.0:
                 self._shift(time)
 
-    def at(self, times: FloatArray) -> Floats:
+    def at(self, times: FloatArray) -> Float32Array:
         """Gaze (T, 2) in radians down and left at increasing times (T,); earlier fixations are forgotten."""
         places, starts = (
             np.array([fixation.place for fixation in self._fixations]),

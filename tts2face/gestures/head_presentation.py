@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.gestures.presentation import FloatArray, FrameContext, LowPass, filtered_spread
-from tts2face.gestures.prosody import Float32Array, prosody_features
+from tts2face.gestures.presentation import FrameContext, LowPass, filtered_spread
+from tts2face.gestures.prosody import prosody_features
 from tts2face.models.palette import GESTURE_FPS, Style
-from tts2face.numeric.arrays import smooth_gaussian, smoothstep
+from tts2face.numeric.arrays import Float32Array, FloatArray, smooth_gaussian, smoothstep
 from tts2face.sound.praat import IntensityTrack
 from tts2face.storage.array_cache import computed_once
 from tts2face.types import HEAD_CHANNELS, Waveform

@@ -37,8 +37,6 @@ SECOND_SIZE = 0.6
 LASTS_S = 1.0  # a response
 KEPT_S, LOOK_S = 5.0, 0.4  # of arriving sound in which cues are looked for (20 ms), and between two looks
 
-FloatArray = NDArray[np.float64]
-
 
 def responses(times: Sequence[float], seed: int) -> Timeline:
     """Nods and brow raises of responses that begin at times in seconds of the clip; each depends on its time alone."""

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from tts2face.gestures.stream import NO_SEEDS, GestureFields, GestureValues, style_median
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import GESTURE_FPS
+from tts2face.numeric.arrays import Float32Array
 from tts2face.types import Waveform
 
 OCTAVES_HZ = (0.5, 1.0, 2.0)  # each half as strong as the last (Perlin 1985)
 NOISE_STANDARD_DEVIATION = 0.164  # standard deviation of the octaves' sum, over two hours of it
 BLINK_DURATION_S = 0.2  # from open to open
 CLOSED_SHARE = 0.5  # share from which a lid counts as shut
-Float32Array = NDArray[np.float32]
 
 
 class NoiseStream:

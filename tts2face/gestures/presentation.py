@@ -12,8 +12,9 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.gestures.prosody import QUIET_DB, Float32Array
+from tts2face.gestures.prosody import QUIET_DB
 from tts2face.models.palette import GESTURE_FPS
+from tts2face.numeric.arrays import Float32Array, FloatArray
 
 SMOOTHING_STAGES = 4  # low-pass stages in series: 80 dB per decade, so that scaled motion adds nothing above 6 Hz
 LOUD_DB = 0.0  # intensity relative to the mean level of speech at which the loudness is 1
@@ -24,7 +25,6 @@ RANDOM_EMPHASIS = 0.07
 LISTENING_LOUDNESS = 1.2  # a listener shows the mood as in loud speech: a friendly one smiles
 EMPHASIS_HZ, RANDOM_HZ = 0.9, 0.25
 EMPHASIS_LIMITS = (0.6, 1.35)
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

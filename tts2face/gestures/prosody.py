@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import Float32Array
 from tts2face.sound.features import speech_level
 from tts2face.sound.praat import IntensityTrack, intensity_track, pitch
 from tts2face.types import Waveform
@@ -10,7 +11,6 @@ from tts2face.types import Waveform
 AUDIBLE_DB = 30.0  # relative to 20 micropascals; a sound with a lower maximum contains no speech
 HIGH_SEMITONES = 12.0
 QUIET_DB, PROSODY_LOUD_DB = -35.0, 10.0  # limits relative to the mean level of speech; values beyond are clipped
-Float32Array = NDArray[np.float32]
 SILENT_PROSODY = np.array([QUIET_DB, 0.0], np.float32)
 MIN_PITCH_SOUND_S = 0.1  # shorter sounds have no pitch
 

@@ -32,7 +32,7 @@ from tts2face.gestures.prosody import prosody_features, speech_intensity
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.gaze import load_gaze
 from tts2face.models.palette import FEATURES, GESTURE_FPS, FeatureChange, Palette, Style
-from tts2face.numeric.arrays import interpolate_cubic
+from tts2face.numeric.arrays import Float32Array, interpolate_cubic
 from tts2face.sound.praat import IntensityTrack
 from tts2face.types import Waveform
 
@@ -56,7 +56,6 @@ OPTIONS: Mapping[str, FieldOptions] = MappingProxyType(
         ),
     }
 )
-Float32Array = NDArray[np.float32]
 GestureValues = Mapping[str, Float32Array]  # (T, k) values of each feature
 # A draw at every frame from the four nearest of all recorded frames, h = 10 preceding frames at 30 frames a second, no
 # bonus for the following frame, no memory of earlier draws, and recorded values shown as they are. The paper names

@@ -22,7 +22,6 @@ from tts2face.gestures.elements import (
     ChannelEdit,
     ExpressionCurve,
     ExpressionSpan,
-    FloatArray,
     Gains,
     GazeTarget,
     ListeningSpan,
@@ -36,6 +35,7 @@ from tts2face.gestures.elements import (
 )
 from tts2face.gestures.kinds import KINDS, ElementKind
 from tts2face.models.palette import EXPRESSIONS, FEATURES, Palette
+from tts2face.numeric.arrays import FloatArray
 
 BLEND_S = 0.3  # transition between two styles; as long as a blink
 # Of an expression: a smile's onset takes about as long whatever the occasion (Schmidt, Cohn and Tian 2003, Biological

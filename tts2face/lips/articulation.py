@@ -12,7 +12,7 @@ import numpy as np
 from lexicon.sequence import PhoneSequence
 from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.face.mouth import MIDDLE_PAIR, LipConstraints, build_lip_constraints
-from tts2face.lips.articulation_tracks import FloatArray, articulation_tracks, pause_closure, seconds_from_closure
+from tts2face.lips.articulation_tracks import articulation_tracks, pause_closure, seconds_from_closure
 from tts2face.lips.mouth_limits import close_lips, largest_gaps, limit_speed
 from tts2face.lips.teeth_and_tongue import IncisorContact, Tongue, build_incisor_contact, build_tongue, incisor_edge
 from tts2face.models.face import Face
@@ -24,7 +24,7 @@ from tts2face.models.landmarks import (
     OUTER_LIP_UPPER,
     inner_lip_gaps,
 )
-from tts2face.numeric.arrays import ordered_product, smoothstep
+from tts2face.numeric.arrays import FloatArray, ordered_product, smoothstep
 from tts2face.source import CLEAR, NATURAL
 from tts2face.types import Trajectory
 

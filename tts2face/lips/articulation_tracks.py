@@ -3,13 +3,11 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lexicon.articulation import TARGET_NAMES, VisibleTarget, visible_targets
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.numeric.arrays import smooth_gaussian, smoothstep
+from tts2face.numeric.arrays import FloatArray, smooth_gaussian, smoothstep
 
-FloatArray = NDArray[np.float64]
 CLOCK_HZ = 200.0  # rate at which tracks are computed; they are interpolated at the frames
 HOLD_SHARE = 0.5  # share of a phone, or of the half of a diphthong, in which its target is held
 MAX_TRANSITION_S = 0.16  # lips round at most this long before a rounded phone is held (Perkell and Matthies 1992)

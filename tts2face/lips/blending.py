@@ -13,11 +13,10 @@ from lexicon.errors import InputError
 from tts2face.lips.options import SynthesisOptions
 from tts2face.lips.targets import Targets
 from tts2face.lips.tokens import Tokens, read_motion
+from tts2face.numeric.arrays import FloatArray, IntArray
 from tts2face.numeric.filters import gaussian
 from tts2face.numeric.kernels import inlined_kernel, kernel
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 CLOCK_HZ = 100.0  # rate at which motion is computed; lip motion is below 15 Hz
 N_KNOTS = 8  # samples per phone; 10 are no better (docs/decisions/007-exemplar-method.md)
 ALIGN_BAND = 1  # maximum warp in knots relative to the best exemplar; 2 lose .002 of r opening

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError, InputError
 from tts2face.lips.lip_gaps import (
     MIN_LIP_GAP_MM,
-    FloatArray,
     contact_mm,
     facing_gaps,
     gap_limits,
@@ -24,7 +23,7 @@ from tts2face.lips.lip_gaps import (
 from tts2face.lips.retargeting import inner_product_map
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.talker import ShapeModel, Talker
-from tts2face.numeric.arrays import fix_signs, ordered_product
+from tts2face.numeric.arrays import FloatArray, fix_signs, ordered_product
 from tts2face.types import Trajectory
 
 MAX_STANDARD_DEVIATIONS = 3.0  # limit of a mapped parameter about the target's mean; T07, section 3.1

@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, inner_lip_gaps
 from tts2face.models.talker import ShapeModel
+from tts2face.numeric.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
 MIN_LIP_GAP_MM = 0.01  # margin for the rounding of parameters in a talker file
 WITHOUT_CORNERS = slice(1, -1)  # of the inner lip points; at the corners both lips share one point
 CONTACT_SHARE = 0.01  # tracked gap of touching lips, relative to the distance of the outer eye corners

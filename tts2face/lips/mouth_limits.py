@@ -3,8 +3,7 @@
 import numpy as np
 
 from tts2face.face.mouth import LipConstraints
-from tts2face.lips.articulation_tracks import FloatArray
-from tts2face.numeric.arrays import ordered_product
+from tts2face.numeric.arrays import FloatArray, ordered_product
 
 # Largest change of a shape's weight per second, .3 per 1/60 s; closing the lips afterwards adds a little. The fastest
 # score of the mouth in 14 recordings of GRID s1 (mouthPucker) changes by .34 per 1/60 s (99.9th percentile), that of

@@ -13,7 +13,7 @@ from tts2face.models.face import Face
 from tts2face.models.landmarks import EYELID_LANDMARKS, MOUTH_REGION, N_LANDMARKS, eye_aperture, inner_lip_gaps
 from tts2face.models.score_map import SCORE_SHAPES, mouth_scores
 from tts2face.models.talker import ShapeModel, Talker, speech_channels
-from tts2face.numeric.arrays import principal_axes
+from tts2face.numeric.arrays import FloatArray, principal_axes
 from tts2face.types import Trajectory
 
 N_MOUTH_MODES = 20
@@ -22,7 +22,6 @@ CLOSED_FRAME_SHARE = 0.15  # share of the frames that count as having closed lip
 SCORE_DRIVEN_SHAPES = ("eye", "brow", "nose", "cheek")  # name prefixes of the shapes that follow scores
 SCORE_DEAD_ZONE = 0.04  # amplitude of the noise of scores
 OPEN_LID_QUANTILE, CLOSED_LID_SHARE = 0.9, 0.25  # aperture quantile of an open eye; share of it of a closed eye
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

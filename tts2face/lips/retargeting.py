@@ -38,11 +38,9 @@ from tts2face.models.landmarks import (
 )
 from tts2face.models.score_map import ScoreMap
 from tts2face.models.talker import ShapeModel, Talker
-from tts2face.numeric.arrays import ordered_product
+from tts2face.numeric.arrays import FloatArray, ordered_product
 from tts2face.numeric.least_squares import bounded_least_squares
 from tts2face.types import Trajectory
-
-FloatArray = NDArray[np.float64]
 
 BILABIALS = frozenset({"p", "b", "m"})
 CONTACT_PERCENTILE = 90  # of the smallest gaps in bilabials: the tracked gap up to which lips touch

@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 
 from tts2face.face.mouth import MIDDLE_PAIR
 from tts2face.models.score_map import N_SCORES, SCORE_SHAPES, ScoreMap, logistic
-from tts2face.numeric.arrays import ordered_product, smoothstep
+from tts2face.numeric.arrays import FloatArray, ordered_product, smoothstep
 from tts2face.numeric.least_squares import bounded_least_squares
-
-FloatArray = NDArray[np.float64]
 
 N_STEPS = 5  # Gauss-Newton steps; more change hardly any score by .01
 STEP_SHARE = 0.5  # of each step: full steps oscillate, because scores are steep functions of the weights

@@ -7,16 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tts2face.face.mouth import LipConstraints
 from tts2face.models.face import Face
 from tts2face.models.face_schema import WIDE_OPEN
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, UPPER_LIP_INNER_MID
-from tts2face.numeric.arrays import ordered_product, smoothstep
+from tts2face.numeric.arrays import FloatArray, ordered_product, smoothstep
 from tts2face.numeric.least_squares import bounded_least_squares
-
-FloatArray = NDArray[np.float64]
 
 TOUCHING_LANDMARKS, FACING_LANDMARKS = INNER_LIP_LOWER[4:7], INNER_LIP_UPPER[4:7]  # of the lips, about the middle
 CONTACT_WEIGHT = 1e4  # of a coordinate of these landmarks, relative to a landmark of the cheek

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from lexicon.sequence import SILENCE
 from tts2face.models.talker import Talker
+from tts2face.numeric.arrays import Float32Array
 from tts2face.numeric.kernels import kernel
 
 MAX_CONTEXT = 6  # stored context phones on either side
 PAUSE_REACH_S = 0.25  # part of a silence that belongs to the adjacent speech, in which lips open or come to rest
-Float32Array = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,7 +9,6 @@ from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lexicon.errors import InputError, SilentTextError
 from lexicon.marked_text import MAX_PAUSE_S, Mark, MarkedText, NameMark, NodMark, StyleRun
@@ -20,6 +19,7 @@ from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.gestures.elements import Nod, StyleSpan, span_weights
 from tts2face.gestures.timeline import Timeline, parse_style
 from tts2face.models.palette import FEATURES, PLAIN, Delivery
+from tts2face.numeric.arrays import FloatArray
 from tts2face.request import Request
 from tts2face.session.joining import (
     SentenceTimes,
@@ -45,7 +45,6 @@ SPEED_CHANGE_PAUSE_S = 0.06  # between utterances that differ in speed only
 IDLE_PART_S = 10.0  # length of the parts of idle animation, similar to a long sentence
 IDLE_RATE = 48_000  # Hz, sample rate of idle animation
 LOUDNESS_RAMP_S = 0.03  # transition between two loudness levels
-Floats = NDArray[np.float64]
 Voices = Callable[[str | None, str], Voice]  # a voice by name (None: the best one) and language
 
 
@@ -148,7 +147,7 @@ def speak_sentence(
     parts: list[Phrase] = []
     spoken: list[Speech] = []
     word_times: list[WordTimes] = []
-    gains: list[Floats] = []
+    gains: list[FloatArray] = []
     volumes: list[float] = []  # of the sound; motion follows the voice's own loudness
     for part in sentence.utterances:
         speaker = speaker_of(part, voice, request, voices)
@@ -332,7 +331,7 @@ def _pause_after(utterance: Phrase) -> float:
     return max(PAUSES_S.get(utterance.source[-1:], 0.0), SPEED_CHANGE_PAUSE_S)
 
 
-def _gain(sound: Waveform, runs: Sequence[StyleRun], part: Phrase, times: WordTimes) -> Floats:
+def _gain(sound: Waveform, runs: Sequence[StyleRun], part: Phrase, times: WordTimes) -> FloatArray:
     """(n,) or (1,) gain of an utterance's samples, from the loudness of its runs."""
     volumes = [
         (run.volume, max(run.start, part.first), end)
@@ -348,11 +347,11 @@ def _gain(sound: Waveform, runs: Sequence[StyleRun], part: Phrase, times: WordTi
         end = times.end(last) if last < part.last else math.inf
         if start < end:
             gain += (volume - 1.0) * span_weights(seconds, start, end, LOUDNESS_RAMP_S)
-    factors: Floats = np.maximum(gain, 0.0)
+    factors: FloatArray = np.maximum(gain, 0.0)
     return factors
 
 
-def _scale_speech(speech: Speech, volume: float, gain: Floats) -> Speech:
+def _scale_speech(speech: Speech, volume: float, gain: FloatArray) -> Speech:
     """Speech times a volume and a gain, limited to full scale, from which motion is computed."""
     samples = apply_volume(speech.waveform.samples, volume)
     scaled = samples if len(gain) == 1 else apply_volume(samples * gain, 1.0)

@@ -16,7 +16,7 @@ from lexicon.errors import DataError
 from lexicon.phones import look_up_phone
 from lexicon.sequence import DOUBTFUL, SILENCE, PhoneSequence, WordSpan, concatenate_phones, enforce_increasing
 from tts2face.models.phone_classifier import PhoneClassifier, load_phone_classifier
-from tts2face.numeric.arrays import ordered_product, true_runs
+from tts2face.numeric.arrays import FloatArray, ordered_product, true_runs
 from tts2face.sound.pauses import Span
 from tts2face.sound.recogniser import ENGLISH, FEATURES, FRAME_S, Heard, PhoneRecogniser, levelled
 from tts2face.sound.segments import STEP_S, divide, frame_features
@@ -40,7 +40,6 @@ LEAST_SAID = 0.8
 N_LEFT_OUT = 6
 N_UNWRITTEN = 5  # phones heard in a silence
 WORDS_SHOWN = 8
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,7 +227,7 @@ class Aligner:
         return Alignment(phones, spans, fit, tuple(sorted(found, key=lambda mismatch: mismatch.begin)))
 
     def _choose(
-        self, frames: Floats, words: Sequence[Pronunciations], spikes: Floats, times: Sequence[Span] | None
+        self, frames: FloatArray, words: Sequence[Pronunciations], spikes: FloatArray, times: Sequence[Span] | None
     ) -> list[tuple[PlacedPhone | None, float, float]]:
         """Phones of the best division of a sound, None for silences, each with its start and end in seconds."""
         silence = self._classifier.inventory.index(SILENCE)
@@ -243,7 +242,7 @@ class Aligner:
         return [span for span in seconds if span[0] is not None or (span[2] > STEP_S and span[1] < end - STEP_S)]
 
 
-def _lenient(frames: Floats, inventory: Sequence[str]) -> Floats:
+def _lenient(frames: FloatArray, inventory: Sequence[str]) -> FloatArray:
     """Log probabilities (T, P) of frames, in which a phone may also be heard as another vowel, sonorant or obstruent.
 
     The end of a diphthong is a vowel of its own, and a voice that the classifier has not learnt is often misheard;
@@ -254,7 +253,7 @@ def _lenient(frames: Floats, inventory: Sequence[str]) -> Floats:
     alike = (classes[:, None] == classes) & sounds
     shares = OF_ITS_CLASS * alike + SOUNDING * (sounds[:, None] & sounds)
     np.fill_diagonal(shares, 1.0)
-    found: Floats = np.log(ordered_product(np.exp(frames), shares) + np.finfo(np.float64).tiny)
+    found: FloatArray = np.log(ordered_product(np.exp(frames), shares) + np.finfo(np.float64).tiny)
     return found
 
 
@@ -288,22 +287,22 @@ def recording_features(sound: Waveform, heard: NDArray[np.float32]) -> NDArray[n
     return np.concatenate([spectrum, around.reshape(len(spectrum), -1)], axis=1, dtype=np.float32)
 
 
-def spike_times(heard: NDArray[np.float32]) -> Floats:
+def spike_times(heard: NDArray[np.float32]) -> FloatArray:
     """Seconds at which the most probable phones begin in log probabilities (T, P + 1)."""
     best = heard.argmax(axis=1)
     is_new = (best != heard.shape[1] - 1) & (best != np.concatenate([[-1], best[:-1]]))
     return np.flatnonzero(is_new).astype(np.float64) * FRAME_S + FRAME_S / 2 - USUAL_DELAY_S
 
 
-def _confidence(spikes: Floats, words: PronouncedWords) -> Floats:
+def _confidence(spikes: FloatArray, words: PronouncedWords) -> FloatArray:
     """Probabilities (W,) that words are said: the sums of those of their pronunciations."""
     totals, at = spikes.sum(axis=0), 0
-    found: Floats = np.zeros(len(words))
+    found: FloatArray = np.zeros(len(words))
     for word, (_, alternatives) in enumerate(words):
         for phones in alternatives:
             found[word] += totals[at]
             at += len(phones)
-    sure: Floats = np.minimum(found, 1.0)
+    sure: FloatArray = np.minimum(found, 1.0)
     return sure
 
 
@@ -313,7 +312,7 @@ def _runs(chosen: NDArray[np.bool_], words: PronouncedWords, least: int) -> list
     return [(int(first), int(last)) for first, last in true_runs(chosen) if sum(lengths[first:last]) >= least]
 
 
-def _is_kept(confidence: Floats, words: PronouncedWords) -> NDArray[np.bool_]:
+def _is_kept(confidence: FloatArray, words: PronouncedWords) -> NDArray[np.bool_]:
     """Whether words (W,) are said; a short word alone is easily misheard, and so are all words in noise."""
     kept = np.ones(len(words), bool)
     for first, last in _runs(confidence < LEFT_OUT, words, N_LEFT_OUT):
@@ -326,7 +325,7 @@ def _is_kept(confidence: Floats, words: PronouncedWords) -> NDArray[np.bool_]:
 def _sequence(
     chosen: "Sequence[tuple[PlacedPhone | None, float, float]]",
     texts: Sequence[str],
-    confidence: Floats,
+    confidence: FloatArray,
     duration: float,
 ) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
     """Phones from 0 s to the end, and the words of them."""
@@ -345,7 +344,7 @@ def _sequence(
 
 def _unheard(
     words: PronouncedWords,
-    confidence: Floats,
+    confidence: FloatArray,
     kept: NDArray[np.bool_],
     phones: PhoneSequence,
     spans: Sequence[WordSpan],
@@ -364,7 +363,7 @@ def _unheard(
     return found
 
 
-def _unwritten(phones: PhoneSequence, heard: Floats) -> list[TextMismatch]:
+def _unwritten(phones: PhoneSequence, heard: FloatArray) -> list[TextMismatch]:
     """Silences of an alignment in which speech is heard."""
     counts = np.histogram(heard, phones.edges)[0]
     return [

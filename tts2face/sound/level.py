@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import FloatArray
 from tts2face.numeric.filters import moving_mean, moving_minimum
-from tts2face.sound.loudness import ABSOLUTE_GATE_LUFS, Floats, integrated_loudness, oversampled_peaks
+from tts2face.sound.loudness import ABSOLUTE_GATE_LUFS, integrated_loudness, oversampled_peaks
 from tts2face.types import Speech, Waveform, YieldTurn, keep_on
 
 LOUDNESS_LUFS = -16.0  # target for mono speech on phones and computers (AES TD1004: -16 to -20)
@@ -18,7 +19,9 @@ TOLERANCE_LU = 0.05
 MOST_STEPS = 12  # iterations; speech of espeak-ng takes 5
 
 
-def level_speech(speeches: Sequence[Speech], gains: Sequence[Floats], yield_turn: YieldTurn = keep_on) -> list[Speech]:
+def level_speech(
+    speeches: Sequence[Speech], gains: Sequence[FloatArray], yield_turn: YieldTurn = keep_on
+) -> list[Speech]:
     """Normalise utterances together to `LOUDNESS_LUFS`, apply a relative gain to each, and limit the peaks.
 
     Parameters
@@ -72,7 +75,7 @@ def limit_peaks(samples: NDArray[np.floating], rate: int) -> NDArray[np.float32]
     return limited
 
 
-def _limiting_gain(peaks: Floats, rate: int) -> Floats:
+def _limiting_gain(peaks: FloatArray, rate: int) -> FloatArray:
     """(n,) gain in (0, 1] that limits peaks (n,) to the ceiling: a moving minimum, then a moving average.
 
     Each value averages gains that all suffice at its sample, so that no peak exceeds the ceiling.

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
+from tts2face.numeric.arrays import FloatArray
 from tts2face.numeric.kernels import kernel
 from tts2face.types import Waveform
 
 ABSOLUTE_GATE_LUFS = -70.0
-Floats = NDArray[np.float64]
 BLOCK_S, STEP_S = 0.4, 0.1  # gating blocks overlap by 75 % (BS.1770-4, annex 1)
 OFFSET_LUFS = -0.691  # cancels the gain of the K-weighting at 997 Hz
 RELATIVE_GATE_LU = -10.0
@@ -49,7 +49,7 @@ def integrated_loudness(sounds: Sequence[Waveform]) -> float:
     return float(_lufs(audible[_lufs(audible) > gate].mean()))
 
 
-def oversampled_peaks(samples: NDArray[np.floating]) -> Floats:
+def oversampled_peaks(samples: NDArray[np.floating]) -> FloatArray:
     """(n,) largest magnitude of the continuous signal between each of n samples and the next one."""
     peaks = np.abs(np.asarray(samples, np.float64))
     if len(peaks):
@@ -60,7 +60,7 @@ def oversampled_peaks(samples: NDArray[np.floating]) -> Floats:
     return peaks
 
 
-def block_powers(sound: Waveform) -> Floats:
+def block_powers(sound: Waveform) -> FloatArray:
     """(B,) mean square of the K-weighted sound in blocks of 400 ms that begin every 100 ms."""
     if sound.rate < LOWEST_RATE:
         raise InputError(
@@ -73,11 +73,11 @@ def block_powers(sound: Waveform) -> Floats:
         filter_biquad(numerator, denominator, weighted)
     sums = np.concatenate([[0.0], np.cumsum(np.square(weighted))])
     starts = np.arange(0, len(weighted) - block + 1, step)
-    powers: Floats = np.maximum(sums[starts + block] - sums[starts], 0.0) / block
+    powers: FloatArray = np.maximum(sums[starts + block] - sums[starts], 0.0) / block
     return powers
 
 
-def k_weighting(rate: int) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
+def k_weighting(rate: int) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
     """Numerator and denominator of the shelving filter and of the high-pass filter at a sample rate in Hz."""
     k = np.tan(np.pi * SHELF_HZ / rate)
     top = 10 ** (SHELF_DB / 20)
@@ -100,7 +100,7 @@ def k_weighting(rate: int) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]
 
 
 @kernel
-def filter_biquad(numerator: Floats, denominator: Floats, samples: Floats) -> None:
+def filter_biquad(numerator: FloatArray, denominator: FloatArray, samples: FloatArray) -> None:
     """Replace samples (n,) by those filtered with a second-order section from rest (transposed direct form II).
 
     numerator, denominator: (3,) coefficients; the first one of the denominator is 1.
@@ -114,14 +114,14 @@ def filter_biquad(numerator: Floats, denominator: Floats, samples: Floats) -> No
 
 
 @cache
-def _interpolation_filter() -> Floats:
+def _interpolation_filter() -> FloatArray:
     """(81,) low-pass filter for fourfold oversampling: a sinc in a Kaiser window over 20 periods of the samples."""
     half = FILTER_PERIODS * OVERSAMPLING
     taps = np.sinc(np.arange(-half, half + 1) / OVERSAMPLING) * np.kaiser(2 * half + 1, KAISER_BETA)
-    normalised: Floats = taps * (OVERSAMPLING / taps.sum())
+    normalised: FloatArray = taps * (OVERSAMPLING / taps.sum())
     return normalised
 
 
-def _lufs(power: Floats | np.floating) -> Floats:
-    levels: Floats = OFFSET_LUFS + 10.0 * np.log10(np.maximum(power, 10 ** (SILENT_DB / 10)))
+def _lufs(power: FloatArray | np.floating) -> FloatArray:
+    levels: FloatArray = OFFSET_LUFS + 10.0 * np.log10(np.maximum(power, 10 ** (SILENT_DB / 10)))
     return levels

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lexicon.sequence import SILENCE, enforce_increasing
 from tts2face.models.phone_classifier import PhoneClassifier
-from tts2face.numeric.arrays import ordered_product
+from tts2face.numeric.arrays import FloatArray, IntArray, ordered_product
 from tts2face.numeric.kernels import kernel
 from tts2face.sound.features import mel_bands
 from tts2face.types import Waveform
@@ -38,8 +38,6 @@ SHORTEST, SHORTEST_SILENCE = 3, 6  # frames
 LONGEST_SHARE = 5  # of the longest stated duration
 REACH = 80  # frames around the stated start, at the usual rate
 USUAL_DURATION_S = 0.08  # of phones; what is stated for slower speech is less exact
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,15 +82,15 @@ class Segments(NamedTuple):
         Log probabilities that a segment begins and ends in each frame after the earliest one of its joint.
     """
 
-    labels: Ints
-    joints: Ints
-    shortest: Ints
-    passed: Floats
-    taken: Floats
-    durations: Floats
-    bounds: Ints
-    begins: Floats
-    ends: Floats
+    labels: IntArray
+    joints: IntArray
+    shortest: IntArray
+    passed: FloatArray
+    taken: FloatArray
+    durations: FloatArray
+    bounds: IntArray
+    begins: FloatArray
+    ends: FloatArray
 
 
 class Divisions(NamedTuple):
@@ -106,17 +104,17 @@ class Divisions(NamedTuple):
         Its last segment, and the frame at which that begins.
     """
 
-    score: Floats
-    entered: Ints
-    before: Ints
+    score: FloatArray
+    entered: IntArray
+    before: IntArray
 
 
 class Endings(NamedTuple):
     """Ways through one segment: the score at each start (W,), the best at each end (W,), and the start that has it."""
 
-    starts: Floats
-    reached: Floats
-    start: Ints
+    starts: FloatArray
+    reached: FloatArray
+    start: IntArray
 
 
 def divide(log_probabilities: NDArray[np.floating], segments: Segments) -> list[tuple[int, int, int]]:
@@ -207,7 +205,7 @@ def _end_unlimited(starts, frames, shortest, out):  # type: ignore[no-untyped-de
         out.reached[end - low], out.start[end - low] = best, best_at
 
 
-def find_edges(sound: Waveform, stated: Sequence[StatedPhone], classifier: PhoneClassifier) -> Floats:
+def find_edges(sound: Waveform, stated: Sequence[StatedPhone], classifier: PhoneClassifier) -> FloatArray:
     """(N + 1,) starts of N stated phones in seconds, and the end of the sound; a skipped one begins with the next one.
 
     Parameters
@@ -230,7 +228,7 @@ def find_edges(sound: Waveform, stated: Sequence[StatedPhone], classifier: Phone
 
 
 def _stated_segments(
-    stated: Sequence[StatedPhone], starts: Floats, n_frames: int, classifier: PhoneClassifier
+    stated: Sequence[StatedPhone], starts: FloatArray, n_frames: int, classifier: PhoneClassifier
 ) -> Segments:
     """Segments one after another, near the stated starts and durations."""
     number = {label: at for at, label in enumerate(classifier.inventory)}

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import FloatArray
 from tts2face.numeric.kernels import kernel
 
 # Log probabilities, chosen on voices in noise with right, wrong and incomplete transcripts.
@@ -18,11 +19,10 @@ LEAST = -12.0  # of a phone in a frame
 UNWRITTEN = -4.0  # of a frame between words in which something else is heard
 UNSAID = -8.0  # of a word that is left out
 NEVER = -np.inf
-Floats = NDArray[np.float64]
 Pronounced = Sequence[Sequence[Sequence[int]]]  # columns of the phones of all pronunciations of each word
 
 
-def find_spikes(log_probabilities: NDArray[np.float32], words: Pronounced, unsaid: float) -> Floats:
+def find_spikes(log_probabilities: NDArray[np.float32], words: Pronounced, unsaid: float) -> FloatArray:
     """Probabilities (T, N) with which each phone begins in each frame, in the order of words, pronunciations, phones.
 
     Their sum over the frames is the probability that the phone is said.
@@ -50,7 +50,7 @@ class _States:
     def __init__(self, words: Pronounced, unsaid: float, blank: int) -> None:
         self.columns: list[int] = []
         self.before: list[NDArray[np.int64]] = []  # the states before each one, and the log probabilities of the steps
-        self.costs: list[Floats] = []
+        self.costs: list[FloatArray] = []
         self.phones: list[int] = []  # numbers of the states
         self.between: list[int] = [self._add(blank, [])]
         self.ends = self.between[:]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from lexicon.phones import nearest_phones
 from lexicon.sequence import SILENCE
 from tts2face.models.phone_classifier import PhoneClassifier
+from tts2face.numeric.arrays import FloatArray
 from tts2face.sound.pauses import Span
 from tts2face.sound.recogniser import FRAME_S
 from tts2face.sound.segments import STEP_S, Segments
@@ -27,7 +28,6 @@ LONGEST_S = 0.45
 LEAST_DURATION = -6.0  # log probability of any duration up to the longest
 Pronunciations = Sequence[tuple[str, ...]]  # alternatives of one word, in phones of the table
 PronouncedWords = Sequence[tuple[str, Pronunciations]]
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,17 +51,17 @@ class PlacedPhone:
         first, last = np.searchsorted(np.cumsum(self.spike), (TAIL, 1.0 - TAIL))
         return float(self.times[first]), float(self.times[min(int(last), len(self.times) - 1)])
 
-    def passed(self, times: Floats) -> Floats:
+    def passed(self, times: FloatArray) -> FloatArray:
         """Probability that the middle lies before given times."""
         from scipy.special import ndtr
 
         heavy = np.flatnonzero(self.spike > LEAST_SPIKE)
-        share: Floats = self.spike[heavy] @ ndtr((times - self.times[heavy, None]) / SPIKE_SPREAD_S)
+        share: FloatArray = self.spike[heavy] @ ndtr((times - self.times[heavy, None]) / SPIKE_SPREAD_S)
         return np.minimum(share, 1.0)
 
 
 def place_phones(
-    classifier: PhoneClassifier, words: Sequence[Pronunciations], spikes: Floats
+    classifier: PhoneClassifier, words: Sequence[Pronunciations], spikes: FloatArray
 ) -> list[list[list[PlacedPhone]]]:
     """Phones of the pronunciations of words, with their spikes."""
     known = sounding(classifier)
