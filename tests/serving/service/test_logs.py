@@ -109,7 +109,7 @@ def test_texts_are_logged_if_the_setting_says_so(caplog: pytest.LogCaptureFixtur
     state.pool = FakePool()  # type: ignore[assignment]
 
     async def make() -> None:
-        async for _ in state.messages(state.work(request={"text": "my words"}), LOCAL_KEY):
+        async for _ in state.results.messages(state.results.work(request={"text": "my words"}), LOCAL_KEY):
             pass
 
     with caplog.at_level(logging.INFO, LOG.name):

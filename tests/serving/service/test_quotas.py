@@ -112,7 +112,7 @@ def first_part(state: ServiceState, key: ApiKey) -> None:
     """Begin a work and cancel it after its first part."""
 
     async def begin() -> None:
-        messages = state.messages(state.work(request={"text": "Hello."}), key)
+        messages = state.results.messages(state.results.work(request={"text": "Hello."}), key)
         await anext(messages)
         await messages.aclose()  # type: ignore[attr-defined]
 
@@ -137,7 +137,7 @@ def test_long_words_are_refused_before_any_work() -> None:
     state = make_state()
 
     async def begin() -> None:
-        await anext(state.messages(state.work(request={"text": "1" * 201}), LOCAL_KEY))
+        await anext(state.results.messages(state.results.work(request={"text": "1" * 201}), LOCAL_KEY))
 
     with pytest.raises(RefusedError, match="a word of more than 200 characters"):
         asyncio.run(begin())

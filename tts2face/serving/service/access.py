@@ -52,6 +52,13 @@ class KeyRing:
             raise _unauthorized(f"the API key {key.name} has been removed; connect with another one")
         return found
 
+    def with_scope(self, key: ApiKey, scope: str) -> ApiKey:
+        """A key as it is now, if it has a scope."""
+        key = self.current(key)
+        if scope not in key.scopes:
+            raise RefusedError(403, "forbidden", f"the key {key.name} lacks the scope {scope}; use another key")
+        return key
+
     def loss_of(self, key: ApiKey) -> RefusedError | None:
         """Why what is open for a key ends: it has been removed, or may do less than it might; None: neither."""
         if key is NOBODY:

@@ -64,7 +64,7 @@ class Adjustments:
 
     async def note_words(self, state: ServiceState, text: str, language: str) -> None:
         """Note what is done with words of other writing systems."""
-        state.check_length(text)
+        state.results.check_length(text)
         self.made += await asyncio.to_thread(reading_notes, text, language_code(language))
 
     def on(self, response: Answer) -> Answer:
@@ -189,7 +189,7 @@ async def spoken_fields(state: ServiceState, key: ApiKey, asked: Any, adjustment
     """Options of a clip for a request with OpenAI's fields: input, model, voice, speed, language, volume."""
     voice = asked.voice if isinstance(asked.voice, str) else str(asked.voice.get("id", ""))
     language = asked.language or asked.lang_code
-    state.check_length(asked.input)
+    state.results.check_length(asked.input)
     text = with_marks(asked.input)
     name, code = await asyncio.to_thread(choose_voice, voice, language, text, adjustments)
     await adjustments.note_words(state, text, code)

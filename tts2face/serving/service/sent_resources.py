@@ -68,7 +68,7 @@ async def store_resource(state: ServiceState, key: ApiKey, sent: Sent) -> Stored
         The key may not build, the name is wrong or taken, the quota is used up, too many files are checked, or this
         one is refused.
     """
-    key = state.key_with(key, "build")
+    key = state.keys.with_scope(key, "build")
     check_new_name(sent.kind, sent.name)
     await asyncio.to_thread(state.library.check_room, key, sent.kind, sent.name, sent.size)
     async with upload_folder(state.settings, state.decoders, key.name) as folder:
@@ -111,7 +111,7 @@ async def find_photo_places(
         The operator allows no photos, the key may not build or reads one already, too many files are checked, or it
         shows no face.
     """
-    key = state.key_with(key, "build")
+    key = state.keys.with_scope(key, "build")
     with _photo_turn(state, key, counts=False):
         folder.state(photo, {"name": photo.name})
         return await folder.places(photo)

@@ -64,7 +64,7 @@ class ComparedProject:
         self._on_change = on_change
         self._folder = workspace.folder / FOLDER
         self.preview = ProjectPreview(
-            lambda work: state.messages(work, workspace.key),
+            lambda work: state.results.messages(work, workspace.key),
             memory,
             on_change=on_change,
             on_fit=self._finish,
@@ -159,7 +159,7 @@ class ComparedProject:
     async def recordings(self) -> list[tuple[str, str]]:
         """Names of the talker's recordings with their words."""
         work = await self._workspace.work("recordings")
-        async for event, _ in events_of(self._state.messages(work, self._workspace.key)):
+        async for event, _ in events_of(self._state.results.messages(work, self._workspace.key)):
             return [(name, words) for name, words in event["recordings"]]
         return []
 
@@ -175,7 +175,7 @@ class ComparedProject:
                 "measure", motion=str(path), channels=header["channels"], fps=header["fps"],
                 sentences=[] if self.reference.is_recorded else header["sentences"],
             )  # fmt: skip
-            async for event, _ in events_of(self._state.messages(work, self._workspace.key)):
+            async for event, _ in events_of(self._state.results.messages(work, self._workspace.key)):
                 return {name: value for name, value in event.items() if name != "type"}
         raise InputError(NOT_READY)
 

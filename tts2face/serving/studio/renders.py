@@ -100,7 +100,7 @@ class Renders:
         work = await project_work(self._state, key, project, folder, kind, **more)
         with translate_disk_errors(path):
             with part.open("wb") as file:
-                async with aclosing(self._state.messages(work, key, priority=PRIORITY)) as messages:  # type: ignore[type-var]
+                async with aclosing(self._state.results.messages(work, key, priority=PRIORITY)) as messages:  # type: ignore[type-var]
                     async for message in messages:
                         file.write(message.payload)
                         render.show("", render.done + message.content["seconds"], render.of)

@@ -128,7 +128,7 @@ def studio_folder(state: ServiceState) -> Path:
 async def data_of(state: ServiceState, key: ApiKey, work: Work) -> bytes:
     """All bytes of a task's result."""
     content = bytearray()
-    async with aclosing(state.messages(work, key)) as messages:  # type: ignore[type-var]
+    async with aclosing(state.results.messages(work, key)) as messages:  # type: ignore[type-var]
         async for message in messages:
             content += message.payload
     return bytes(content)

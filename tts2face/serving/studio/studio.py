@@ -121,7 +121,7 @@ class Studio:
     async def _prepare(self) -> None:
         """Make the face in a process of its own: it takes seconds, in which one of the service would answer nobody."""
         project = Project()
-        work = self.state.work(kind="face", models=asdict(project.models), request={"has_gestures": True})
+        work = self.state.results.work(kind="face", models=asdict(project.models), request={"has_gestures": True})
         with suppress(RefusedError, Tts2faceError):  # the first page says why
             await self._face_file(project, work, self.state.pool.make_aside)
 
@@ -148,7 +148,7 @@ class Studio:
         """File of the default head without gestures, as takes move it; errors as `face`."""
         project = Project()
         project = replace(project, request=replace(project.request, gestures="none"))
-        work = self.state.work(kind="face", models=asdict(project.models), request={"has_gestures": False})
+        work = self.state.results.work(kind="face", models=asdict(project.models), request={"has_gestures": False})
         return await self._face_file(project, work, self._maker(key))
 
     def _maker(self, key: ApiKey) -> Callable[[Work], Awaitable[bytes]]:

@@ -167,7 +167,7 @@ class Styles:
     async def _draw(self, key: ApiKey, request: dict[str, Any]) -> bytes:
         models = {"palette": self.store.base(key.name)}
         state = self._studio.state
-        return await data_of(state, key, state.work(kind="swatch", models=models, request=request))
+        return await data_of(state, key, state.results.work(kind="swatch", models=models, request=request))
 
     def _order(self, owner: str) -> Path:
         return self.store.take_folder(owner) / ORDER

@@ -97,8 +97,8 @@ class Takes:
         file = folder / PREVIEW
         if not file.is_file():
             sound = str(folder / SOUND) if entry.has_sound else None
-            work = self._studio.state.work(kind="take", request={"take": str(folder / TABLE), "sound": sound})
-            async for event, content in events_of(self._studio.state.messages(work, key)):
+            work = self._studio.state.results.work(kind="take", request={"take": str(folder / TABLE), "sound": sound})
+            async for event, content in events_of(self._studio.state.results.messages(work, key)):
                 await asyncio.to_thread(write_atomically, file, take_bundle(event, content))
         return await asyncio.to_thread(file.read_bytes)
 

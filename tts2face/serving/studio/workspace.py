@@ -45,7 +45,7 @@ class Workspace:
         self.folder: Path = store.folder(number, key.name)
         self.history: History = store.read(number, key.name)
         self.preview = ProjectPreview(
-            lambda work: state.messages(work, self.key),
+            lambda work: state.results.messages(work, self.key),
             memory,
             on_change=self._show_preview,
             on_fit=self._fit,

@@ -32,14 +32,14 @@ async def prepare_clip(order: JobOrder) -> dict[str, Any]:
     given: dict[str, Any] = order.options.model_dump(exclude_none=True, exclude_defaults=True)
     format = given.pop("format", ClipRequest.model_fields["format"].default)
     fields = await divide_options(order.state, order.key, given)
-    order.state.check_length(given.get("text", ""))
+    order.state.results.check_length(given.get("text", ""))
     has_audio = FILES["audio"] in order.upload.files
     if not (given.get("text", "").strip() or has_audio or "idle" in given or "listen" in given):
         raise RefusedError(400, "invalid_request", "there is nothing to say; give text, audio, idle or listen")
     sounds = {name: Path(file) for name, file in FILES.items() if name != "timeline" and file in order.upload.files}
     Request(**fields.request | sounds)
     Picture(**fields.picture)
-    work = order.state.work(models=fields.models, request=fields.request, picture=fields.picture, format=format)
+    work = order.state.results.work(models=fields.models, request=fields.request, picture=fields.picture, format=format)
     return work.as_json()
 
 

@@ -131,7 +131,7 @@ async def prepare_subtitles(order: JobOrder) -> dict[str, Any]:
     picture = Picture(**fields.picture)
     if picture.is_transparent and options.get("format", "mp4") in {"mp4", "mov"}:
         raise RefusedError(400, "invalid_request", "mp4 and mov have no transparency; choose webm")
-    work = order.state.work(models=fields.models, request=fields.request, picture=fields.picture)
+    work = order.state.results.work(models=fields.models, request=fields.request, picture=fields.picture)
     tables = _cast_tables(cast)
     resolved = [await _resolve_role(order, role) for role in (tables.get("default", {}), *tables.get("role", []))]
     return {

@@ -107,5 +107,7 @@ async def _answer(
     picture = fields.picture | {name: files[name] for name in ("background",) if name in files}
     spoken = fields.request | {name: files[name] for name in (*SOUNDS, "timeline") if name in files}
     keeps_pace = format in MOVIE_KINDS and not clip.model_fields_set & {"quality", "supersampling"}
-    work = state.work(models=fields.models, request=spoken, picture=picture, format=format, keeps_pace=keeps_pace)
+    work = state.results.work(
+        models=fields.models, request=spoken, picture=picture, format=format, keeps_pace=keeps_pace
+    )
     return adjustments.on(await stream_work(request, work, media_types()[format], resources=resources))

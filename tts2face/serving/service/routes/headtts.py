@@ -135,7 +135,7 @@ async def _answer(connection: WebSocket, setup: dict[str, Any], message: dict[st
     """Answer one ``synthesize``, which counts as a request."""
     reference = message.get("id")
     try:
-        service_state(connection).count(connection.state.key)
+        service_state(connection).permissions.count(connection.state.key)
         body = HeadTtsRequest(**(setup | (message.get("data") or {})))
         content, sound = await _speak(connection, body, Adjustments())
     except (RefusedError, ValueError, TypeError) as error:
@@ -160,7 +160,7 @@ async def _speak(
     state = service_state(request)
     await adjustments.note_words(state, text, body.language)
     fields = await resolve_dictionary(state.library, request.state.key, fields)
-    events, pcm = await timed_speech(request, state.work(kind="speech", request=fields))
+    events, pcm = await timed_speech(request, state.results.work(kind="speech", request=fields))
     rate = events[0]["rate"] if events else 24_000
     sound = pcm if body.audioEncoding == "pcm" else wav_header(rate, len(pcm)) + pcm
     return audio_fields(events, subtitles) | {"audioEncoding": body.audioEncoding}, sound

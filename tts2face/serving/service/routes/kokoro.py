@@ -107,8 +107,8 @@ async def phonemize(request: HttpRequest, asked: PhonesRequest) -> dict[str, Any
     """The phones that a voice of the language speaks."""
     language = language_code(KOKORO_LANGUAGES.get(asked.language, asked.language))
     state = service_state(request)
-    state.check_length(asked.text)
-    work = state.work(kind="phones", request={"text": with_marks(asked.text), "language": language})
+    state.results.check_length(asked.text)
+    work = state.results.work(kind="phones", request={"text": with_marks(asked.text), "language": language})
     (event,), _ = await timed_speech(request, work)
     return {"phonemes": " ".join(event["words"]), "tokens": []}
 
@@ -131,10 +131,10 @@ class PhonesToSpeak(BaseModel):
 async def generate_from_phonemes(request: HttpRequest, asked: PhonesToSpeak) -> Response:
     """Sound of phones as a complete .wav file."""
     adjustments, state = Adjustments(), service_state(request)
-    state.check_length(asked.phonemes)
+    state.results.check_length(asked.phonemes)
     voice, language = await asyncio.to_thread(choose_voice, asked.voice, None, "", adjustments)
     spoken = {"text": phones_text(asked.phonemes), "voice": voice, "language": language}
-    work = state.work(request=spoken, format="wav", is_complete=True)
+    work = state.results.work(request=spoken, format="wav", is_complete=True)
     return adjustments.on(await stream_work(request, work, media_types()["wav"]))
 
 

@@ -84,10 +84,10 @@ async def stream(connection: WebSocket) -> None:
         receiver = _Sound(options.rate)
     else:
         limits = state.settings.live_characters, state.settings.live_characters_per_minute
-        receiver = LiveText(str(given.get("language", "en-us")), limits, lambda: state.count(key))
+        receiver = LiveText(str(given.get("language", "en-us")), limits, lambda: state.permissions.count(key))
     kind = "listen" if isinstance(receiver, _Sound) else "live"
-    work = state.work(kind=kind, models=models, request=given)
-    sending = asyncio.create_task(_send(connection, state.messages(work, key, receiver.inputs), receiver))
+    work = state.results.work(kind=kind, models=models, request=given)
+    sending = asyncio.create_task(_send(connection, state.results.messages(work, key, receiver.inputs), receiver))
     receiving = asyncio.create_task(_receive(connection, receiver))
     try:
         await asyncio.wait({sending, receiving}, return_when=asyncio.FIRST_COMPLETED)

@@ -154,7 +154,7 @@ async def speech_work(
     if asked.volume_multiplier is not None:
         given["volume"] = asked.volume_multiplier
     options = await divide_options(state, key, given)
-    return state.work(models=options.models, request=options.request, **fields)
+    return state.results.work(models=options.models, request=options.request, **fields)
 
 
 def timed(event: Mapping[str, Any], names: Sequence[str]) -> dict[str, list[dict[str, Any]]]:

@@ -37,7 +37,7 @@ async def stream_work(
         Closed when the answer is complete or has failed.
     """
     state, stack = service_state(request), resources or AsyncExitStack()
-    messages = state.messages(work, request.state.key)
+    messages = state.results.messages(work, request.state.key)
     convert = convert or DataBytes(media_type)
     chunks = convert(messages)
     try:
@@ -104,7 +104,7 @@ async def timed_speech(request: HttpRequest | WebSocket, work: Work) -> tuple[li
     events: list[dict[str, Any]] = []
     sound = bytearray()
     state = service_state(request)
-    async with aclosing(state.messages(work, request.state.key)) as messages:  # type: ignore[type-var]
+    async with aclosing(state.results.messages(work, request.state.key)) as messages:  # type: ignore[type-var]
         async for message in messages:
             sound += message.payload
             if "event" in message.content:

@@ -206,7 +206,7 @@ async def download_render(request: HttpRequest, project: str, number: str) -> Fi
 async def explain(studio: Studio, workspace: Workspace, time: float) -> dict[str, Any]:
     """The phone at a time with the recorded examples that made it; ``phone`` is None where there is none."""
     work = await workspace.work("explain", time=time)
-    async for event, _ in events_of(studio.state.messages(work, workspace.key)):
+    async for event, _ in events_of(studio.state.results.messages(work, workspace.key)):
         return event
     raise InputError("the clip has no phones; give a text, or the words of its recording")
 

@@ -1,0 +1,159 @@
+"""Results of synthesis processes: the messages of a `Work`, within the limits of its key, counted and cached."""
+
+from collections.abc import AsyncIterator
+from contextlib import aclosing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from lexicon.errors import Tts2faceError
+from tts2face.processes.message import RESULT, Message
+from tts2face.serving.service.access import KeyRing
+from tts2face.serving.service.errors import RefusedError, as_refused
+from tts2face.serving.service.exchange import while_client_stays
+from tts2face.serving.service.keys import LOCAL_KEY, ApiKey
+from tts2face.serving.service.logs import log_event
+from tts2face.serving.service.long_words import check_words
+from tts2face.serving.service.messages import QUALITY, SYNTHESISE, Work
+from tts2face.serving.service.metrics import Metrics, quality_labels
+from tts2face.serving.service.pool import STREAM_PRIORITY, Pool
+from tts2face.serving.service.preparation import Step
+from tts2face.serving.service.rate_limits import RateLimits
+from tts2face.serving.service.result_cache import CACHED_KINDS, ResultCache
+from tts2face.serving.service.settings import ServiceSettings
+from tts2face.serving.service.warm_process import InputQueue, work_call
+
+WARM_TEXT = "Hi."
+
+
+def warm_steps(settings: ServiceSettings) -> tuple[Step, ...]:
+    """Steps of synthesis processes: the longest compilation first, then the voice and the models of a movie."""
+    first = {"voice": new_work(settings, kind="speech", request={"text": WARM_TEXT}),
+             "models": new_work(settings, format="mp4", request={"text": WARM_TEXT})}  # fmt: skip
+    kernels = {f"kernels of {part}": f"compile_{part}" for part in ("pictures", "motion", "gestures", "sound")}
+    return (
+        *(Step(name, call, first["models"].models, is_shared=True) for name, call in kernels.items()),
+        *(Step(name, SYNTHESISE, work_call(work)) for name, work in first.items()),
+    )
+
+
+def new_work(settings: ServiceSettings, *, models: dict[str, Any] | None = None, **fields: Any) -> Work:
+    """A `Work` with the models of the settings unless it names others."""
+    defaults = {"talker": settings.talker, "face": settings.face, "palette": settings.palette}
+    return Work(models=defaults | (models or {}), owner=_common_owner(settings), **fields)
+
+
+def _common_owner(settings: ServiceSettings) -> str:
+    """For whom processes keep finished sentences, whoever asks: the one user of a service without keys."""
+    return LOCAL_KEY.name if settings.studio and settings.keys is None else ""
+
+
+@dataclass(frozen=True, slots=True)
+class Permissions:
+    """Which keys may have something spoken now: those that exist, have the scope speak, and have seconds left."""
+
+    keys: KeyRing
+    limits: RateLimits
+
+    def speaking_key(self, key: ApiKey) -> ApiKey:
+        """A key as it is now, if it may have something spoken."""
+        key = self.keys.with_scope(key, "speak")
+        self.limits.check_speech(key)
+        return key
+
+    def count(self, key: ApiKey) -> None:
+        """Count an utterance of an open WebSocket as a request of its key; errors as `speaking_key` and the limits."""
+        self.limits.count(self.speaking_key(key))
+
+
+class Results:
+    """Messages of what clients ask for, from the cache or from a process."""
+
+    def __init__(
+        self,
+        settings: ServiceSettings,
+        permissions: Permissions,
+        pool: Pool,
+        metrics: Metrics,
+        cache: ResultCache | None,
+    ) -> None:
+        self._settings, self._permissions = settings, permissions
+        self._pool, self._metrics = pool, metrics
+        self._cache = cache
+
+    def work(self, *, models: dict[str, Any] | None = None, **fields: Any) -> Work:
+        """A `Work` with the models of the settings unless it names others."""
+        return new_work(self._settings, models=models, **fields)
+
+    def check_length(self, text: str) -> None:
+        """Refuse a text of more than `text_characters`."""
+        most = self._settings.text_characters
+        if len(text) > most:
+            raise RefusedError(413, "too_long", f"the text has more than {most} characters; divide it")
+
+    async def messages(
+        self, work: Work, key: ApiKey, inputs: InputQueue | None = None, priority: int = STREAM_PRIORITY
+    ) -> AsyncIterator[Message]:
+        """Messages of a task, without the last one; counted in the metrics.
+
+        A task of a higher `priority` runs in its process when no other one can.
+
+        Raises
+        ------
+        RefusedError
+            The task failed, or too many tasks wait.
+        ClientDisconnect
+            The client of the present request has left; the work no longer waits, or has been stopped.
+        """
+        self.check_length(str(work.request.get("text", "")))
+        key = self._permissions.speaking_key(key)
+        made = 0.0
+        if self._settings.log_text and work.request.get("text"):
+            log_event("text", text=work.request["text"])
+        try:
+            check_words(str(work.request.get("text", "")))
+            async with aclosing(self._stream(work, key, inputs, priority)) as stream:  # type: ignore[type-var]
+                while True:
+                    with while_client_stays():
+                        message = await anext(stream)
+                    seconds = message.content["seconds"]
+                    if message.kind == RESULT:
+                        self._permissions.limits.add_speech(key, seconds - made)  # of parts without content
+                        self._metrics.speech.inc(seconds)
+                        self._metrics.cpu.inc(message.content["cpu_s"])
+                        return
+                    made += seconds
+                    self._permissions.limits.add_speech(key, seconds)
+                    if self._settings.log_text and work.kind == "live" and "event" in message.content:
+                        _log_spoken(message)
+                    self._note_quality(message)
+                    yield message
+        except Tts2faceError as error:
+            refused = as_refused(error, _folders(work))
+            self._metrics.failures.labels(refused.code).inc()
+            raise refused from error
+
+    def _note_quality(self, message: Message) -> None:
+        event = message.content.get("event", {})
+        if event.get("type") == QUALITY:
+            samples, frames = quality_labels(event["has_all_samples"], event["frame_step"])
+            self._metrics.quality.labels(samples, frames).inc()
+            log_event("quality", samples=samples, frames=frames)
+
+    def _stream(self, work: Work, key: ApiKey, inputs: InputQueue | None, priority: int) -> AsyncIterator[Message]:
+        """Messages of a task from the cache, or from a process."""
+        made = self._pool.stream(work, key.name, priority, inputs)
+        if self._cache is None or work.kind not in CACHED_KINDS:
+            return made
+        return self._cache.messages(work, made)
+
+
+def _folders(work: Work) -> set[Path]:
+    """Folders of the files that a task reads, uploads among them."""
+    values = [value for fields in (work.models, work.request, work.picture) for value in fields.values()]
+    return {Path(value).parent for value in values if isinstance(value, str | Path) and Path(value).is_absolute()}
+
+
+def _log_spoken(message: Message) -> None:
+    if text := message.content["event"].get("text"):
+        log_event("text", text=text)
