@@ -14,7 +14,10 @@ from tts2face.request import option_fields
 MOVIE_FORMATS = ("mp4", "webm", "mov", "none")
 CLIP_UNITS = ("cue", "scene", "file", "film")
 MAX_OVERLAP_S = 2.0  # more is no overlap but two lines at once
-EXTEND, CUT_PAUSES, REPORT = OVERFLOW_POLICIES = ("extend", "cut-pauses", "report")
+EXTEND = "extend"
+CUT_PAUSES = "cut-pauses"
+REPORT = "report"
+OVERFLOW_POLICIES = (EXTEND, CUT_PAUSES, REPORT)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""Who speaks a line: its models and request by cast and table, and how speakers without a role are told apart."""
+"""Who speaks a line: its models and request by cast and table, and how speakers without a role differ."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace

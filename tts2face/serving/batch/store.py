@@ -1,4 +1,4 @@
-"""Rendered segments in a content store: a movie and its result. A segment appears complete or not at all."""
+"""Rendered segments in a content store: a movie and its result, which appear complete or not at all."""
 
 import json
 import time

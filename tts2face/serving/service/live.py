@@ -34,7 +34,7 @@ GROWING_S = 0.02  # after which is looked again whether another stream has made 
 class LiveTask:
     """One live stream: inputs are ``say``, ``listen``, ``heard``, ``cancel`` and ``end``; results are events and sound.
 
-    The text of ``say`` is a sentence; ``said`` with their number ``n`` tells which ones are spoken or forgotten. From
+    The text of ``say`` is a sentence; ``said`` with their number ``n`` names those that are spoken or forgotten. From
     ``listen`` to the next sentence the face listens; the payload of ``heard`` is 16-bit sound of the partner.
 
     Parameters

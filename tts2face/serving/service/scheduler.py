@@ -18,6 +18,7 @@ Result = TypeVar("Result")
 
 AHEAD_S = 1.0  # by which a result is ahead of its listener before those of other keys that are not go first
 CREDIT_S = 1.0  # of computing that a key which has been idle is ahead of the others: a few sentences, or one movie
+_CURRENT = threading.local()
 
 
 class InterruptedTaskError(Exception):
@@ -246,9 +247,6 @@ class OneAtATime:
             future.set_result(result)
         if task is not None:
             task.charge(time.monotonic() - began)
-
-
-_CURRENT = threading.local()
 
 
 def lead() -> float:

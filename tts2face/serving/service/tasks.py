@@ -62,8 +62,9 @@ def _timed_event(timed: "Piece") -> Event:
     from tts2face.interchange.exports.labels import Label
     from tts2face.interchange.exports.visemes import viseme_labels
 
-    spoken, phones, begin = timed.speech, timed.speech.phones, timed.begin
-    times = [(float(a) + begin, float(b) + begin) for a, b in zip(phones.edges, phones.edges[1:], strict=False)]
+    spoken, start = timed.speech, timed.begin
+    phones = spoken.phones
+    times = [(float(a) + start, float(b) + start) for a, b in zip(phones.edges, phones.edges[1:], strict=False)]
     labels = [Label(phone, *span) for phone, span in zip(phones.phones, times, strict=True)]
     return Event({
         "rate": spoken.waveform.rate,

@@ -21,6 +21,7 @@ from tts2face.serving.service.state import service_state
 from tts2face.session.encoded_stream import media_types
 
 router = APIRouter(tags=["kokoro"])
+FileName = Annotated[str, Path(description="Name of the file.", examples=["0123456789abcdef01234567.mp3"])]
 
 
 class CaptionedSpeech(SpokenText):
@@ -136,9 +137,6 @@ async def generate_from_phonemes(request: HttpRequest, asked: PhonesToSpeak) -> 
     spoken = {"text": phones_text(asked.phonemes), "voice": voice, "language": language}
     work = state.results.work(request=spoken, format="wav", is_complete=True)
     return adjustments.on(await stream_work(request, work, media_types()["wav"]))
-
-
-FileName = Annotated[str, Path(description="Name of the file.", examples=["0123456789abcdef01234567.mp3"])]
 
 
 @router.get("/v1/download/{name}", response_class=StreamingResponse, summary="Complete file of a download link")

@@ -55,7 +55,7 @@ class AnimatePage:
         self.client = ui.context.client
         self.tab = self.client.id
         self._is_own_edit = self._plays_next = False
-        self._looks: Any = None
+        self._appearance: Any = None
 
     @property
     def address(self) -> str:
@@ -95,7 +95,7 @@ class AnimatePage:
                 self.timeline.on("pick", lambda event: self.inspector.show_item(event.args))
             with ui.element("section").classes("panel right").props('aria-label="Inspector"'):
                 self.inspector.build(found)
-        self._looks = self._shown_looks()
+        self._appearance = self._shown_face()
         self._set_enabled(may_edit)
         self.workspace.listeners.add(self._on_change)
         self._show_comparison()
@@ -161,7 +161,7 @@ class AnimatePage:
             for lane in FEATURES
         ]
 
-    def _shown_looks(self) -> tuple[str | None, str | None]:
+    def _shown_face(self) -> tuple[str | None, str | None]:
         return self.face_address, self.workspace.project.models.palette
 
     def _on_change(self, what: str) -> None:
@@ -187,10 +187,10 @@ class AnimatePage:
             self.bar.refresh()
         else:
             self.refresh()
-        looks = self._shown_looks()
-        if looks != self._looks:
-            self._looks = looks
-            self.stage.set_face(looks[0])
+        appearance = self._shown_face()
+        if appearance != self._appearance:
+            self._appearance = appearance
+            self.stage.set_face(appearance[0])
             ui.timer(0.0, self._show_styles, once=True)
 
     async def _show_models(self) -> None:
@@ -202,7 +202,7 @@ class AnimatePage:
         found = await styles(self.studio.state.library, self.workspace.key, models.palette)
         self.timeline.set_styles(found)
         self.inspector.set_styles(found)
-        await self.speech.show_looks()
+        await self.speech.show_appearance()
 
     def _show_preview(self) -> None:
         preview = self.workspace.preview.current

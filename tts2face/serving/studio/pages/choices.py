@@ -54,7 +54,7 @@ async def models(library: Library, key: ApiKey, kind: str) -> list[str]:
     return [*shipped_names(kind), *more, *(uploaded.name for uploaded in own)]
 
 
-async def looks(library: Library, key: ApiKey, face: str) -> dict[str, dict[str, str]]:
+async def appearance(library: Library, key: ApiKey, face: str) -> dict[str, dict[str, str]]:
     """Identities, haircuts and hair colours of a face by the names of the options; the empty one is its own."""
     names: tuple[str, ...] = ()
     takes_haircuts = False

@@ -6,14 +6,14 @@ from typing import Any
 from nicegui import ui
 
 from tts2face.request import GESTURES, OWN_FACE
-from tts2face.serving.studio.pages.choices import languages, looks, models, voices
+from tts2face.serving.studio.pages.choices import appearance, languages, models, voices
 from tts2face.serving.studio.pages.frame import heading
 from tts2face.serving.studio.pages.open_page import OpenPage
 from tts2face.serving.studio.pages.photo_dialog import TITLE, PhotoDialog, may_make_faces
 from tts2face.serving.work.resource_check import FACE, PALETTE, TALKER
 from tts2face.source import Recorded
 
-LOOKS = {"identity": "Identity", "hair": "Hair", "hair_color": "Hair colour"}  # of a face, with their labels
+APPEARANCE = {"identity": "Identity", "hair": "Hair", "hair_color": "Hair colour"}  # of a face, with their labels
 TYPING_MS = 350  # of rest after which a text is spoken
 
 
@@ -48,8 +48,8 @@ class SpeechPanel:
         if may_make_faces(page):
             dialog = PhotoDialog(page, self._show_made)
             ui.button(TITLE, on_click=dialog.open).props("outline dense")
-        offered = await looks(library, key, project.models.face)
-        for name, label in LOOKS.items():
+        offered = await appearance(library, key, project.models.face)
+        for name, label in APPEARANCE.items():
             self._select("models", name, label, offered[name])
         heading(2, "Gestures")
         self._select("models", PALETTE, PALETTE.capitalize(), found[PALETTE])
@@ -72,10 +72,10 @@ class SpeechPanel:
         await self._change("models", FACE, face)
         self._show(FACE)
 
-    async def show_looks(self) -> None:
+    async def show_appearance(self) -> None:
         """Offer the identities and the hair of the present face."""
         page = self._page
-        offered = await looks(page.studio.state.library, page.workspace.key, page.workspace.project.models.face)
+        offered = await appearance(page.studio.state.library, page.workspace.key, page.workspace.project.models.face)
         for name, options in offered.items():
             value = self._value(name)
             self._controls[name].set_options({value: value, **options}, value=value)
@@ -136,7 +136,7 @@ class SpeechPanel:
             return
         options = {name: None if value == "" and name != "text" else value}
         if name == "face":  # presets and hair belong to a face
-            options |= dict.fromkeys(LOOKS)
+            options |= dict.fromkeys(APPEARANCE)
         await self._page.edit({"kind": part, "options": options})
 
 
