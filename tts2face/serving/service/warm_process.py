@@ -15,6 +15,7 @@ from tts2face.serving.service.messages import SERVE, SYNTHESISE, Work
 from tts2face.serving.service.places import Places
 from tts2face.serving.service.preparation import Preparation
 
+# A name, as the server does not import what its processes do: the session alone takes 1 s of processor time.
 PROGRAM = "tts2face.serving.service.synthesis:handlers"
 AT_ONCE = 4096  # more calls than the pool gives to one process
 FIRST_PAUSE_S, LAST_PAUSE_S = 0.5, 30.0  # before a process that was not ready is started again
