@@ -16,6 +16,7 @@ from tts2face.serving.service.exchange import Receive, Scope, Send
 from tts2face.serving.service.guard import Guard
 from tts2face.serving.service.keys import LOCAL_KEY
 from tts2face.serving.service.logs import LOG, LineFormatter, log_event
+from tts2face.serving.service.results import Results
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
 
@@ -106,7 +107,8 @@ class FakePool:
 @pytest.mark.parametrize("log_text", [False, True])
 def test_texts_are_logged_if_the_setting_says_so(caplog: pytest.LogCaptureFixture, log_text: bool) -> None:
     state = ServiceState(ServiceSettings(processes=1, log_text=log_text))
-    state.pool = FakePool()  # type: ignore[assignment]
+    pool: Any = FakePool()
+    state.results = Results(state.settings, state.permissions, pool, state.metrics, None)
 
     async def make() -> None:
         async for _ in state.results.messages(state.results.work(request={"text": "my words"}), LOCAL_KEY):

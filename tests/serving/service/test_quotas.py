@@ -27,6 +27,7 @@ from tts2face.serving.service.places import (
 )
 from tts2face.serving.service.pool import BusyError, Pool, PoolSettings
 from tts2face.serving.service.rate_limits import RateLimits
+from tts2face.serving.service.results import Results
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
 
@@ -104,7 +105,8 @@ class OnePartPool:
 
 def make_state() -> ServiceState:
     state = ServiceState(ServiceSettings(processes=1))
-    state.pool = OnePartPool()  # type: ignore[assignment]
+    pool: Any = OnePartPool()
+    state.results = Results(state.settings, state.permissions, pool, state.metrics, None)
     return state
 
 

@@ -11,6 +11,7 @@ from lexicon.errors import BackendError
 from tts2face.processes.message import EVENT, Message
 from tts2face.request import Request
 from tts2face.serving.service.keys import LOCAL_KEY
+from tts2face.serving.service.results import Results
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.studio import workspace as opened
@@ -95,8 +96,9 @@ def test_the_preview_ends_with_the_last_page_and_begins_again_with_the_next(stor
     number = store.create(LOCAL_KEY.name, Project(request=Request(text="Hello.")))
 
     async def run() -> None:
-        state, pool = ServiceState(ServiceSettings(processes=1)), HangingPool()
-        state.pool = pool  # type: ignore[assignment]
+        state = ServiceState(ServiceSettings(processes=1))
+        pool: Any = HangingPool()
+        state.results = Results(state.settings, state.permissions, pool, state.metrics, None)
         workspace = Workspace(state, store, LOCAL_KEY, number, ResultMemory(1000))
 
         async def expect(n_begun: int, n_running: int) -> None:
