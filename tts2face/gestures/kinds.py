@@ -144,11 +144,6 @@ class ElementKind:
         return float(element.start if math.isinf(element.end) else max(element.start, element.end - MAX_OVERRUN_S))
 
 
-def _span_text(span: Any, between: str) -> str:
-    """Seconds of a span in a message."""
-    return f"{span.start:g} s to the end" if math.isinf(span.end) else f"{span.start:g}{between}{span.end:g} s"
-
-
 KINDS: Mapping[str, ElementKind] = MappingProxyType({
     kind.name: kind
     for kind in (
@@ -163,3 +158,8 @@ KINDS: Mapping[str, ElementKind] = MappingProxyType({
         ElementKind("edits", ChannelEdit, "curve", "channel"),
     )
 })  # fmt: skip
+
+
+def _span_text(span: Any, between: str) -> str:
+    """Seconds of a span in a message."""
+    return f"{span.start:g} s to the end" if math.isinf(span.end) else f"{span.start:g}{between}{span.end:g} s"
