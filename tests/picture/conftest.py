@@ -11,7 +11,7 @@ N_DIRECTIONS = 16
 
 @pytest.fixture(scope="module")
 def few_directions() -> Iterator[None]:
-    """Faces without an occlusion of their own are looked at from 16 directions instead of 128."""
+    """Faces without an occlusion of their own have shadows from 16 directions instead of 128."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(occlusion, "N_DIRECTIONS", N_DIRECTIONS)
         yield

@@ -76,5 +76,5 @@ def test_a_lamp_is_a_soft_lobe_of_directions_around_it():
 @pytest.mark.parametrize("threads", [2, 3])
 def test_occlusion_does_not_depend_on_the_number_of_threads(threads):
     face = tiny_face()
-    one, many = (bake_occlusion(face, n).occlusion for n in (1, threads))
-    np.testing.assert_array_equal(one, many)
+    single, many = (bake_occlusion(face, n).occlusion for n in (1, threads))
+    np.testing.assert_array_equal(single, many)

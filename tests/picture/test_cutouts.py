@@ -54,7 +54,7 @@ def test_half_coverage_is_the_mean_of_both() -> None:
     inside = np.abs(with_it - without).max(axis=2) > 60
     assert inside.sum() > 100
     light = TONE_TABLES[0]
-    whole, part = ((light[one] - light[without])[inside] for one in (with_it, mixed))
+    whole, part = ((light[drawn] - light[without])[inside] for drawn in (with_it, mixed))
     share = (part * whole).sum() / (whole * whole).sum()  # by least squares; a sum of signed differences nearly cancels
     assert share == pytest.approx(0.5, abs=0.04)  # the shadow of the sheet does not become half
 

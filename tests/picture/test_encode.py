@@ -120,9 +120,9 @@ def test_clips_follow_each_other_with_sound_and_picture_together(tmp_path, rende
     n = len(clips[0].motion)
     assert len(pictures) == 12 * n
     for k in range(12):
-        begin = float(k * n / exact_rate(fps))
-        around = sound[round((begin + 0.1 - first) * rate) : round((begin + 0.3 - first) * rate)]
-        assert begin + 0.1 + loud_at(around, rate, 0.0) == pytest.approx(begin + 0.2, abs=0.003)
+        start = float(k * n / exact_rate(fps))
+        around = sound[round((start + 0.1 - first) * rate) : round((start + 0.3 - first) * rate)]
+        assert start + 0.1 + loud_at(around, rate, 0.0) == pytest.approx(start + 0.2, abs=0.003)
 
 
 def test_decoded_pictures_equal_the_drawn_ones_and_carry_colour_tags(tmp_path):

@@ -76,15 +76,15 @@ def test_pictures_with_fewest_samples_show_the_same_view() -> None:
     fine = mesh_renderer(tiny_face(), Picture(size="128x96", supersampling=3))
     coarse = fine.with_fewest_samples()
     assert coarse.picture.samples_per_side == 1
-    pictures = [next(iter(one.frames(clip, [3]))).astype(float) for one in (fine, coarse)]
+    pictures = [next(iter(renderer.frames(clip, [3]))).astype(float) for renderer in (fine, coarse)]
     assert 0.0 < np.abs(pictures[0] - pictures[1]).mean() < 3.0  # of 255: edges alone differ
     assert coarse.with_fewest_samples() is coarse
 
 
 def test_a_movie_is_the_same_with_any_number_of_threads() -> None:
     renderer = mesh_renderer(lit_tiny_face(), Picture(size="64x48"))
-    one, two, four = (
+    single, double, fourfold = (
         b"".join(chunk.content for chunk in encode_movie([clip_of(0.5, fps=FPS)], renderer, "mp4", threads=threads))
         for threads in (1, 2, 4)
     )
-    assert one == two == four
+    assert single == double == fourfold

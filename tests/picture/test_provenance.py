@@ -1,4 +1,4 @@
-"""What files of synthetic pictures of people say of themselves, read as other programs read it."""
+"""Statement in files of synthetic pictures of people, read as other programs read it."""
 
 from fractions import Fraction
 from pathlib import Path

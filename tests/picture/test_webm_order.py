@@ -22,17 +22,17 @@ def number(content: bytes, at: int, *, has_mark: bool) -> tuple[int, int]:
 
 def blocks(content: bytes) -> list[tuple[int, int]]:
     """Time in milliseconds and track of each block of a WebM file, in the order of the file."""
-    found, at, begin = [], 0, 0
+    found, at, start = [], 0, 0
     while at < len(content):
         name, at = number(content, at, has_mark=True)
         size, at = number(content, at, has_mark=False)
         if name in {SEGMENT, CLUSTER, GROUP}:  # their content follows, whose size a stream may not know
             continue
         if name == CLUSTER_TIME:
-            begin = int.from_bytes(content[at : at + size], "big")
+            start = int.from_bytes(content[at : at + size], "big")
         elif name in {BLOCK, SIMPLE_BLOCK}:
             track, after = number(content, at, has_mark=False)
-            found.append((begin + int.from_bytes(content[after : after + 2], "big", signed=True), track))
+            found.append((start + int.from_bytes(content[after : after + 2], "big", signed=True), track))
         at += size
     return found
 

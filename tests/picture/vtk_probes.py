@@ -7,6 +7,11 @@ import numpy as np
 
 from tts2face.picture.display import OFF_SCREEN_CLASSES, PROBE
 
+CRASHES = {PROBE: lambda call: os.abort()}
+FAILS = {PROBE: lambda call: {"is_drawn": False}}
+HANGS = {PROBE: lambda call: time.sleep(60)}
+SEES = {PROBE: lambda call: {"is_drawn": True}}
+
 
 def _draw_off_screen(call):
     os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = OFF_SCREEN_CLASSES[0]
@@ -18,8 +23,4 @@ def _draw_off_screen(call):
     return {"is_drawn": int(np.asarray(plotter.screenshot(return_img=True))[16, 16, 0]) > 200}
 
 
-CRASHES = {PROBE: lambda call: os.abort()}
-FAILS = {PROBE: lambda call: {"is_drawn": False}}
-HANGS = {PROBE: lambda call: time.sleep(60)}
-SEES = {PROBE: lambda call: {"is_drawn": True}}
 OFF_SCREEN = {PROBE: _draw_off_screen}

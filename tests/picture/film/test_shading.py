@@ -32,7 +32,7 @@ def draw_list(points, triangles, part_of, side):
     keys = np.zeros((4, side * side), np.int64)
     pixels = np.zeros(SIZE * SIZE + 1, np.int32)
     count = list_fragments(nearest, (side, 0, *columns), np.array(part_of, np.int32), (*found, keys), pixels)
-    return table, nearest, [one[:count] for one in found], pixels
+    return table, nearest, [values[:count] for values in found], pixels
 
 
 @pytest.mark.parametrize("side", [1, 2, 3])
