@@ -134,13 +134,15 @@ class Studio:
             It is a talker's own face, which has no mesh.
         """
         while True:
-            look, project = workspace.look, workspace.project
+            appearance, project = workspace.appearance, workspace.project
             work = await workspace.work("face", has_gestures=project.request.has_gestures)
             try:
                 # In any process: making a face takes seconds, in which the project's own process makes its preview.
-                return look, await self._face_file(project, replace(work, affinity=""), self._maker(workspace.key))
+                return appearance, await self._face_file(
+                    project, replace(work, affinity=""), self._maker(workspace.key)
+                )
             except RefusedError:
-                if look == workspace.look:
+                if appearance == workspace.appearance:
                     raise
                 # The project has changed meanwhile, and what its face was made of may have been removed.
 

@@ -67,7 +67,7 @@ class Workspace:
         return self.history.present
 
     @property
-    def look(self) -> str:
+    def appearance(self) -> str:
         """Word that names what the face of the project, as it is now, is made of."""
         made_of = f"{__version__} {self.project.models} {self.project.request.has_gestures}"
         return f"{zlib.crc32(made_of.encode()):08x}"

@@ -67,7 +67,7 @@ class AnimatePage:
         """Address of the face, which changes with it; None for a talker's own face, which has no mesh."""
         if self.workspace.project.models.face == OWN_FACE:
             return None
-        return f"{self.address}/face.glb?look={self.workspace.look}"
+        return f"{self.address}/face.glb?look={self.workspace.appearance}"
 
     @property
     def _preview_address(self) -> str:

@@ -146,7 +146,7 @@ async def preview(
 
 @router.get("/projects/{project}/face.glb")
 async def face(request: HttpRequest, project: str, look: str = "") -> Response:
-    """The face as binary glTF; a browser may keep it if it is the one of `look` (`Workspace.look`)."""
+    """The face as binary glTF; a browser may keep it if it is the one of `look` (`Workspace.appearance`)."""
     async with opened(request, project) as workspace:
         made, path = await _studio(request).face(workspace)
     return await face_answer(request, path, is_named=look == made)
