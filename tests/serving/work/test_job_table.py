@@ -26,14 +26,6 @@ from tts2face.serving.work.queues import WORKFLOWS
 from tts2face.serving.work.run import JobRunner, job_blobs
 from tts2face.serving.work.table import OtherBodyError, QueueFullError
 
-OLD_TABLE = """CREATE TABLE tts2face_jobs (
-    id VARCHAR(64) PRIMARY KEY, key_name VARCHAR(200) NOT NULL, kind VARCHAR(40) NOT NULL, state VARCHAR(10) NOT NULL,
-    request TEXT NOT NULL, idempotency_key VARCHAR(255), body_hash VARCHAR(64) NOT NULL,
-    created DOUBLE PRECISION NOT NULL, started DOUBLE PRECISION, finished DOUBLE PRECISION,
-    n_done INTEGER NOT NULL DEFAULT 0, n_all INTEGER NOT NULL DEFAULT 0, error TEXT,
-    webhook TEXT, webhook_state VARCHAR(10), webhook_due DOUBLE PRECISION, webhook_tries INTEGER NOT NULL DEFAULT 0,
-    UNIQUE (key_name, idempotency_key))"""
-
 
 @pytest.fixture
 def client(database: str, tmp_path: Path) -> Iterator[JobClient]:
@@ -169,33 +161,19 @@ def test_whether_a_job_waits_or_runs_is_what_the_engine_says(client: JobClient, 
     assert [one.content["state"] for one in client.table.events(name, 0)[0]] == ["waiting", "running"]
 
 
-def test_a_database_whose_jobs_had_states_of_their_own_is_brought_up_to_date(database: str, tmp_path: Path) -> None:
-    url = database_url(database)
-    old = JobDatabase(url)
-    with old.transaction() as change:
-        change.run(OLD_TABLE)
-        change.run("CREATE INDEX tts2face_jobs_by_state ON tts2face_jobs (state, created)")
-        for number, state in enumerate(("waiting", "running", "done", "failed", "cancelled")):
-            change.run(
-                "INSERT INTO tts2face_jobs (id, key_name, kind, state, request, body_hash, created) "
-                "VALUES (:id, 'ann', 'clip', :state, '{}', '0', :created)",
-                id=state, state=state, created=float(number),
-            )  # fmt: skip
-    old.close()
-    threads = [threading.Thread(target=prepare_database, args=(url,)) for _ in range(3)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    client = JobClient(url, open_blobs(tmp_path / "store", "results"))
-    try:
-        found = {one.id: one.state for one in client.table.page("ann", None, None, 9)}
-        ends = {name: name for name in ("done", "failed", "cancelled")}
-        assert found == ends | {"waiting": "waiting", "running": "waiting"}  # as they are in no queue
-        assert sorted(client.table.open_jobs()) == ["running", "waiting"]
-        assert client.submit(new_job())[1]
-    finally:
-        client.close()
+def test_workers_of_earlier_versions_go_on_beside(client: JobClient, changes: JobChanges) -> None:
+    """They note that a job runs; what is shown is what the engine says, and the job ends once."""
+    name = client.submit(new_job())[0].id
+    with client._database.transaction(is_change=True) as change:
+        old = "UPDATE tts2face_jobs SET state = 'running', started = 1.0 WHERE id = :id AND state = 'waiting'"
+        assert change.run(old, id=name) == 1
+    found = client.table.get(name)
+    assert found is not None
+    assert (found.state, found.is_open, client.table.open_jobs()) == ("waiting", True, [name])
+    take(client, changes, name)
+    assert [one.id for one in client.table.page("ann", "running", None, 9)] == [name]
+    assert changes.end(name, Ending("done"))
+    assert not changes.end(name, Ending("failed", error="late"))
 
 
 def test_cancelling_ends_the_segments_that_only_this_job_uses(

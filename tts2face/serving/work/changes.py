@@ -88,7 +88,7 @@ class JobChanges:
         """
         with self._database.transaction(is_change=True) as change:
             n_ended = change.run(
-                f"UPDATE tts2face_jobs SET ending = :state, error = :error, finished = {self._database.now}, "
+                f"UPDATE tts2face_jobs SET state = :state, error = :error, finished = {self._database.now}, "
                 "webhook_due = CASE WHEN webhook IS NULL THEN NULL ELSE 0 END "
                 f"WHERE id = :id AND {IS_OPEN}", id=job_id, state=ending.state, error=ending.error,
             )  # fmt: skip

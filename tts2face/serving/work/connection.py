@@ -102,15 +102,6 @@ class Transaction:
         """Rows of a query."""
         return list(self.connection.execute(self._sql(statement), values))
 
-    def columns(self, table: str) -> frozenset[str]:
-        """Names of the columns of a table; none if there is no such table."""
-        import sqlalchemy
-
-        found = sqlalchemy.inspect(self.connection)
-        return (
-            frozenset(column["name"] for column in found.get_columns(table)) if found.has_table(table) else frozenset()
-        )
-
     def value(self, statement: str, **values: Any) -> Any:
         """First value of a query; None without a row."""
         return self.connection.execute(self._sql(statement), values).scalar()

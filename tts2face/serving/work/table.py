@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from lexicon.errors import BackendError, InputError
-from tts2face.serving.work.connection import JobDatabase, Transaction, create_tables, repeat_creation
+from tts2face.serving.work.connection import JobDatabase, Transaction, create_tables
 from tts2face.serving.work.job_record import (
     COLUMNS,
     OPEN_STATES,
@@ -24,7 +24,7 @@ from tts2face.serving.work.queues import WORKFLOWS
 INPUT, OUTPUT = "input", "output"  # roles of files
 _TABLES = (
     """CREATE TABLE IF NOT EXISTS tts2face_jobs (
-    id VARCHAR(64) PRIMARY KEY, key_name VARCHAR(200) NOT NULL, kind VARCHAR(40) NOT NULL, ending VARCHAR(10),
+    id VARCHAR(64) PRIMARY KEY, key_name VARCHAR(200) NOT NULL, kind VARCHAR(40) NOT NULL, state VARCHAR(10) NOT NULL,
     request TEXT NOT NULL, idempotency_key VARCHAR(255), body_hash VARCHAR(64) NOT NULL,
     created DOUBLE PRECISION NOT NULL, started DOUBLE PRECISION, finished DOUBLE PRECISION,
     n_done INTEGER NOT NULL DEFAULT 0, n_all INTEGER NOT NULL DEFAULT 0, error TEXT,
@@ -38,22 +38,16 @@ _TABLES = (
     PRIMARY KEY (job_id, number))""",
     """CREATE TABLE IF NOT EXISTS tts2face_job_segments (
     job_id VARCHAR(64) NOT NULL, address VARCHAR(64) NOT NULL, PRIMARY KEY (job_id, address))""",
-    "CREATE INDEX IF NOT EXISTS tts2face_jobs_by_ending ON tts2face_jobs (ending, created)",
+    "CREATE INDEX IF NOT EXISTS tts2face_jobs_by_state ON tts2face_jobs (state, created)",
     "CREATE INDEX IF NOT EXISTS tts2face_job_files_by_hash ON tts2face_job_files (sha256)",
     "CREATE INDEX IF NOT EXISTS tts2face_job_segments_by_address ON tts2face_job_segments (address)",
 )
-# Tables of versions whose jobs had a state of their own beside that of DBOS.
-_MIGRATION = (
-    "ALTER TABLE tts2face_jobs ADD COLUMN ending VARCHAR(10)",
-    f"UPDATE tts2face_jobs SET ending = state WHERE state NOT IN {OPEN_STATES}",
-    "DROP INDEX IF EXISTS tts2face_jobs_by_state",
-    "ALTER TABLE tts2face_jobs DROP COLUMN state",
-)
-IS_OPEN = "ending IS NULL"  # condition of a query
-# The ending belongs to the results, and is written with them; whether an open job waits or runs is what DBOS says.
-# A workflow that has ended without its job counts as running until `JobRunner.end_abandoned`.
-_STATE = """CASE WHEN ending IS NOT NULL THEN ending
-    WHEN EXISTS (SELECT 1 FROM {workflows} WHERE workflow_uuid = tts2face_jobs.id
+# The column has the ending, which belongs to the results and is written with them. Of an open job it has one word for
+# ever (workers of earlier versions write another): whether it waits or runs is what DBOS says, and a workflow that has
+# ended without its job counts as running until `JobRunner.end_abandoned`.
+IS_OPEN = f"state IN {OPEN_STATES}"  # condition of a query
+_STATE = f"""CASE WHEN NOT {IS_OPEN} THEN state
+    WHEN EXISTS (SELECT 1 FROM {{workflows}} WHERE workflow_uuid = tts2face_jobs.id
         AND status NOT IN ('ENQUEUED', 'DELAYED')) THEN 'running' ELSE 'waiting' END"""
 CHILD_TABLES = ("tts2face_job_files", "tts2face_job_events", "tts2face_job_segments")
 
@@ -82,18 +76,8 @@ class JobTable:
         self._select = f"SELECT {shown} FROM tts2face_jobs"
 
     def create(self) -> None:
-        """Create the tables or bring them up to date; several processes may do so at once."""
-        repeat_creation(self._migrate)
+        """Create the tables where they are missing; several processes may do so at once."""
         create_tables(self.database, _TABLES)
-
-    def _migrate(self) -> None:
-        with self.database.transaction() as read:
-            names = read.columns("tts2face_jobs")
-        if "state" in names:
-            with self.database.transaction(is_change=True) as change:
-                if "state" in change.columns("tts2face_jobs"):  # no other process was faster
-                    for statement in _MIGRATION:
-                        change.run(statement)
 
     def submit(
         self, new: NewJob, enqueue: Callable[[Transaction, int], None], max_waiting: int | None = None
@@ -129,8 +113,8 @@ class JobTable:
                     f"the key {new.key_name} has {max_waiting} waiting jobs; wait until some have ended"
                 )
             change.run(
-                "INSERT INTO tts2face_jobs (id, key_name, kind, request, idempotency_key, body_hash, created, "
-                "webhook, webhook_state) VALUES (:id, :key, :kind, :request, :idempotency, :hash, "
+                "INSERT INTO tts2face_jobs (id, key_name, kind, state, request, idempotency_key, body_hash, created, "
+                "webhook, webhook_state) VALUES (:id, :key, :kind, 'waiting', :request, :idempotency, :hash, "
                 f"{self.database.now}, :webhook, :webhook_state)",
                 id=new.id, key=new.key_name, kind=new.kind, request=json.dumps(new.request, ensure_ascii=False),
                 idempotency=new.idempotency_key, hash=new.body_hash, webhook=new.webhook,
@@ -163,7 +147,7 @@ class JobTable:
             conditions.append("key_name = :key")
             values["key"] = key_name
         if state is not None:
-            conditions.append(f"{IS_OPEN} AND {self._state} = :state" if state in OPEN_STATES else "ending = :state")
+            conditions.append(f"{IS_OPEN} AND {self._state} = :state" if state in OPEN_STATES else "state = :state")
             values["state"] = state
         if before is not None:
             conditions.append("(created, id) < (SELECT created, id FROM tts2face_jobs WHERE id = :before)")
@@ -184,7 +168,7 @@ class JobTable:
         """Result of a hash in a job of an owner, or of anybody; None if there is none."""
         query = (
             "SELECT f.name, f.sha256, f.media_type, f.n_bytes FROM tts2face_job_files f JOIN tts2face_jobs j "
-            "ON j.id = f.job_id WHERE f.sha256 = :hash AND f.role = 'output' AND j.ending = 'done'"
+            "ON j.id = f.job_id WHERE f.sha256 = :hash AND f.role = 'output' AND j.state = 'done'"
         )
         query += "" if key_name is None else " AND j.key_name = :key"
         with self.database.transaction() as read:
@@ -194,8 +178,8 @@ class JobTable:
     def counts(self) -> tuple[dict[str, int], float]:
         """Numbers of jobs by state, and the age of the oldest waiting one in seconds."""
         with self.database.transaction() as read:
-            rows = read.rows("SELECT ending, count(*), 0.0 FROM tts2face_jobs WHERE ending IS NOT NULL GROUP BY ending")
-            query = f"SELECT {self._state} AS state, count(*), {self.database.now} - min(created) FROM tts2face_jobs"
+            rows = read.rows(f"SELECT state, count(*), 0.0 FROM tts2face_jobs WHERE NOT {IS_OPEN} GROUP BY state")
+            query = f"SELECT {self._state} AS shown, count(*), {self.database.now} - min(created) FROM tts2face_jobs"
             rows += read.rows(f"{query} WHERE {IS_OPEN} GROUP BY 1")
         ages = {row[0]: float(row[2]) for row in rows}
         return dict.fromkeys(STATES, 0) | {row[0]: row[1] for row in rows}, ages.get(WAITING, 0.0)
