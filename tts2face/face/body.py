@@ -35,6 +35,15 @@ OUT_S = 2.4  # in which the shoulders sink to a third of the way
 REST_CYCLE_S = (3.4, 4.8)  # between breaths at rest: 12 to 18 a minute
 REST_DEPTH = 0.7  # of a breath at rest
 LOWEST = 0.1
+FloatArray = NDArray[np.float64]
+FREQUENCY_HZ, DAMPING = 1.9, 0.32  # of loose ends: they come to rest in about half a second
+LIMIT_RAD = 0.15  # of a lag, towards which larger ones bend
+PUPIL_SHAPE = "pupilDilate"
+DILATION = 0.25  # share of its diameter by which a pupil is wider at weight 1
+WAVES_HZ, WAVE_SIZES = np.array([0.06, 0.13, 0.29]), np.array([0.22, 0.16, 0.10])
+SPEECH, FOLLOW_S = 0.4, 0.9  # weight while speaking, and the time in which two thirds of it are reached
+JAW_SHAPE, PARTED = "jawOpen", 0.07  # weight at which a mouth that was closed draws breath
+PARTS_S, CLOSES_S = 0.3, 0.05  # before the first phone: begin and end, so that its closure is the phone's own
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,12 +119,6 @@ def _next(now: Breath, ahead_s: float, step: float, seed: int) -> Breath:
     return Breath(level, 0.0, until, following, clock, number)
 
 
-FloatArray = NDArray[np.float64]
-
-FREQUENCY_HZ, DAMPING = 1.9, 0.32  # of loose ends: they come to rest in about half a second
-LIMIT_RAD = 0.15  # of a lag, towards which larger ones bend
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Swing:
     """Hair after a frame: angles (3,) and their rates (3,) of the head, and the state (2, 3) of the springs."""
@@ -163,12 +166,6 @@ class HairSwing:
         return replace(face, values=weights), Swing(angles[-1], rates[-1], springs)
 
 
-PUPIL_SHAPE = "pupilDilate"
-DILATION = 0.25  # share of its diameter by which a pupil is wider at weight 1
-WAVES_HZ, WAVE_SIZES = np.array([0.06, 0.13, 0.29]), np.array([0.22, 0.16, 0.10])
-SPEECH, FOLLOW_S = 0.4, 0.9  # weight while speaking, and the time in which two thirds of it are reached
-
-
 @dataclass(frozen=True, slots=True)
 class Dilation:
     """Pupils after a frame: the time in the whole clip, and the weight that speech gives them."""
@@ -205,10 +202,6 @@ class Pupils:
         weights = face.values.copy()
         weights[:, self.column] = efforts + np.sin(turns) @ WAVE_SIZES
         return replace(face, values=weights), Dilation(now.clock_s + face.duration, effort)
-
-
-JAW_SHAPE, PARTED = "jawOpen", 0.07  # weight at which a mouth that was closed draws breath
-PARTS_S, CLOSES_S = 0.3, 0.05  # before the first phone: begin and end, so that its closure is the phone's own
 
 
 def part_lips(face: Trajectory, turns: Sequence[float]) -> Trajectory:

@@ -24,6 +24,9 @@ from tts2face.types import HEAD_CHANNELS, Trajectory
 REST_HEAD = np.zeros(len(HEAD_CHANNELS), np.float32)  # head pose at rest
 CHIN_MARGIN_MM = 8.0  # height below the chin that still moves rigidly with the head
 MIN_NECK_MM = 20.0  # meshes with a shorter neck move rigidly as a whole
+FloatArray = NDArray[np.float64]
+DIGITS = 9  # decimals kept: the last bits of LAPACK's results depend on its threads
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,11 +189,6 @@ def _move_head(transform, follow, vertices):  # type: ignore[no-untyped-def]
             vertices[v, c] += follow[v] * (target - vertices[v, c])
 
 
-FloatArray = NDArray[np.float64]
-
-DIGITS = 9  # decimals kept: the last bits of LAPACK's results depend on its threads
-
-
 def landmark_positions(face: Face) -> FloatArray:
     """Landmarks (L, 3) of a face at rest, mm, in the order of `Face.landmarks`."""
     mixed = face.landmark_weights.astype(np.float64)[..., None]
@@ -238,9 +236,6 @@ def axis_ratios(source: NDArray[np.floating], target: NDArray[np.floating]) -> F
     here, there = here - here.mean(axis=0), there - there.mean(axis=0)
     ratios: FloatArray = (here * there).sum(axis=0) / np.maximum((here**2).sum(axis=0), 1e-12)
     return ratios
-
-
-Floats = NDArray[np.float64]
 
 
 def rest_landmarks(face: Face) -> Floats:

@@ -35,6 +35,11 @@ NARROWING_SHAPES = (("eyeSquintLeft", "cheekSquintLeft"), ("eyeSquintRight", "ch
 MAX_NARROWING = 0.6  # largest share of the opening that squinting may close
 
 FloatArray = NDArray[np.float64]
+EXPRESSION_TABLE = "expressions.tsv"
+BOTH_SIDES = "*"  # suffix of a name: both the left and the right shape
+GAZE_SHAPES = tuple(
+    f"eyeLook{direction}{side}" for direction in ("Up", "Down", "In", "Out") for side in ("Left", "Right")
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,13 +122,6 @@ def build_eyelid_model(face: Face) -> EyelidModel:
         narrowing=np.array([[number[name] for name in names] for names in NARROWING_SHAPES], np.int64),
         limits=face.limits.astype(np.float64),
     )
-
-
-EXPRESSION_TABLE = "expressions.tsv"
-BOTH_SIDES = "*"  # suffix of a name: both the left and the right shape
-GAZE_SHAPES = tuple(
-    f"eyeLook{direction}{side}" for direction in ("Up", "Down", "In", "Out") for side in ("Left", "Right")
-)
 
 
 @cache

@@ -38,6 +38,18 @@ DEPTH_WEIGHT = 0.1  # of z, relative to x and y: a single camera measures depth 
 WIDTH_WEIGHT = 60.0  # of the mouth's width, relative to a landmark: viewers read rounding from it
 CHIN_WEIGHT = 600.0  # of the drop of the chin, relative to a landmark: it sets the distance of the teeth
 REGULARISATION = 0.005  # ridge term as a share of the mean curvature: makes the solution unique and smooth
+FULL_EXPRESSION_GAP_MM = 4.0  # gap from which lips follow an expression in full; touching lips do not follow it
+MIN_GAP_SHARE = 0.5  # least share of the speech gap that an expression leaves open
+GAP_CONSTRAINT_WEIGHT = 1e5  # relative to a landmark of the cheek; 300 in retargeting, where gaps may deviate a little
+CHANGE_COST = 0.5  # of changes of the weights in contacts, relative to the median curvature
+# Of changes of a smile by gestures: lips close by pressing and rolling; a smaller smile is seen as another mood.
+SMILE_COST, SMILE_PREFIX = 5.0, "mouthSmile"
+GESTURE_COST = 1.0  # of changes of all weights by gestures
+CLOSED_SMILE_COST = 0.3  # of the smile of a basis expression, whose lips are closed
+FULL_GROWTH_GAP_MM = 1.5  # gaps smaller than this are amplified by less than the gain
+GAP_TOLERANCE_MM = 0.01  # largest gap of closed lips
+FULL_ROUNDING_MM = 8.0  # a mouth this much narrower than at rest is fully rounded
+ROUNDING_ATTENUATION = 0.25  # reduction of an expression on a fully rounded mouth, which is still seen to smile
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,20 +105,6 @@ def landmark_weights(common: list[int]) -> FloatArray:
     per_landmark = np.array([LIP_WEIGHT if landmark in LIP_LANDMARKS else 1.0 for landmark in common])
     weights: FloatArray = per_landmark[:, None] * np.array([1.0, 1.0, DEPTH_WEIGHT])
     return weights
-
-
-FULL_EXPRESSION_GAP_MM = 4.0  # gap from which lips follow an expression in full; touching lips do not follow it
-MIN_GAP_SHARE = 0.5  # least share of the speech gap that an expression leaves open
-GAP_CONSTRAINT_WEIGHT = 1e5  # relative to a landmark of the cheek; 300 in retargeting, where gaps may deviate a little
-CHANGE_COST = 0.5  # of changes of the weights in contacts, relative to the median curvature
-# Of changes of a smile by gestures: lips close by pressing and rolling; a smaller smile is seen as another mood.
-SMILE_COST, SMILE_PREFIX = 5.0, "mouthSmile"
-GESTURE_COST = 1.0  # of changes of all weights by gestures
-CLOSED_SMILE_COST = 0.3  # of the smile of a basis expression, whose lips are closed
-FULL_GROWTH_GAP_MM = 1.5  # gaps smaller than this are amplified by less than the gain
-GAP_TOLERANCE_MM = 0.01  # largest gap of closed lips
-FULL_ROUNDING_MM = 8.0  # a mouth this much narrower than at rest is fully rounded
-ROUNDING_ATTENUATION = 0.25  # reduction of an expression on a fully rounded mouth, which is still seen to smile
 
 
 @dataclass(frozen=True, slots=True, eq=False)

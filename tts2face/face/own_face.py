@@ -33,6 +33,15 @@ from tts2face.numeric.splines import fit_local_interpolant
 from tts2face.types import Trajectory
 
 RIDGE = 0.003  # ridge term as a share of the mean variance of the terms
+LID_CHANNEL = "lids"
+OPEN_QUANTILE, CLOSED_QUANTILE = 0.7, 0.005  # quantiles of the lid opening over all frames: open eyes and blinks
+MIN_BLINK_CLOSURE = 0.5  # least closure in recorded blinks; talkers without blinks get no lid motion
+MIN_LID_CLOSURE = -0.3  # closure of lids opened wide
+GESTURE_RIDGE = 1e-5
+LID_INNER_RADIUS, LID_OUTER_RADIUS = 0.7, 1.1  # relative to the eye width: lid texture changes in full, and ends
+EXPRESSION_SHARE = 0.6  # of an expression that is applied: its folds and teeth do not occur in recorded speech
+Float32Array = NDArray[np.float32]
+FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,18 +106,6 @@ def _regression_terms(values: NDArray[np.floating]) -> NDArray[np.float32]:
     """Regression terms (T, 1 + S): 1, and the values (T, S) clipped to four standard deviations."""
     clipped = np.clip(values, -4.0, 4.0).astype(np.float32)
     return np.concatenate([np.ones((len(clipped), 1), np.float32), clipped], axis=1)
-
-
-LID_CHANNEL = "lids"
-OPEN_QUANTILE, CLOSED_QUANTILE = 0.7, 0.005  # quantiles of the lid opening over all frames: open eyes and blinks
-MIN_BLINK_CLOSURE = 0.5  # least closure in recorded blinks; talkers without blinks get no lid motion
-MIN_LID_CLOSURE = -0.3  # closure of lids opened wide
-GESTURE_RIDGE = 1e-5
-LID_INNER_RADIUS, LID_OUTER_RADIUS = 0.7, 1.1  # relative to the eye width: lid texture changes in full, and ends
-EXPRESSION_SHARE = 0.6  # of an expression that is applied: its folds and teeth do not occur in recorded speech
-
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -88,7 +88,7 @@ class StoredAudioMap(StoredModel):
     def prepare_check(cls, contents: Contents, prefix: str) -> None:
         """Kinds of features and context determine the number of inputs; outputs are those of the talker."""
         tensors = stored_tensors(cls, prefix, contents.arrays)
-        contents.tensors({name: tensors[name] for name in (f"{prefix}.{one}" for one in FIRST)})
+        contents.tensors({name: tensors[name] for name in (f"{prefix}.{first}" for first in FIRST)})
         feature = _text_of(contents.arrays[f"{prefix}.feature"])
         kinds = feature.split("+")
         if any(kind not in FEATURE_SIZES for kind in kinds):

@@ -30,6 +30,7 @@ BLACK_SHARE = 64  # of a page's height lies below both, black: the texels of par
 LEAST_SIDE = 2 * BLACK_SHARE  # of a page: two rows of black, of which one is read
 HAIR_QUALITY = 85  # of the JPEG pictures of haircuts; 92 takes 100 kB more of each
 MAX_FACTOR = 1e3  # of any weight or light
+LAMPS = Tensor("float32", ("lamps", N_LAMP_NUMBERS), -MAX_MM, MAX_MM, may_be_empty=True)
 
 
 def _factors(*shape: int | str, low: float = -MAX_FACTOR) -> Tensor:
@@ -42,9 +43,6 @@ def _steps(*shape: int | str) -> Tensor:
 
 def _numbers(*shape: int | str) -> Tensor:
     return Tensor("int32", shape, may_be_empty=True)
-
-
-LAMPS = Tensor("float32", ("lamps", N_LAMP_NUMBERS), -MAX_MM, MAX_MM, may_be_empty=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

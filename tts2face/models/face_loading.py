@@ -15,6 +15,8 @@ from tts2face.models.named_colours import parse_hair_colour
 from tts2face.processes.shared import Shared, file_state
 from tts2face.storage.shipped import SHIPPED_FOLDER, find_file
 
+_FACES: Shared[Face] = Shared()
+
 
 def load_face(
     name: str, identity: str | None = None, *, hair: str | None = None, hair_color: str | None = None
@@ -44,9 +46,6 @@ def load_face(
     of_hair = SHIPPED_FOLDER if hair is None or not Path(hair).suffix else Path(hair)  # that of a face is shipped
     key = (file_state(path), file_state(of_hair), identity, hair, hair_color)
     return _FACES.get(key, lambda: _read_face(name, path, identity, hair, hair_color))
-
-
-_FACES: Shared[Face] = Shared()
 
 
 def _read_face(name: str, path: Path, identity: str | None, hair: str | None, hair_color: str | None) -> Face:

@@ -57,11 +57,12 @@ METADATA: Mapping[str, Check] = {
     "styles": table(free),
     "derivations": table(record({"source": text, "summary": text, "changes": table(_CHANGE)}, {"delivery": _DELIVERY})),
 }
+_PALETTES: Shared[Palette] = Shared()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StoredStyle(StoredModel):
-    """What a file holds of a style beside its motion."""
+    """Loudness, pitch and lengths of the recordings of a style, in a file."""
 
     intensity: Annotated[NDArray[np.float32], half("frames of {own}", low=-LOUDNESS_DB, high=LOUDNESS_DB)]
     pitch: Annotated[NDArray[np.float32], half("frames of {own}", low=-SEMITONES, high=SEMITONES)]
@@ -156,9 +157,6 @@ def load_palette(name: str) -> Palette:
     """
     path = find_file(name, KIND)
     return _PALETTES.get(file_state(path), lambda: read_palette(path))
-
-
-_PALETTES: Shared[Palette] = Shared()
 
 
 def _check(contents: Contents) -> None:

@@ -1,4 +1,4 @@
-"""Network that tells to which phone each frame of a sound belongs, and how long phones last.
+"""Network that says to which phone each frame of a sound belongs, and how long phones last.
 
 One hidden layer of rectified linear units over features of a window around each frame: of the spectrum for a voice
 (``heart``), also of what a recogniser hears for recordings of anybody (``recordings``).

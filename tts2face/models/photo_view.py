@@ -17,9 +17,9 @@ class PhotoView:
 
     ``view`` (3, 4) goes from the face to that camera (x right, y down, z ahead, mm), and ``lens`` (3,) is its focal
     length and centre in pixels of the picture, which has a ``size`` (width, height) and the coverage ``alpha`` (H, W)
-    unless it is opaque; ``behind`` (H, W, 3) is the background that was told from the person in an opaque one. Vertices
-    follow the head's motion by the shares ``follow`` (V,). The first page of the light begins at the pixel ``corner``
-    (2,).
+    unless it is opaque; ``behind`` (H, W, 3) is the background that was divided from the person in an opaque one.
+    Vertices follow the head's motion by the shares ``follow`` (V,). The first page of the light begins at the pixel
+    ``corner`` (2,).
     """
 
     size: tuple[int, int]

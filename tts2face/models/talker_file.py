@@ -52,6 +52,7 @@ OPTIONAL_METADATA: Mapping[str, Check] = {
 OF_FORMAT = {*METADATA, "utterances", INVENTORY}  # metadata that are no statement about the talker
 
 Floats = NDArray[np.float32]
+_TALKERS: Shared[Talker] = Shared()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -195,9 +196,6 @@ def load_talker(name: str) -> Talker:
     """
     path = find_file(name, KIND)
     return _TALKERS.get(file_state(path), lambda: read_talker(path))
-
-
-_TALKERS: Shared[Talker] = Shared()
 
 
 def _check(contents: Contents) -> None:

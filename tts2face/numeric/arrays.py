@@ -14,16 +14,15 @@ FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
 IntArray = NDArray[np.int64]
 AnyFloat = TypeVar("AnyFloat", np.float32, np.float64)
+_N_USED: dict[int, int] = {}  # rows that arrays of `zeros_with_room` have given away, by their numbers
+_LOCK = threading.Lock()
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB, IEC 61966-2-1
 
 
 def ordered_product(a: NDArray[np.floating], b: NDArray[np.floating]) -> FloatArray:
     """Matrix product whose result is bit-identical for any number of threads, unlike that of a threaded BLAS."""
     summed: FloatArray = np.einsum("...k,kj->...j" if b.ndim > 1 else "...k,k->...", a, b)
     return summed
-
-
-_N_USED: dict[int, int] = {}  # rows that arrays of `zeros_with_room` have given away, by their numbers
-_LOCK = threading.Lock()
 
 
 def zeros_with_room(n_rows: int, room: int, row: tuple[int, ...]) -> NDArray[np.float32]:
@@ -228,9 +227,6 @@ def interpolate_linear(
 def interpolate_columns(values: NDArray[np.floating], times: NDArray[Any], at: NDArray[Any]) -> NDArray[np.float64]:
     """(N, D) values at N instants from (T, D) at increasing times (T,), as float64; constant before and after."""
     return np.stack([np.interp(at, times, column) for column in values.T], axis=1)
-
-
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB, IEC 61966-2-1
 
 
 def decode_srgb(srgb: NDArray[np.floating]) -> NDArray[np.float64]:

@@ -35,6 +35,14 @@ entrypoints._already_initialized = True
 _ensure_blas, linalg.ensure_blas = linalg.ensure_blas, lambda: None
 importlib.import_module("numba.np.arraymath")
 linalg.ensure_blas = _ensure_blas
+_dispatchers: dict[tuple[Any, bool], Any] = {}  # by kernel, and whether references to arrays are counted
+# Names of numpy's functions that make arrays. Where a kernel uses none, numba counts no references to its arrays,
+# unless it says that it must: for expressions with whole arrays.
+ALLOCATING = {"zeros", "ones", "full", "empty_like", "zeros_like", "full_like", "copy"}
+CODES = {
+    types.boolean: "?", types.int8: "b", types.int16: "h", types.int32: "i", types.int64: "q",
+    types.uint8: "B", types.uint16: "H", types.uint32: "I", types.uint64: "Q", types.float32: "f", types.float64: "d",
+}  # fmt: skip
 
 
 class KernelLibrary(CPUCodeLibrary):  # type: ignore[misc]
@@ -99,9 +107,6 @@ class KernelCompiler(CompilerBase):  # type: ignore[misc]
         return [passes]
 
 
-_dispatchers: dict[tuple[Any, bool], Any] = {}  # by kernel, and whether references to arrays are counted
-
-
 def compile_kernel(kernel: Any, arguments: tuple[Any, ...]) -> Compiled:
     """Compile a kernel for the types of its arguments."""
     with global_compiler_lock:
@@ -151,11 +156,6 @@ def _dispatcher(kernel: Any, counts: bool) -> Any:
     return _dispatchers[kernel, counts]
 
 
-# Names of numpy's functions that make arrays. Where a kernel uses none, numba counts no references to its arrays,
-# unless it says that it must: for expressions with whole arrays.
-ALLOCATING = {"zeros", "ones", "full", "empty_like", "zeros_like", "full_like", "copy"}
-
-
 def _allocates(kernel: Any) -> bool:
     """Whether a kernel, or one that it calls, allocates arrays."""
     names, known = kernel.py_func.__code__.co_names, kernel.py_func.__globals__
@@ -201,12 +201,6 @@ def _entry(context: Any, described: Any) -> tuple[Any, str, str]:
 def _leaves(kind: Any) -> list[Any]:
     """Types that a type consists of."""
     return [leaf for one in kind for leaf in _leaves(one)] if isinstance(kind, BaseTuple) else [kind]
-
-
-CODES = {
-    types.boolean: "?", types.int8: "b", types.int16: "h", types.int32: "i", types.int64: "q",
-    types.uint8: "B", types.uint16: "H", types.uint32: "I", types.uint64: "Q", types.float32: "f", types.float64: "d",
-}  # fmt: skip
 
 
 def _argument_code(kind: Any) -> str:

@@ -49,6 +49,8 @@ CODES = {"O": ctypes.py_object, "?": ctypes.c_bool, "d": ctypes.c_double, "f": c
 }
 BLOCK = 8  # entries that `write_larger` writes at once
 _loading = threading.RLock()
+_stamps: dict[str, str] = {}  # by the path of the module
+VARIABLE = "ORT_DISABLE_TELEMETRY"  # read when the native library is loaded
 
 
 class Intrinsic:
@@ -258,9 +260,6 @@ def _processor() -> object:
     return llvm.get_host_cpu_name(), sorted(llvm.get_host_cpu_features().items())
 
 
-_stamps: dict[str, str] = {}  # by the path of the module
-
-
 def _stamp(path: str, names: dict[str, Any]) -> str:
     """Hash of a module's name and text, of the modules of the kernels that it imports, and of imported constants."""
     if path not in _stamps:
@@ -334,9 +333,6 @@ def _private_folder() -> Path:
 
 
 FOLDER = cache_folder()
-
-
-VARIABLE = "ORT_DISABLE_TELEMETRY"  # read when the native library is loaded
 
 
 def disable_telemetry() -> None:

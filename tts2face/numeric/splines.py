@@ -27,6 +27,8 @@ DECAY_LENGTH = 64.0  # the basis function is exp(-r / 64) (eq. 4)
 FACE_WIDTH = 200.0  # width of the face in the unit of `DECAY_LENGTH`: pixels in the paper
 MIN_CENTRE_DISTANCE = 1e-6  # relative to the decay length; closer centres make the matrix singular
 CHUNK_SIZE = 512  # points evaluated at once, whose values of 500 centres stay in the cache of a core
+# Of the interpolation matrix; beyond it, half of the digits of the coefficients are rounding errors.
+MAX_CONDITION = 1e9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,10 +123,6 @@ def rbf_values(points: NDArray[np.floating], centres: NDArray[np.floating], deca
     values: FloatArray = cdist(points, centres)
     values /= -decay_length
     return np.exp(values, out=values)
-
-
-# Of the interpolation matrix; beyond it, half of the digits of the coefficients are rounding errors.
-MAX_CONDITION = 1e9
 
 
 def fit_local_interpolant(

@@ -27,6 +27,10 @@ from tts2face.storage.content_store import FolderStore
 from tts2face.storage.user_folders import user_cache
 from tts2face.video.networks import find_segmenter
 
+FOLDER, N_KEPT = "photos", 8
+LEAST_AGE_S = 3600.0  # of a face that is removed: another process may be about to read a younger one
+MAKING = 4  # raised when faces of photos are made in another way, or of another head
+
 
 def face_from_photo(  # noqa: PLR0913 - one parameter an option
     photo: str | Path,
@@ -114,11 +118,6 @@ def _without_background(seen: PhotographedFace, reader: PhotoReader, name: Path)
             "background, or a PNG picture whose background is transparent, does not"
         )
     return replace(seen, picture=parted)
-
-
-FOLDER, N_KEPT = "photos", 8
-LEAST_AGE_S = 3600.0  # of a face that is removed: another process may be about to read a younger one
-MAKING = 4  # raised when faces of photos are made in another way, or of another head
 
 
 def kept_path(photo: str | Path, fit: Path | None = None, smile: str | Path | None = None) -> Path:

@@ -37,6 +37,11 @@ BACKWARDS = 0.5  # of a step of a line, against its direction: at their corners 
 CROSSING = 0.01  # of the eye distance, by which lines may cross at the corners, as the tracker's do
 MOST_OFF = 0.8  # of the eye distance, between the middles of a line that is given and of the one that was found
 N_FINE = 400  # places along a line by which its length is measured
+_Point = Annotated[tuple[float, float], "[x, y] in pixels"]
+_Parts: dict[str, Any] = {
+    part: make_dataclass(part, [(edge, tuple[_Point, ...] | None, None) for edge in LINES[part]]) for part in LINES
+}
+Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,10 +82,6 @@ class PhotoFit:
         return content | {name: _rounded(point) for name, point in self.points.items()}
 
 
-_Point = Annotated[tuple[float, float], "[x, y] in pixels"]
-_Parts: dict[str, Any] = {
-    part: make_dataclass(part, [(edge, tuple[_Point, ...] | None, None) for edge in LINES[part]]) for part in LINES
-}
 _Written: Any = make_dataclass(
     "_Written", [(part, _Parts.get(part, _Point) | None, None) for part in (*LINES, *POINTS)]
 )
@@ -288,9 +289,6 @@ def _forward(line: Floats) -> Floats:
 
 
 NOTHING_GIVEN = PhotoFit({}, {})
-
-
-Ints = NDArray[np.int64]
 
 
 def place_landmarks(

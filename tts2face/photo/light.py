@@ -55,6 +55,30 @@ NO_EYES = np.array([0.2, 0.4], np.float32)  # edges of pupil and iris, of which 
 TURN_TERMS, MOVE_TERMS = slice(1, 4), slice(4, 7)  # of `tts2face.picture.baked.response.write_terms`
 LEAST_RESPONSE = 1e-6  # of 255, of a response
 CURVE_TERM = 2  # of `tts2face.picture.baked.response.write_mouth_terms`
+RAISED = ("browInnerUp", "browOuterUpLeft", "browOuterUpRight")
+SMILING = ("mouthSmileLeft", "mouthSmileRight")
+UNLIKE_SMILES = ("jawOpen", "mouthPucker")  # whose motion of the cheeks is none of a smile
+LEAST_MM = 0.6  # of movement, below which skin has no wrinkles
+BROW_EDGES = (70, 63, 105, 66, 107, 336, 296, 334, 293, 300)  # upper edges, from the person's right to the left
+FOREHEAD_TOP, NOSE_TIP = 10, 1  # landmarks
+FOREHEAD = (0.12, 0.3, 0.75, 1.0)  # of the way from brows to its top, over which lines begin and end
+LEAST_HIGH = 0.1  # of that half width, of the height of a forehead
+N_LINES = 3.0  # from brows to top
+FOREHEAD_SIDE = (0.75, 1.05)  # of the half width of the brows, over which lines end
+FOLDS = ((129, 203, 206, 216, 212), (358, 423, 426, 436, 432))  # from the wings of the nose past the mouth
+FOLD_ENDS = (0.1, 0.3, 0.75, 1.0)  # of the way along it, over which it begins and ends
+FOLD_REACH, CHEEK_REACH = 0.024, 0.045  # of the eye distance, of the shade of a fold and of the light beside it
+CHEEK_SHARE = 0.5  # of that light
+FOLD_BAND = 0.1  # of the eye distance to either side of a fold, beyond which nothing is looked for
+NEAR_FOLD = 2.0  # reaches of a fold, in which what the picture shows is one
+N_FOLD_POINTS = 81  # points along a fold
+TINY = 1e-9  # mm squared
+FAINT_LINES, FAINT_FOLDS = 0.018, 0.05  # of the colour: lines that the picture does not show
+DEEPER = 1.2  # lines that it shows, by how much of them
+MOST_SHOWN = 0.05  # of the colour, of what counts as a line
+LINE_BLUR = 0.01  # of the eye distance, as all of these ways
+ON_LINE = (-0.06, -0.03, 0.0, 0.03, 0.06)  # places on a line that are compared with those to its sides
+BESIDE_LINE = (-0.06, -0.045, 0.045, 0.06)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -209,32 +233,6 @@ def picture_light(
         view=np.zeros((TABLE_SIDE, TABLE_SIDE, TABLE_SIDE, 3), np.uint8),
         backdrop=pixels,
     )
-
-
-RAISED = ("browInnerUp", "browOuterUpLeft", "browOuterUpRight")
-SMILING = ("mouthSmileLeft", "mouthSmileRight")
-UNLIKE_SMILES = ("jawOpen", "mouthPucker")  # whose motion of the cheeks is none of a smile
-LEAST_MM = 0.6  # of movement, below which skin has no wrinkles
-BROW_EDGES = (70, 63, 105, 66, 107, 336, 296, 334, 293, 300)  # upper edges, from the person's right to the left
-FOREHEAD_TOP, NOSE_TIP = 10, 1  # landmarks
-FOREHEAD = (0.12, 0.3, 0.75, 1.0)  # of the way from brows to its top, over which lines begin and end
-LEAST_HIGH = 0.1  # of that half width, of the height of a forehead
-N_LINES = 3.0  # from brows to top
-FOREHEAD_SIDE = (0.75, 1.05)  # of the half width of the brows, over which lines end
-FOLDS = ((129, 203, 206, 216, 212), (358, 423, 426, 436, 432))  # from the wings of the nose past the mouth
-FOLD_ENDS = (0.1, 0.3, 0.75, 1.0)  # of the way along it, over which it begins and ends
-FOLD_REACH, CHEEK_REACH = 0.024, 0.045  # of the eye distance, of the shade of a fold and of the light beside it
-CHEEK_SHARE = 0.5  # of that light
-FOLD_BAND = 0.1  # of the eye distance to either side of a fold, beyond which nothing is looked for
-NEAR_FOLD = 2.0  # reaches of a fold, in which what the picture shows is one
-N_FOLD_POINTS = 81  # points along a fold
-TINY = 1e-9  # mm squared
-FAINT_LINES, FAINT_FOLDS = 0.018, 0.05  # of the colour: lines that the picture does not show
-DEEPER = 1.2  # lines that it shows, by how much of them
-MOST_SHOWN = 0.05  # of the colour, of what counts as a line
-LINE_BLUR = 0.01  # of the eye distance, as all of these ways
-ON_LINE = (-0.06, -0.03, 0.0, 0.03, 0.06)  # places on a line that are compared with those to its sides
-BESIDE_LINE = (-0.06, -0.045, 0.045, 0.06)
 
 
 def wrinkles(pixels: NDArray[np.uint8], mesh: PhotoMesh, motion: Mapping[str, Floats], person: PhotoPerson) -> Floats:

@@ -22,6 +22,40 @@ from tts2face.models.landmarks import (
 from tts2face.photo.found_face import FoundFace
 
 Floats = NDArray[np.float64]
+N_POINTS = 41  # along a lip, from the person's right corner to the left one
+CLOSED_GAP = 0.02  # of the eye distance, as all lengths below; closed lips have up to .017, narrow smiles from .024
+SEARCHED = 0.03  # to either side of the landmarks
+N_PLACES = 25  # that are compared across the line at each point
+SEAM_BLUR, LIP_BLUR = 0.005, 0.004
+LEAST_BLUR_PX, LEAST_LIP_BLUR_PX, LEAST_CONTRAST, TINY_PX = 0.6, 0.5, 1e-3, 1e-6
+STIFF_STEP = 0.01  # between neighbours, whose cost is the stiffness of a path
+LIP_MIDDLE = slice(6, -6)  # points whose colours are those of the lip
+SEAM_STIFFNESS, LIP_STIFFNESS = 2.0, 1.0  # cost of steps between neighbours
+SEAM_REST, LIP_REST = 0.15 / 0.02**2, 0.25 / 0.03**2  # cost of a distance from the landmarks
+EDGE_GAIN = 2.0
+LIP_SPREAD = np.array([22.0, 7.0, 9.0])  # of a lip's colour in Lab
+N_SIDE = 3  # places on each side of an edge whose colours are compared
+EDGE_SHADE, EDGE_DARKNESS = 0.006, 0.55  # reach of the shadow between lips that meet, and its share of the light
+EDGE_REACH, EDGE_FINE = 3, 4  # reaches beyond which there is no shade, and points of a finer edge
+SMOOTHING, WAY_SMOOTHING, CORNER_POINTS = 5, 7, 4  # points of means, and points over which corners take less
+LID_MARGINS = (RIGHT_LIDS, LEFT_LIDS)  # of the person, which the picture shows on its left and right
+N_LID = 25  # points along the margin of a lid, from the outer corner to the inner one
+BELOW = ((230, 231, 229, 118, 119, 117), (450, 451, 449, 347, 348, 346))  # landmarks of skin below the eyes
+ABOVE = ((225, 224, 223, 222), (445, 444, 443, 442))  # and between folds and brows
+LID_BLUR = 0.004  # of the eye distance, as all lengths below
+HUE_SPREAD, BRIGHT_SPREAD = 8.0, 30.0  # of the colours of skin in Lab
+LOWER_STEPS = np.arange(-0.012, 0.17, 0.006)  # of lower lids that are tried; drawn eyes are larger than the tracker's
+INSIDE, OUTSIDE = 0.012, 0.016  # of a lower lid, where the eye and skin are compared
+COST = 1.2  # of a step, over its length
+GAIN, LEAST_STEP = 0.15, 0.012  # of a step that is taken
+LARGE_EYES, LARGE_EYES_TRUST = 0.165, 0.4  # opening of drawn eyes, and the share of cost and gain that they need
+LARGE_EYES_MORE = 0.025  # so that no rim of the eye is left when its lids are shut
+CORNER_STEPS, CORNER_SKIN = np.arange(0.006, 0.05, 0.006), 0.25  # of corners, up to where there is skin
+MIDDLE = slice(4, -4)
+FOLD_STEPS = np.arange(0.04, 0.13, 0.006)  # of the fold above an upper lid: where skin begins
+FOLD_ROOM = 0.75  # of the way to the skin below the brow, at most
+FOLD_COLUMNS = slice(6, -6)
+FOLD_SKIN = 0.5
 
 
 def lab_at(pixels: NDArray[np.uint8], places: Floats, blur: float) -> Floats:
@@ -64,24 +98,6 @@ def colours_at(values: Floats, places: Floats) -> Floats:
     return np.stack(
         [map_coordinates(part, at, order=1, mode="nearest") for part in np.moveaxis(values, -1, 0)], axis=-1
     )
-
-
-N_POINTS = 41  # along a lip, from the person's right corner to the left one
-CLOSED_GAP = 0.02  # of the eye distance, as all lengths below; closed lips have up to .017, narrow smiles from .024
-SEARCHED = 0.03  # to either side of the landmarks
-N_PLACES = 25  # that are compared across the line at each point
-SEAM_BLUR, LIP_BLUR = 0.005, 0.004
-LEAST_BLUR_PX, LEAST_LIP_BLUR_PX, LEAST_CONTRAST, TINY_PX = 0.6, 0.5, 1e-3, 1e-6
-STIFF_STEP = 0.01  # between neighbours, whose cost is the stiffness of a path
-LIP_MIDDLE = slice(6, -6)  # points whose colours are those of the lip
-SEAM_STIFFNESS, LIP_STIFFNESS = 2.0, 1.0  # cost of steps between neighbours
-SEAM_REST, LIP_REST = 0.15 / 0.02**2, 0.25 / 0.03**2  # cost of a distance from the landmarks
-EDGE_GAIN = 2.0
-LIP_SPREAD = np.array([22.0, 7.0, 9.0])  # of a lip's colour in Lab
-N_SIDE = 3  # places on each side of an edge whose colours are compared
-EDGE_SHADE, EDGE_DARKNESS = 0.006, 0.55  # reach of the shadow between lips that meet, and its share of the light
-EDGE_REACH, EDGE_FINE = 3, 4  # reaches beyond which there is no shade, and points of a finer edge
-SMOOTHING, WAY_SMOOTHING, CORNER_POINTS = 5, 7, 4  # points of means, and points over which corners take less
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -215,26 +231,6 @@ def _smooth(values: Floats, n: int) -> Floats:
     padded = np.pad(values, ((n // 2, n // 2), (0, 0)), mode="edge")
     kernel = np.ones(n) / n
     return np.stack([np.convolve(column, kernel, "valid") for column in padded.T], axis=1)
-
-
-LID_MARGINS = (RIGHT_LIDS, LEFT_LIDS)  # of the person, which the picture shows on its left and right
-N_LID = 25  # points along the margin of a lid, from the outer corner to the inner one
-BELOW = ((230, 231, 229, 118, 119, 117), (450, 451, 449, 347, 348, 346))  # landmarks of skin below the eyes
-ABOVE = ((225, 224, 223, 222), (445, 444, 443, 442))  # and between folds and brows
-LID_BLUR = 0.004  # of the eye distance, as all lengths below
-HUE_SPREAD, BRIGHT_SPREAD = 8.0, 30.0  # of the colours of skin in Lab
-LOWER_STEPS = np.arange(-0.012, 0.17, 0.006)  # of lower lids that are tried; drawn eyes are larger than the tracker's
-INSIDE, OUTSIDE = 0.012, 0.016  # of a lower lid, where the eye and skin are compared
-COST = 1.2  # of a step, over its length
-GAIN, LEAST_STEP = 0.15, 0.012  # of a step that is taken
-LARGE_EYES, LARGE_EYES_TRUST = 0.165, 0.4  # opening of drawn eyes, and the share of cost and gain that they need
-LARGE_EYES_MORE = 0.025  # so that no rim of the eye is left when its lids are shut
-CORNER_STEPS, CORNER_SKIN = np.arange(0.006, 0.05, 0.006), 0.25  # of corners, up to where there is skin
-MIDDLE = slice(4, -4)
-FOLD_STEPS = np.arange(0.04, 0.13, 0.006)  # of the fold above an upper lid: where skin begins
-FOLD_ROOM = 0.75  # of the way to the skin below the brow, at most
-FOLD_COLUMNS = slice(6, -6)
-FOLD_SKIN = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -45,6 +45,8 @@ GRID_CLEAR = 0.55  # of its step, which a point of a grid keeps from all others
 ROW_STEP = 0.87  # between the rows of a grid, of its step
 MOST_REACH = 4.0  # of what moves from the oval of the face, of the eye distance
 EDGE_PX = 2.0  # from the picture's edge, which landmarks keep
+LEAST_LENGTH = 0.004  # of an edge, of the size of the face: shorter ones weigh no more
+RIDGE = 1e-9  # so that pieces of the mesh where nothing is known have a solution
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -325,10 +327,6 @@ def grid_triangles(numbers: Ints) -> Ints:
     """Triangles of a grid of vertices (R, C), of rows from above and columns from the left, seen from ahead."""
     a, b, c, d = (part.ravel() for part in (numbers[:-1, :-1], numbers[:-1, 1:], numbers[1:, :-1], numbers[1:, 1:]))
     return np.concatenate([np.column_stack([a, c, d]), np.column_stack([a, d, b])])
-
-
-LEAST_LENGTH = 0.004  # of an edge, of the size of the face: shorter ones weigh no more
-RIDGE = 1e-9  # so that pieces of the mesh where nothing is known have a solution
 
 
 class Spreading:

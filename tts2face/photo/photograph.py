@@ -31,6 +31,14 @@ NUMBERED = re.compile(r"(.+)@(\d{1,3})")  # a photo, and which of its faces
 OPAQUE, HALF = 255, 128
 WIDE_MODES = ("I", "I;16", "I;16L", "I;16B", "I;16N")  # of Pillow: greys of more than 8 bits
 HEIC_BRANDS = (b"heic", b"heix", b"heim", b"heis", b"hevc", b"mif1", b"msf1")
+Floats = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+PAINT_EYES_PX, PAINT_REACH_PX = 50.0, 3.0  # eye distance in which what is nearest goes on, and from how far
+HALF_KNOWN = 0.5  # share of a pixel from which its colour is known
+AGREED = 12.0  # of 255: difference of the colours of one thing
+LEAST_AGREED = 0.02  # weight of what is nearest
+GAP = 0.3  # of the eye distance: a gap over which a line weighs half as much as over none
+STANDS_OUT_REACH = 0.3  # of the eye distance, from whose mean colour lines stand out
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,17 +187,6 @@ def split_number(photo: str | Path) -> tuple[Path, int]:
     if not path.is_file():
         raise InputError(f"there is no photo {path}; check the path")
     return path, number
-
-
-Floats = NDArray[np.float32]
-Mask = NDArray[np.bool_]
-
-PAINT_EYES_PX, PAINT_REACH_PX = 50.0, 3.0  # eye distance in which what is nearest goes on, and from how far
-HALF_KNOWN = 0.5  # share of a pixel from which its colour is known
-AGREED = 12.0  # of 255: difference of the colours of one thing
-LEAST_AGREED = 0.02  # weight of what is nearest
-GAP = 0.3  # of the eye distance: a gap over which a line weighs half as much as over none
-STANDS_OUT_REACH = 0.3  # of the eye distance, from whose mean colour lines stand out
 
 
 def paint_hole(pixels: Pixels, hole: Mask, scale: float) -> Pixels:
