@@ -46,9 +46,9 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
     """Build a gesture style for `--palette` from recordings of a person; transcripts are not needed."""
     check_suffix(out, "palette")
     from corpus_tools.build_palette import StyleSource, build_style
-    from corpus_tools.decomposition.basis import find_stills, parse_stills
-    from corpus_tools.decomposition.markers import DEFAULT_MARKER_TABLE
-    from corpus_tools.decomposition.recordings import MarkerOptions
+    from corpus_tools.decomposition.capture_files import MarkerOptions
+    from corpus_tools.decomposition.marker_sets import DEFAULT_MARKER_TABLE
+    from corpus_tools.decomposition.stills import find_stills, parse_stills
     from corpus_tools.run_options import ignore_stage
     from tts2face.models.palette_file import load_palette
 

@@ -1,8 +1,5 @@
 """``tts2face corpus evaluate``: the split of the recordings and the output of the measures."""
 
-import csv
-import io
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -96,7 +93,10 @@ def run_evaluation(
         write_message(f"warning: {warning}")
     print(f"{result.table()}\n\n{result.class_table()}")  # noqa: T201 - the result
     if out is not None:
-        _write_evaluation(out, result, runs)
+        from corpus_tools.studies.evaluation.page import REPORT
+        from tts2face.storage.files import write_atomically
+
+        write_atomically(out, REPORT.formats[out.suffix]((result, runs)))
         kind = "of another talker" if result.is_across else "held out"
         write_message(f"wrote {out}: {result.n_test} utterances {kind}, {result.n_train} for training")
 
@@ -164,18 +164,3 @@ def _read_observations(folder: Path, run_options: "RunOptions") -> "tuple[Observ
     for refusal in found.refused:
         write_message(f"rejected {refusal.name}: {refusal.reason}")
     return found.kept
-
-
-def _write_evaluation(out: Path, result: "Evaluation", runs: "tuple[SplitResult, ...]") -> None:
-    from tts2face.storage.files import write_atomically
-
-    if out.suffix == ".json":
-        write_atomically(out, json.dumps(result.to_json(), indent=1).encode())
-    elif out.suffix == ".csv":
-        table = io.StringIO()
-        csv.writer(table, lineterminator="\n").writerows(result.rows())
-        write_atomically(out, table.getvalue().encode())
-    else:
-        from corpus_tools.studies.evaluation.page import evaluation_page
-
-        write_atomically(out, evaluation_page(result, runs).encode())

@@ -169,7 +169,7 @@ def calibrate(
     del yes  # read where the model is missing
     check_file_name(out, "a face", (".face",))
     refuse_overwriting({"--out": out}, {"--talker": talker, "--model": model})
-    from corpus_tools.training.calibrate_face import calibrate_face_file
+    from corpus_tools.training.calibrate_file import calibrate_face_file
 
     with progress_bar("rendering poses") as on_progress:
         calibrate_face_file(name, out, source=talker, model=model, on_progress=on_progress)

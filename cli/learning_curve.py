@@ -20,18 +20,17 @@ def run_learning_curve(
     folder = split_flags.curve_recordings(comparison)
     from corpus_tools.measures.splits import split_randomly
     from corpus_tools.run_options import ignore_stage
-    from corpus_tools.studies.evaluation.curve_page import WRITERS
+    from corpus_tools.studies.evaluation.curve_page import REPORT
     from corpus_tools.studies.evaluation.curve_tables import curve_tables
     from corpus_tools.studies.evaluation.learning_curve import DEFAULT_AMOUNTS_S, measure_learning_curve
     from corpus_tools.studies.evaluation.material import read_material
-    from corpus_tools.studies.pages import report_writer
     from corpus_tools.training.adapt_talker import Base
-    from corpus_tools.training.choose_adaptation import NO_BASE
+    from corpus_tools.training.short_talker import NO_BASE
     from tts2face.models.talker_file import load_talker
     from tts2face.storage.files import write_atomically
 
     amounts_s = DEFAULT_AMOUNTS_S if amounts == AUTOMATIC else _parse_seconds(amounts)
-    writer = None if out is None else report_writer(out, WRITERS)
+    writer = None if out is None else REPORT.writer(out)
     name = base or DEFAULT_BASE
     indexed = None if name == NO_BASE else Base.of(load_talker(name))
     with stage_bar() as stages:

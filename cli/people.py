@@ -1,8 +1,5 @@
 """``tts2face corpus evaluate --people``: a finished talker on landmark tracks of other people."""
 
-import csv
-import io
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +9,7 @@ from lexicon.errors import InputError
 from tts2face.storage.output_paths import check_file_name
 
 if TYPE_CHECKING:
-    from corpus_tools.studies.evaluation.people import PeopleEvaluation
+    pass
 
 PEOPLE_SUFFIXES = (".json", ".csv")
 DEFAULT_TALKER = "grid_s1"
@@ -31,7 +28,7 @@ def run_people_evaluation(talker: str, people: list[Path], comparison: Compariso
     from corpus_tools.studies.evaluation.people_tables import difference_table, people_table, phone_table
     from corpus_tools.studies.evaluation.person_tracks import read_person
     from corpus_tools.studies.evaluation.tracks import read_tracks
-    from corpus_tools.training.train_talker import correct_pose
+    from corpus_tools.training.pose_correction import correct_pose
     from tts2face.models.talker_file import load_talker
 
     tests = [correct_pose(read_person(folder)) for folder in people]
@@ -47,17 +44,8 @@ def run_people_evaluation(talker: str, people: list[Path], comparison: Compariso
     tables = (people_table(found), difference_table(found, DEFAULT_METHOD), phone_table(found, methods))
     print("\n\n".join(tables))  # noqa: T201 - the result
     if out is not None:
-        _write_people(out, found)
+        from corpus_tools.studies.evaluation.people_tables import REPORT
+        from tts2face.storage.files import write_atomically
+
+        write_atomically(out, REPORT.formats[out.suffix](found))
         write_message(f"wrote {out}: {found.n_utterances} utterances of {found.n_people} people")
-
-
-def _write_people(out: Path, found: "PeopleEvaluation") -> None:
-    from corpus_tools.studies.evaluation.people_tables import people_rows
-    from tts2face.storage.files import write_atomically
-
-    if out.suffix == ".json":
-        write_atomically(out, json.dumps(found.to_json(), indent=1).encode())
-        return
-    table = io.StringIO()
-    csv.writer(table, lineterminator="\n").writerows(people_rows(found))
-    write_atomically(out, table.getvalue().encode())

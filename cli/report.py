@@ -91,7 +91,8 @@ def moods(  # noqa: PLR0913 - one parameter a flag
     """Render the derived styles of a palette and tell them apart by the face tracker's scores."""
     del yes  # read where the model is missing
     refuse_overwriting({"--out": out}, {"the palette": palette, "--face": face})
-    from corpus_tools.studies.gestures.moods import MoodOptions, write_moods
+    from corpus_tools.studies.gestures.moods import MoodOptions
+    from corpus_tools.studies.gestures.write_moods import write_moods
     from tts2face.session.session import Session
 
     options = MoodOptions(seeds=seeds, first_seed=seed, size=size)
@@ -116,7 +117,7 @@ def retarget(
     """Compare what the face tracker reads in recordings and in a face that mimics them, phone by phone."""
     refuse_overwriting({"--out": out}, {"the recordings": recordings, "--face": face, "--model": tool.model})
     from corpus_tools.run_options import ignore_stage
-    from corpus_tools.studies.retargeting.page import write_retargeting
+    from corpus_tools.studies.retargeting.write import write_retargeting
     from tts2face.models.face_names import default_face
 
     with stage_bar() as stages:

@@ -10,15 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.decomposition.basis import (
-    NEUTRAL,
-    ExpressionBasis,
-    PictureReader,
-    Still,
-    basis_from_stills,
-    build_marker_reader,
-    transfer_basis,
-)
+from corpus_tools.decomposition.basis import ExpressionBasis, basis_from_stills, transfer_basis
 from corpus_tools.decomposition.blend_weights import (
     MAX_SLACK,
     Estimator,
@@ -26,19 +18,18 @@ from corpus_tools.decomposition.blend_weights import (
     build_nearest_samples_estimator,
 )
 from corpus_tools.decomposition.capture import FaceRecording
-from corpus_tools.decomposition.decompose import (
-    Decomposition,
-    add_style,
-    decompose,
-    read_derived_styles,
-    weight_displacements,
-)
-from corpus_tools.decomposition.markers import read_marker_face, read_marker_set
-from corpus_tools.decomposition.recordings import MarkerOptions, read_recordings
+from corpus_tools.decomposition.capture_files import MarkerOptions
+from corpus_tools.decomposition.decompose import Decomposition, decompose, weight_displacements
+from corpus_tools.decomposition.derived_styles import read_derived_styles
+from corpus_tools.decomposition.learnt_style import add_style
+from corpus_tools.decomposition.marker_sets import read_marker_set
+from corpus_tools.decomposition.markers import read_marker_face
+from corpus_tools.decomposition.recordings import read_recordings
+from corpus_tools.decomposition.stills import NEUTRAL, PictureReader, Still, build_marker_reader
 from corpus_tools.recordings.observe import Refusal
 from corpus_tools.recordings.provenance import PROVENANCE, PROVENANCE_FIELDS, read_provenance
 from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
-from corpus_tools.training.train_talker import fit_pose_correction
+from corpus_tools.training.pose_correction import fit_pose_correction
 from lexicon.errors import DataError, InputError
 from lexicon.values.fields import check_fields
 from tts2face.face.deformation import rest_landmarks
@@ -147,7 +138,7 @@ def build_style(  # noqa: PLR0913 - run options change no motion
         palette = replace(palette, derivations=read_derived_styles(style))
     write_palette(out, palette)
     minutes = learnt.palette.styles[style].seconds / 60
-    notes = tuple(f"{one.name}: {note}" for one in captured for note in one.notes)
+    notes = tuple(f"{recording.name}: {note}" for recording in captured for note in recording.notes)
     return BuiltStyle(len(captured), minutes, tuple(refused), notes, learnt.kept)
 
 
@@ -157,8 +148,8 @@ def decompose_recordings(
     """Decompositions of recordings of one person, after correction of pose-dependent errors."""
     leak = fit_pose_correction(captured)
     parts = []
-    for number, one in enumerate(captured, start=1):
-        parts.append(decompose(leak.apply(one), basis, estimator))
+    for number, recording in enumerate(captured, start=1):
+        parts.append(decompose(leak.apply(recording), basis, estimator))
         if on_progress:
             on_progress(number, len(captured))
     return parts
@@ -173,13 +164,7 @@ def build_estimator(name: str, basis: ExpressionBasis, epsilon: float = 0.0) -> 
 
 
 def build_basis(recorded: StyleSource, captured: Sequence[FaceRecording], face: Face) -> ExpressionBasis:
-    """The person's basis expressions: captured, or transferred from the default head.
-
-    Raises
-    ------
-    InputError, DataError
-        A still is missing or cannot be read.
-    """
+    """The person's basis expressions: captured, or transferred from the default head."""
     rest = person_at_rest(captured)
     if recorded.stills:
         known = None if NEUTRAL in recorded.stills else rest
@@ -188,13 +173,7 @@ def build_basis(recorded: StyleSource, captured: Sequence[FaceRecording], face: 
 
 
 def build_still_reader(recorded: StyleSource, face: Face) -> Callable[[Still], NDArray[np.float64]]:
-    """The reader of the stills: the tracker for pictures, or a reader of markers.
-
-    Raises
-    ------
-    InputError
-        Only some stills are markers, or there are no markers at rest.
-    """
+    """The reader of the stills: the tracker for pictures, or a reader of markers."""
     are_markers = {still.is_markers for still in recorded.stills.values()}
     if are_markers == {False}:
         return PictureReader()
@@ -209,10 +188,10 @@ def build_still_reader(recorded: StyleSource, face: Face) -> Callable[[Still], N
 
 def person_at_rest(captured: Sequence[FaceRecording]) -> NDArray[np.float64]:
     """(478, 3) landmarks of the person at rest: as captured, or the median of frames with closed lips and open lids."""
-    given = next((one.rest for one in captured if one.rest is not None), None)
+    given = next((recording.rest for recording in captured if recording.rest is not None), None)
     if given is not None:
         return np.asarray(given, np.float64)
-    frames = np.concatenate([one.landmarks for one in captured])
+    frames = np.concatenate([recording.landmarks for recording in captured])
     frames = frames[:: max(1, len(frames) // N_REST_FRAMES)]
     opened = np.minimum(eye_aperture(frames, "Left"), eye_aperture(frames, "Right"))
     is_open = opened >= MIN_OPEN_LIDS * np.median(opened)

@@ -17,8 +17,13 @@ from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
 from corpus_tools.studies.plots import load_matplotlib
 from corpus_tools.studies.recordings_page import recordings_page
 from corpus_tools.training.adapt_talker import Base, carried_audio_maps
-from corpus_tools.training.choose_adaptation import (
-    BASE_ONLY,
+from corpus_tools.training.choose_adaptation import BASE_ONLY
+from corpus_tools.training.learn_audio_maps import learn_audio_maps
+from corpus_tools.training.phone_network import add_phone_network
+from corpus_tools.training.pooling.base_speech import base_speech
+from corpus_tools.training.pose_correction import correct_pose
+from corpus_tools.training.score_map import add_score_map
+from corpus_tools.training.short_talker import (
     NO_BASE,
     ShortTalker,
     learn_short_talker,
@@ -26,11 +31,7 @@ from corpus_tools.training.choose_adaptation import (
     recording_advice,
     statements_of_both,
 )
-from corpus_tools.training.network_audio_map import learn_audio_maps
-from corpus_tools.training.phone_network import add_phone_network
-from corpus_tools.training.pooling.speech import base_speech
-from corpus_tools.training.score_map import add_score_map
-from corpus_tools.training.train_talker import correct_pose, learn_talker
+from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError
 from tts2face.models.talker import NOT_STATED, Talker
 from tts2face.models.talker_file import load_talker, write_talker
@@ -137,7 +138,7 @@ def build_talker(  # noqa: PLR0913 - run options and the date change no motion
             talker, observations.kept, run_options=run_options or RunOptions(), on_progress=on_frames
         )
     write_talker(out, talker)
-    minutes = sum(len(one.landmarks) / one.fps for one in steady) / 60.0
+    minutes = sum(len(item.landmarks) / item.fps for item in steady) / 60.0
     notes = (*short.notes, *recording_advice(steady)) if short else ()
     return BuiltTalker(len(steady), minutes, observations.refused, observations.warnings, notes)
 
@@ -183,13 +184,6 @@ def add_appearance(
     observations
         Training observations of the talker, in the order of its first utterances; the appearance of further ones,
         which are those of a base, is predicted from the lips.
-
-    Raises
-    ------
-    InputError
-        There are too few frames for the modes.
-    BackendError
-        A package or the landmark models are missing.
     """
     from corpus_tools.appearance.train import learn_appearance
     from corpus_tools.appearance.videos import build_appearance_recording
@@ -209,7 +203,7 @@ def add_appearance(
     if not carried:
         return talker
     predict = appearance_from_lips(talker)
-    predicted = (replace(one, appearance_parameters=predict(one.shape, talker.fps)) for one in carried)
+    predicted = (replace(item, appearance_parameters=predict(item.shape, talker.fps)) for item in carried)
     return replace(talker, utterances=(*utterances, *predicted))
 
 
@@ -231,7 +225,7 @@ def add_audio_maps(
         A recording holds no sound, or its frame rate is not the talker's.
     """
     kept = correct_pose(check_any_kept(observe(recordings, run_options=run_options, on_progress=stages(READING_STAGE))))
-    if any(one.fps != talker.fps for one in kept):
+    if any(recording.fps != talker.fps for recording in kept):
         raise DataError(f"the recordings do not have the talker's {talker.fps:g} frames per second; convert them")
     audio_maps = learn_audio_maps(kept, talker, stages=stages)
     if not audio_maps:

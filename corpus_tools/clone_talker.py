@@ -81,13 +81,6 @@ def transfer_talker(source: Talker, target: Talker, *, gain: float = 1.0, append
 
     Head translations are scaled with the size of the faces; angles do not change. If the target has an appearance
     model, its parameters are transferred from the source by eq. 5, or predicted from the lips if the source has none.
-
-    Raises
-    ------
-    InputError
-        The source has no utterance, or the gain is not a number from 0 up.
-    DataError
-        A shape model is unsuitable.
     """
     if not source.utterances:
         raise InputError("the source talker has no utterance to clone; give a talker built from recordings")

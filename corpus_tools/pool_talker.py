@@ -53,4 +53,4 @@ def pool_talker(
     pooled = align_lip_tracks(read_lip_tracks(tracks), learnt, stages(STAGES[0]))
     trained = add_phone_network(learnt, pooled, on_progress=stages(STAGES[1]))
     write_talker(out, replace(trained, metadata={**learnt.metadata, "pooled": source}))
-    return PooledTalker(len(pooled), sum(float(one.is_used.sum()) / one.fps for one in pooled) / 60)
+    return PooledTalker(len(pooled), sum(float(track.is_used.sum()) / track.fps for track in pooled) / 60)

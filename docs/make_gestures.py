@@ -9,8 +9,9 @@ from pathlib import Path
 
 from corpus_tools.studies.gestures.analysis import StudyOptions, StyleStudy, TraitComparison, study_gestures
 from corpus_tools.studies.gestures.gaze import GazeStudy, study_gaze
-from corpus_tools.studies.gestures.moods import MoodOptions, MoodStudy, mood_rows, study_moods
-from corpus_tools.studies.gestures.page import gaze_panels, panels_png
+from corpus_tools.studies.gestures.moods import MoodOptions, MoodStudy, study_moods
+from corpus_tools.studies.gestures.page import gaze_panels, panels_plot
+from corpus_tools.studies.gestures.write_moods import mood_rows
 from tts2face.models.palette import MEASURED_STYLE
 from tts2face.models.palette_file import load_palette
 from tts2face.session.session import Session
@@ -128,7 +129,7 @@ def mood_tables() -> dict[str, str]:
 def gaze_tables() -> dict[str, str]:
     """Tables of the gaze, of which a picture is written too."""
     found = study_gaze(PEOPLE)
-    GAZE_PICTURE.write_bytes(panels_png("Gaze of people and of made people", gaze_panels(found)))
+    GAZE_PICTURE.write_bytes(panels_plot("Gaze of people and of made people", gaze_panels(found)).png())
     return {"gaze": gaze(found)}
 
 

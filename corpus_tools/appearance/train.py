@@ -10,50 +10,20 @@ from numpy.typing import NDArray
 from corpus_tools.appearance.frame import (
     MOUTH_LANDMARKS,
     ReferenceFrame,
-    align_shapes,
     build_reference_frame,
     face_ring,
     face_triangles,
     mouth_triangles,
 )
+from corpus_tools.appearance.lighting import LightingCorrection, fit_lighting
 from corpus_tools.appearance.pca import IncrementalPca
-from corpus_tools.appearance.videos import AppearanceRecording, choose_plate_frames, encode_plate_video
+from corpus_tools.appearance.plate import choose_plate_frames, encode_plate_video
+from corpus_tools.appearance.procrustes import align_shapes
+from corpus_tools.appearance.videos import AppearanceRecording
 from lexicon.errors import InputError
 from tts2face.models.appearance import Appearance, Plate, TextureModel
 from tts2face.models.landmarks import FACE_OVAL, MOUTH_REGION, N_MESH_LANDMARKS, lip_opening
 from tts2face.types import Progress
-
-GAIN_LIMITS = (0.5, 2.0)  # beyond them it is another scene, not another light
-Floats = NDArray[np.float32]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LightingCorrection:
-    """``texture in the reference's light = gain * texture + offset``, each (3,)."""
-
-    gain: Floats
-    offset: Floats
-
-    def apply(self, texture: Floats) -> Floats:
-        """(P, 3) a texture in the reference's light."""
-        return self.gain * texture + self.offset
-
-
-def fit_lighting(texture: Floats, reference: Floats, still: NDArray[np.bool_]) -> LightingCorrection:
-    """The light of a recording whose mean texture (P, 3) this is, by least squares on the pixels that speech leaves.
-
-    Parameters
-    ----------
-    still : (P,)
-        Pixels to compare.
-    """
-    here, there = texture[still].astype(np.float64), reference[still].astype(np.float64)
-    centred = here - here.mean(axis=0)
-    gain = (centred * (there - there.mean(axis=0))).sum(axis=0) / np.maximum((centred**2).sum(axis=0), 1e-9)
-    gain = np.clip(gain, *GAIN_LIMITS)
-    offset = there.mean(axis=0) - gain * here.mean(axis=0)
-    return LightingCorrection(gain.astype(np.float32), offset.astype(np.float32))
-
 
 N_REFERENCE_SHAPES = 4000  # frames from which the reference shape is made
 OPEN_LIP_QUANTILE = 0.9  # the reference is the mean of the frames with lip gaps above this quantile

@@ -165,15 +165,7 @@ def build_nearest_samples_estimator(
 
 
 def reduce_basis(basis: NDArray[np.floating], slack: float = 0.0) -> ReducedBasis:
-    """A basis (B, ...) of displacements in the axes of its span.
-
-    Raises
-    ------
-    InputError
-        `slack` is not in [0, 1].
-    DataError
-        The expressions depend on each other, so that weights are not unique, or are not finite.
-    """
+    """A basis (B, ...) of displacements in the axes of its span."""
     if not 0.0 <= slack <= MAX_SLACK:
         raise InputError(f"weights may pass their limits by 0 to {MAX_SLACK:g}, not by {slack:g}")
     flat = np.asarray(basis, np.float64).reshape(len(basis), -1)

@@ -56,15 +56,7 @@ class C3dFile:
 
 
 def read_c3d_file(path: Path) -> C3dFile:
-    """Contents of a file.
-
-    Raises
-    ------
-    OSError
-        It cannot be read.
-    ValueError, IndexError, KeyError
-        It is damaged, ends before its last frame, or is of another format.
-    """
+    """Contents of a file."""
     with path.open("rb") as file:
         header = file.read(BLOCK_BYTES)
         if len(header) < BLOCK_BYTES or header[1] != HEADER_KEY:

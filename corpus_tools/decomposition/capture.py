@@ -117,13 +117,7 @@ def _interpolate_frames(values: Floats, fps: float, target_fps: float, n_frames:
 
 
 def read_capture_sound(capture: Path) -> Waveform | None:
-    """The sound of the file that `find_capture_sound` finds for a capture.
-
-    Raises
-    ------
-    InputError, DataError
-        As `find_capture_sound` and `tts2face.video.media.read_sound`.
-    """
+    """The sound of the file that `find_capture_sound` finds for a capture."""
     found = find_capture_sound(capture)
     return None if found is None else read_sound(found, SOUND_RATE)
 

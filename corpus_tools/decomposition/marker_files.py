@@ -42,13 +42,6 @@ def read_markers(path: Path, fps: float | None = None) -> MarkerTake:
     ----------
     fps
         Frame rate of a table with frame numbers.
-
-    Raises
-    ------
-    InputError
-        There is no such file, its format is unknown, or a table has frame numbers and `fps` is missing.
-    DataError
-        It is damaged.
     """
     readers = {".c3d": lambda: read_c3d(path), ".csv": lambda: read_marker_table(path, fps)}
     if path.suffix.lower() not in readers:

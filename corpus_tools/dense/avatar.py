@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from corpus_tools.dense.build_face import CONTENT, SOURCE_FACE, BuiltFace, fit_person, paint_person
 from corpus_tools.dense.mesh_fit import align_to_head, face_landmarks
 from corpus_tools.dense.person_look import LookChoices
-from corpus_tools.dense.texels import TrackedPictures
+from corpus_tools.dense.tracked_pictures import TrackedPictures
 from tts2face.models.consent import PHOTO_TOOL, consent_record
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
@@ -79,7 +79,7 @@ def build_avatar(  # noqa: PLR0913 - one parameter an option
     record = consent_record(name or split_number(photos[0])[0].stem, consent)
     head = read_face(find_file(SOURCE_FACE, "face"))
     seen, neutral = _read(photos, head, model, on_warning)
-    mirrored = [_mirrored(one, mirror_table(head)) for one in seen]
+    mirrored = [_mirrored(observed, mirror_table(head)) for observed in seen]
     fitted = fit_person(head, np.mean(neutral, axis=0))
     face, look = paint_person(fitted, [*seen, *mirrored], lambda done, of: None, choices)
     face = replace(face, metadata=_metadata(head, record, look.summary()))

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.dense.adapt_head import adapt_head
+from corpus_tools.dense.light_colour import remove_cast, skin_texture
 from corpus_tools.dense.mesh_fit import (
-    adapt_head,
     align_to_head,
     correct_lips_and_lids,
     face_landmarks,
@@ -18,9 +19,10 @@ from corpus_tools.dense.mesh_fit import (
 )
 from corpus_tools.dense.modes import MOST_MODES, DenseModel, add_modes, dense_model, mode_fitter
 from corpus_tools.dense.person_look import AS_SEEN, LookChoices, LookSampler, PersonLook, dress_head
-from corpus_tools.dense.skin_colour import average_skin_colours, build_picture_fitter, remove_cast, skin_texture
-from corpus_tools.dense.texels import TrackedPictures, build_canvas, find_videos, resting_landmarks, track_videos
+from corpus_tools.dense.skin_canvas import build_canvas
+from corpus_tools.dense.skin_colour import average_skin_colours, build_picture_fitter
 from corpus_tools.dense.texture import paint_skin
+from corpus_tools.dense.tracked_pictures import TrackedPictures, find_videos, resting_landmarks, track_videos
 from corpus_tools.recordings.provenance import PROVENANCE, read_provenance
 from corpus_tools.recordings.video import CachedTracker
 from corpus_tools.run_options import RunOptions
@@ -147,13 +149,7 @@ def fit_person(head: Face, person: Floats) -> FittedHead:
 def paint_person(
     fitted: FittedHead, seen: Sequence[TrackedPictures], on_progress: Progress, choices: LookChoices = AS_SEEN
 ) -> tuple[Face, PersonLook]:
-    """The head with the skin, eyes, hair and shirt that frames show, and what was found or chosen.
-
-    Raises
-    ------
-    DataError
-        No frame shows open eyes.
-    """
+    """The head with the skin, eyes, hair and shirt that frames show, and what was found or chosen."""
     canvas = build_canvas(fitted.shaped)
     seen_vertices = np.unique(canvas.texels.corners[canvas.share > 0])
     fit = build_picture_fitter(fitted.shaped, canvas.opened, fitted.used, seen_vertices)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.dense.skin_colour import log_colour
-from corpus_tools.dense.texels import polygon_depth
+from corpus_tools.dense.light_colour import log_colour
+from corpus_tools.dense.skin_canvas import polygon_depth
 from tts2face.models.landmarks import CHIN, FACE_OVAL
 
 Floats = NDArray[np.float64]

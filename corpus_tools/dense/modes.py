@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.dense.mesh_fit import EYE_PARTS, RIGID_MOUTH_PARTS, face_landmarks, part_vertices
+from corpus_tools.dense.adapt_head import EYE_PARTS, RIGID_MOUTH_PARTS
+from corpus_tools.dense.mesh_fit import face_landmarks, part_vertices
 from corpus_tools.dense.skin_colour import PictureFitter, build_picture_fitter
-from corpus_tools.dense.texels import TrackedPictures
+from corpus_tools.dense.tracked_pictures import TrackedPictures
 from lexicon.errors import InputError
 from tts2face.face.mouth import CHIN_LANDMARKS
 from tts2face.face.shape_transfer import append_shapes
@@ -154,13 +155,8 @@ def dense_model(
         The talker's landmarks at rest, to which the head was adapted.
     n_modes
         Modes to keep.
-
-    Raises
-    ------
-    InputError
-        There are fewer frames or directions than modes, or `n_modes` is below 1.
     """
-    videos = [displacements(fit, one.landmarks, talker) for one in landmarks]
+    videos = [displacements(fit, landmark.landmarks, talker) for landmark in landmarks]
     frames = np.concatenate(videos)
     most = min(len(frames) - 1, MOST_MODES)
     if not 1 <= n_modes <= most:
@@ -240,6 +236,6 @@ def _held_out(videos: Sequence[Floats], metric: Floats, n_vertices: int, n_modes
     for own in (metric, np.eye(len(metric))):
         found = components(learnt, own)
         left = [found.residual(frames, k) for k in counts]
-        squares = [(one * _times(metric, one)).sum(axis=(1, 2)).mean() for one in left]
+        squares = [(item * _times(metric, item)).sum(axis=(1, 2)).mean() for item in left]
         errors.append(tuple(float(np.sqrt(square / n_vertices)) for square in squares))
     return HeldOut(counts, *errors)

@@ -15,20 +15,19 @@ from corpus_tools.dense.hair_region import (
     find_hair,
     portrait_grid,
 )
-from corpus_tools.dense.mesh_fit import part_vertices
-from corpus_tools.dense.skin_colour import (
+from corpus_tools.dense.light_colour import (
     MIN_IRIS_PX,
     SCLERA_CHROMA,
     EyeColours,
-    PictureFitter,
     clear_iris,
     estimate_cast,
     log_colour,
     median_eyes,
     sample_eyes,
-    sample_picture,
     srgb_colour,
 )
+from corpus_tools.dense.mesh_fit import part_vertices
+from corpus_tools.dense.skin_colour import PictureFitter, sample_picture
 from corpus_tools.dense.texels import find_texels
 from lexicon.values.fields import check_fields
 from tts2face.models.face import Face, Hairdo

@@ -6,9 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.dense.hair_region import OTHER_HUE
+from corpus_tools.dense.light_colour import linear_light, log_colour
 from corpus_tools.dense.mesh_fit import face_landmarks, part_vertices
-from corpus_tools.dense.skin_colour import SkinColours, linear_light, log_colour, welded_normals
-from corpus_tools.dense.texels import SkinCanvas, Texels, blur, soften_edges
+from corpus_tools.dense.skin_canvas import SkinCanvas, soften_edges
+from corpus_tools.dense.skin_colour import SkinColours, welded_normals
+from corpus_tools.dense.texels import Texels, blur
 from tts2face.models.face import Face, Texture
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT
 from tts2face.numeric.arrays import encode_light, smoothstep

@@ -62,12 +62,12 @@ def fingerprint_observations(observations: Sequence[Observation]) -> tuple[Finge
     """
     return tuple(
         Fingerprint(
-            one.name,
-            None if (sound := _sound(one)) is None else sound_changes(sound),
-            motion_changes(face_modes(one.landmarks), one.head, one.intensity, one.fps),
-            one.phones,
+            observation.name,
+            None if (sound := _sound(observation)) is None else sound_changes(sound),
+            motion_changes(face_modes(observation.landmarks), observation.head, observation.intensity, observation.fps),
+            observation.phones,
         )
-        for one in observations
+        for observation in observations
     )
 
 
@@ -77,12 +77,12 @@ def fingerprint_talker(talker: Talker) -> tuple[Fingerprint, ...]:
     turn = face_modes(talker.model.mean + talker.model.basis) - offset  # both models are linear
     return tuple(
         Fingerprint(
-            one.name,
+            utterance.name,
             None,
-            motion_changes(one.shape @ turn + offset, one.head, one.intensity, talker.fps),
-            one.phones,
+            motion_changes(utterance.shape @ turn + offset, utterance.head, utterance.intensity, talker.fps),
+            utterance.phones,
         )
-        for one in talker.utterances
+        for utterance in talker.utterances
     )
 
 
@@ -90,14 +90,16 @@ def find_same(known: Sequence[Fingerprint], tested: Sequence[Fingerprint]) -> tu
     """Names of the tested recordings that are known, each with the name of the most similar known one."""
     if not known or not tested:
         return ()
-    motion = similarities([one.motion for one in tested], [one.motion for one in known])
+    motion = similarities([recording.motion for recording in tested], [recording.motion for recording in known])
     excess = np.maximum(motion - SAME_MOTION, _sound_similarities(tested, known) - SAME_SOUND)
-    for at, one in enumerate(tested):
+    for at, recording in enumerate(tested):
         for candidate in np.flatnonzero(motion[at] >= SAME_MOTION_OF_PHONES).tolist():
-            if _have_same_durations(one.phones, known[candidate].phones):
+            if _have_same_durations(recording.phones, known[candidate].phones):
                 excess[at, candidate] = max(excess[at, candidate], 0.0)
     best: list[int] = excess.argmax(axis=1).tolist()
-    return tuple((one.name, known[best[at]].name) for at, one in enumerate(tested) if excess[at, best[at]] >= 0)
+    return tuple(
+        (recording.name, known[best[at]].name) for at, recording in enumerate(tested) if excess[at, best[at]] >= 0
+    )
 
 
 def check_no_same(known: Sequence[Fingerprint], tested: Sequence[Fingerprint], places: str, remedy: str) -> None:
@@ -107,11 +109,6 @@ def check_no_same(known: Sequence[Fingerprint], tested: Sequence[Fingerprint], p
     ----------
     places, remedy
         Where the lists are from, and what to do, for the message.
-
-    Raises
-    ------
-    InputError
-        There is such a recording.
     """
     if same := find_same(known, tested):
         name, other = same[0]
@@ -175,10 +172,10 @@ class _Table:
 
     @classmethod
     def of(cls, changes: Sequence[Floats]) -> "_Table":
-        lengths = np.array([len(one) for one in changes])
+        lengths = np.array([len(change) for change in changes])
         values = np.zeros((len(changes), int(lengths.max()), changes[0].shape[1]), np.float32)
-        for at, one in enumerate(changes):
-            values[at, : len(one)] = one
+        for at, change in enumerate(changes):
+            values[at, : len(change)] = change
         squares = np.square(values, dtype=np.float64).sum(axis=2).cumsum(axis=1)
         return cls(lengths, values, np.concatenate([np.zeros((len(changes), 1)), squares], axis=1))
 
@@ -195,10 +192,10 @@ class _Table:
 def _sound_similarities(ones: Sequence[Fingerprint], others: Sequence[Fingerprint]) -> NDArray[np.float64]:
     """(N, M) similarities of the sounds; -1 where there is none."""
     found = np.full((len(ones), len(others)), -1.0)
-    rows = [at for at, one in enumerate(ones) if one.sound is not None]
+    rows = [at for at, item in enumerate(ones) if item.sound is not None]
     columns = [at for at, other in enumerate(others) if other.sound is not None]
     if rows and columns:
-        left, right = ([one.sound for one in some if one.sound is not None] for some in (ones, others))
+        left, right = ([item.sound for item in some if item.sound is not None] for some in (ones, others))
         found[np.ix_(rows, columns)] = similarities(left, right)
     return found
 
@@ -216,13 +213,13 @@ def _have_same_durations(one: PhoneSequence, other: PhoneSequence) -> bool:
     return bool(np.abs(durations - other_durations).mean() <= SAME_DURATIONS_S)
 
 
-def _sound(one: Observation) -> Waveform | None:
+def _sound(observation: Observation) -> Waveform | None:
     """Sound of an observation, None without a file of sound."""
-    if one.video.suffix == TRACK_SUFFIX or not one.video.is_file():
+    if observation.video.suffix == TRACK_SUFFIX or not observation.video.is_file():
         return None
-    whole = _read_sound(one.video)
-    begin = round((one.quality.cut + one.quality.lag) * SOUND_RATE)
-    samples = whole.samples[max(begin, 0) :][: round(len(one.landmarks) / one.fps * SOUND_RATE)]
+    whole = _read_sound(observation.video)
+    begin = round((observation.quality.cut + observation.quality.lag) * SOUND_RATE)
+    samples = whole.samples[max(begin, 0) :][: round(len(observation.landmarks) / observation.fps * SOUND_RATE)]
     return Waveform(samples, SOUND_RATE) if len(samples) >= WINDOW_SAMPLES + STEP_SAMPLES else None
 
 

@@ -53,20 +53,20 @@ def speak_references(voice: Voice, real: Sequence[ReferenceUtterance]) -> tuple[
     InputError
         No utterance remains.
     """
-    voiced = tuple(_speak_reference(voice, one) for one in real)
-    if all(one is None for one in voiced):
+    voiced = tuple(_speak_reference(voice, reference) for reference in real)
+    if all(item is None for item in voiced):
         raise InputError("own durations need recordings whose words are known; add transcripts")
     return voiced
 
 
-def _speak_reference(voice: Voice, one: ReferenceUtterance) -> VoicedUtterance | None:
-    words = one.observation.words
-    if not words or one.observation.is_recognised:
+def _speak_reference(voice: Voice, reference: ReferenceUtterance) -> VoicedUtterance | None:
+    words = reference.observation.words
+    if not words or reference.observation.is_recognised:
         return None
     speech = voice.speak(normalize(" ".join(word.text for word in words)))
     if len(speech.words) != len(words):
         return None
-    return map_word_times(speech, one.observation.phones, words, one.observation.fps)
+    return map_word_times(speech, reference.observation.phones, words, reference.observation.fps)
 
 
 def map_word_times(speech: Speech, phones: PhoneSequence, words: Sequence[WordSpan], fps: float) -> VoicedUtterance:

@@ -87,8 +87,10 @@ class Thresholds:
 
         def threshold(curve: str, labels: Collection[str]) -> float:
             least = [
-                min_openings(getattr(one.curves, curve), one.observation.phones, one.observation.fps, labels)
-                for one in real
+                min_openings(
+                    getattr(reference.curves, curve), reference.observation.phones, reference.observation.fps, labels
+                )
+                for reference in real
             ]
             return closure_threshold(np.concatenate(least))
 

@@ -131,15 +131,15 @@ class UtteranceComparison:
 
 def available_figures(scores: Sequence[Scores]) -> tuple[tuple[str, str, int], ...]:
     """Those of `FIGURES` that the scores have."""
-    return tuple(figure for figure in FIGURES if all(figure[0] in one.figures for one in scores))
+    return tuple(figure for figure in FIGURES if all(figure[0] in score.figures for score in scores))
 
 
 def score_splits(method: str, splits: Sequence[SplitMotion], limits: Thresholds, synthesis_s: float = 0.0) -> Scores:
     """Scores of a method over the utterances of all splits; synthesis took `synthesis_s` seconds."""
     comparisons = [
-        UtteranceComparison(one, values, LipCurves.of(model.shapes(values)), speech_spread(model))
+        UtteranceComparison(reference, values, LipCurves.of(model.shapes(values)), speech_spread(model))
         for model, real, synthesised in splits
-        for one, values in zip(real, synthesised, strict=True)
+        for reference, values in zip(real, synthesised, strict=True)
     ]
     return compute_scores(method, comparisons, limits, synthesis_s)
 
@@ -153,13 +153,13 @@ def compute_scores(
     method: str, comparisons: Sequence[UtteranceComparison], limits: Thresholds, synthesis_s: float = 0.0
 ) -> Scores:
     """Scores of a method over compared utterances; synthesis took `synthesis_s` seconds."""
-    tallies = [_utterance_statistics(one, limits) for one in comparisons]
+    tallies = [_utterance_statistics(comparison, limits) for comparison in comparisons]
     return Scores(
         method,
         _estimate_figures(tallies),
         tuple(_class_scores(comparisons)),
-        synthesis_s / sum(one.real.seconds for one in comparisons),
-        tuple(_utterance_score(tally, one) for tally, one in zip(tallies, comparisons, strict=True)),
+        synthesis_s / sum(comparison.real.seconds for comparison in comparisons),
+        tuple(_utterance_score(tally, comparison) for tally, comparison in zip(tallies, comparisons, strict=True)),
     )
 
 
@@ -214,18 +214,18 @@ def _event_counts(comparison: UtteranceComparison, limits: Thresholds) -> Floats
 def _estimate_figures(tallies: Sequence[UtteranceStatistics]) -> dict[str, IntervalEstimate]:
     draws = np.random.default_rng(0).multinomial(len(tallies), np.full(len(tallies), 1 / len(tallies)), N_DRAWS)
     weights = np.concatenate([np.ones((1, len(tallies))), draws])  # the first row: each utterance once
-    moments = np.array([[one.opening, one.width] for one in tallies])
+    moments = np.array([[tally.opening, tally.width] for tally in tallies])
     rows = {
         **correlations(weights, moments),
         "range_ratio": _range_ratio(weights @ moments[:, 0]),
-        "rmse_z": weights @ [one.rmse_z for one in tallies] / weights.sum(axis=1),
-        "dtw_cost": weights @ [one.dtw_cost for one in tallies] / weights.sum(axis=1),
-        "peak_offset_ms": 1000 * _weighted_medians(weights, [one.offsets for one in tallies]),
+        "rmse_z": weights @ [tally.rmse_z for tally in tallies] / weights.sum(axis=1),
+        "dtw_cost": weights @ [tally.dtw_cost for tally in tallies] / weights.sum(axis=1),
+        "peak_offset_ms": 1000 * _weighted_medians(weights, [tally.offsets for tally in tallies]),
     }
-    free = [one.free_cost for one in tallies if one.free_cost is not None]
+    free = [tally.free_cost for tally in tallies if tally.free_cost is not None]
     if len(free) == len(tallies):
         rows["free_cost"] = weights @ free / weights.sum(axis=1)
-    counts = np.tensordot(weights, np.array([one.counts for one in tallies]), axes=1)
+    counts = np.tensordot(weights, np.array([tally.counts for tally in tallies]), axes=1)
     for at, name in enumerate(("closure", "false_closure", "labiodental", "rounding")):
         rows[name] = counts[:, at, 0] / np.maximum(counts[:, at, 1], 1.0)
     return {name: interval_of(rows[name]) for name, _, _ in FIGURES if name in rows}

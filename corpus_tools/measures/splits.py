@@ -92,12 +92,15 @@ def check_disjoint(splits: Sequence[Split]) -> tuple[str, ...]:
             raise InputError("there is no utterance to test")
         if not train:
             raise InputError("there is no utterance to learn from")
-    every = {id(one): one for split in splits for part in split for one in part}
+    every = {id(observation): observation for split in splits for part in split for observation in part}
     prints = dict(zip(every, fingerprint_observations(tuple(every.values())), strict=True))
     for train, test in splits:
-        known, tested = ([prints[id(one)] for one in part] for part in (train, test))
+        known, tested = ([prints[id(observation)] for observation in part] for part in (train, test))
         check_no_same(known, tested, PARTS, "remove it from one")
-    names = (([one.name for one in train], [one.name for one in test]) for train, test in splits)
+    names = (
+        ([observation.name for observation in train], [observation.name for observation in test])
+        for train, test in splits
+    )
     found = (warning for known, tested in names for warning in same_name_warnings(known, tested, PARTS))
     return tuple(dict.fromkeys(found))
 
@@ -113,7 +116,9 @@ def check_unknown(talker: Talker, observations: Sequence[Observation]) -> tuple[
     places = f"the talker {talker.metadata.get('name', '')} and the recordings"
     known = fingerprint_talker(talker)
     check_no_same(known, fingerprint_observations(observations), places, "give other recordings, or another talker")
-    return same_name_warnings([one.name for one in known], [one.name for one in observations], places)
+    return same_name_warnings(
+        [recording.name for recording in known], [observation.name for observation in observations], places
+    )
 
 
 def _sort_by_name(observations: Sequence[Observation]) -> list[Observation]:
@@ -121,5 +126,5 @@ def _sort_by_name(observations: Sequence[Observation]) -> list[Observation]:
 
 
 def _split_at(ordered: Sequence[Observation], held: Collection[int]) -> Split:
-    train = tuple(one for at, one in enumerate(ordered) if at not in held)
-    return train, tuple(one for at, one in enumerate(ordered) if at in held)
+    train = tuple(item for at, item in enumerate(ordered) if at not in held)
+    return train, tuple(item for at, item in enumerate(ordered) if at in held)

@@ -15,6 +15,9 @@ from tts2face.interchange.exports.visemes import viseme_table
 
 INVENTORY = "oculus"  # visemes, a class of every phone of the phone table; 15 with silence
 Triphone = tuple[str, str, str]  # viseme before, visemes of the phone joined by "-", viseme behind
+REPEATS = (8, 4, 2, 1)  # weight of the first, second, ... occurrence of a unit; further ones add nothing
+PHONES_A_PROMPT = 25  # cost of a prompt beside its own phones: reading it and the pauses take about 2 s
+PHONE_SHARE = 0.5  # weight of all phones together in units of that of all triphones
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,13 +74,7 @@ class RunningText:
 
 
 def sentence_units(text: str, language: str) -> Units:
-    """Units of a sentence; there is silence before it, behind it and at its marks.
-
-    Raises
-    ------
-    InputError
-        The text contains no word, or the language does not exist or cannot read its letters.
-    """
+    """Units of a sentence; there is silence before it, behind it and at its marks."""
     phones: list[str] = [SILENCE]
     for word in pronounce(text, language).words:
         phones += [*word.phones, *([SILENCE] if word.mark else [])]
@@ -104,11 +101,6 @@ def count_units(sentences: Iterable[Units]) -> RunningText:
 
 def _visemes(phone: str) -> tuple[str, ...]:
     return viseme_table(INVENTORY)[look_up_phone(phone).symbol]
-
-
-REPEATS = (8, 4, 2, 1)  # weight of the first, second, ... occurrence of a unit; further ones add nothing
-PHONES_A_PROMPT = 25  # cost of a prompt beside its own phones: reading it and the pauses take about 2 s
-PHONE_SHARE = 0.5  # weight of all phones together in units of that of all triphones
 
 
 def select_sentences(candidates: Sequence[Units], running: RunningText) -> Iterator[int]:

@@ -1,19 +1,8 @@
-"""Prompts for a number of minutes: shipped ones in American English, or from a text of the user's.
-
-Sentences of a text that are easy to read aloud.
-
-Write the shipped English prompts: ``python -m corpus_tools.prompts.prompts BOOK ...``.
-
-Candidates are easy sentences of frequent words without names, from public-domain books, which NOTICE.md names. The
-result was read by a person, whose objections are `REJECTED_WORDS` and `REJECTED_PARTS`.
-"""
+"""Prompts for a number of minutes: shipped ones in American English, or from a text of the user's."""
 
 import functools
 import math
-import re
-import sys
-from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -21,58 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from corpus_tools.prompts.coverage import Coverage, RunningText, Units, count_units, select_sentences, sentence_units
-from lexicon.chunks import split_chunks
-from lexicon.dictionary import cmudict_lookup
+from corpus_tools.prompts.sentences import MAX_WORDS, MIN_WORDS, easy_sentences
 from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE, check_language
 from lexicon.values.files import read_text
-from tts2face.storage.files import write_atomically
-
-MIN_WORDS, MAX_WORDS = 5, 12
-LONGEST_SENTENCE = 400  # characters; longer ones are cut, and have too many words anyway
-_WORD = re.compile(r"[^\W\d_]+(?:['’-][^\W\d_]+)*")
-_OTHER_SIGNS = re.compile(r"""[^\w\s',.?!¿¡’、。？！।؟،-]|[\d_]|--|[.?!][.?!\s]""")
-_BLANK_LINES = re.compile(r"\n\s*\n")
-_QUOTES = re.compile(r"""^["'“‘«„`\s]+|["'”’»“`\s]+$""")
-
-
-def easy_sentences(text: str, language: str) -> Iterator[str]:
-    """Sentences of `MIN_WORDS` to `MAX_WORDS` words, without numbers, brackets and quotations inside; each once.
-
-    In texts without spaces between words, as in Japanese, every sentence that is not longer than its limit.
-    """
-    found: set[str] = set()
-    for paragraph in _BLANK_LINES.split(text):
-        for piece in split_chunks(paragraph, LONGEST_SENTENCE, language):
-            sentence = _QUOTES.sub("", piece)
-            key = sentence.casefold()
-            if key not in found and _is_easy(sentence):
-                found.add(key)
-                yield sentence
-
-
-def words_of(text: str) -> list[str]:
-    """Words of a text in lower case."""
-    return [word.casefold().replace("’", "'") for word in _WORD.findall(text)]
-
-
-def count_words(text: str) -> Counter[str]:
-    """How often each word occurs in lower case: names have a count of 0."""
-    return Counter(word for word in _WORD.findall(text) if word == word.casefold())
-
-
-def _is_easy(sentence: str) -> bool:
-    if _OTHER_SIGNS.search(sentence) or not sentence[:1].isalpha() or sentence[0] != sentence[0].upper():
-        return False
-    return sentence[-1] in ".?!。？！।؟" and MIN_WORDS <= _n_words(sentence) <= MAX_WORDS
-
-
-def _n_words(sentence: str) -> int:
-    """Number of words; that of syllables by estimate where words are not separated."""
-    words = _WORD.findall(sentence)
-    is_separated = " " in sentence or not any(ord(letter) >= 0x2E80 for letter in sentence)
-    return len(words) if is_separated else sum(map(len, words)) // 2
-
 
 POOL = Path(__file__).with_name("prompts_en_us.tsv")  # written by `write_prompts`, best first
 UNIT_COUNTS = Path(__file__).with_name("running_text_en_us.tsv")
@@ -183,42 +124,3 @@ def format_counts(running: RunningText) -> str:
         *(("triphone", " ".join(triphone), count) for triphone, count in running.triphones.items()),
     )
     return "kind\tname\tcount\n" + "".join(f"{kind}\t{name}\t{count}\n" for kind, name, count in rows)
-
-
-N_SHIPPED = 180  # 15 minutes
-MIN_WORD_COUNT = 20  # occurrences of each word in the books; rarer ones are old or hard to read
-# Old words and forms of address, and subjects that nobody should have to read aloud.
-REJECTED_WORDS = frozenset(Path(__file__).with_name("rejected_words.tsv").read_text(encoding="utf-8").split()[1:])
-REJECTED_PARTS = re.compile(
-    r"\b(?:every|any|some|no) (?:body|thing|one's)\b|\bfor ever\b|\bever say\b|^(?:And|Or|Nor|For|Oh|Ah)\b|"
-    r"\b(?:do|does|did|is|are|was|were|have|has|had|can|could|will|would|shall|should|must|may|might) not "
-    r"(?:you|he|she|they|we|I|it|this|that)\b|\bhad (?:rather|he|she|they|it|I|you)\b|(?:^|\s)'|'\s",
-    re.IGNORECASE,
-)
-
-
-def main() -> None:
-    """Write the prompts and the counts of running text beside this file."""
-    text = "\n\n".join(read_text(Path(name)) for name in sys.argv[1:])
-    counts = count_words(text)
-    sentences = list(easy_sentences(text, DEFAULT_LANGUAGE))
-    running = count_units(sentence_units(sentence, DEFAULT_LANGUAGE) for sentence in sentences)
-    candidates = [sentence for sentence in sentences if _is_suitable(sentence, counts)]
-    units = [sentence_units(sentence, DEFAULT_LANGUAGE) for sentence in candidates]
-    selected = [candidates[at] for at in islice(select_sentences(units, running), N_SHIPPED)]
-    write_atomically(POOL, "".join(f"{sentence}\n" for sentence in ("text", *selected)).encode())
-    write_atomically(UNIT_COUNTS, format_counts(running).encode())
-
-
-def _is_suitable(sentence: str, counts: dict[str, int]) -> bool:
-    """Whether a sentence has frequent words only, none of them a name or rejected."""
-    if REJECTED_PARTS.search(sentence) or any(word[0].isupper() and word != "I" for word in sentence.split()[1:]):
-        return False
-    words = words_of(sentence)
-    return REJECTED_WORDS.isdisjoint(words) and all(
-        word == "i" or (counts[word] >= MIN_WORD_COUNT and cmudict_lookup(word)) for word in words
-    )
-
-
-if __name__ == "__main__":
-    main()

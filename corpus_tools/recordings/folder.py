@@ -1,169 +1,17 @@
-"""Folders of recordings: their videos and transcripts.
-
-Transcripts of videos: Praat TextGrids, word alignments of the GRID corpus, subtitles and plain text.
-
-Subtitles of videos as cues with margins.
-"""
+"""Folders of recordings: their videos and transcripts."""
 
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from corpus_tools.recordings.subtitle_cues import find_subtitles, read_cues
+from corpus_tools.recordings.transcripts import find_transcript, read_transcript
 from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import DataError, InputError
 from lexicon.normalize import normalize
 from lexicon.values.tables import read_table
-from tts2face.interchange.subtitles.decoding import read_text
-from tts2face.interchange.subtitles.reader import read_subtitles
 from tts2face.sound.word_lattice import PronouncedWords, Pronunciations
-
-SUBTITLE_SUFFIXES = (".srt", ".vtt", ".ass", ".ssa", ".ttml")  # in order of preference
-CUE_MARGIN_S = 0.3  # before and after a cue; subtitles are rarely closer to the speech
-
-
-@dataclass(frozen=True, slots=True)
-class SpokenCue:
-    """Words spoken between two instants in seconds."""
-
-    begin: float
-    end: float
-    text: str
-
-
-def find_subtitles(video: Path) -> Path | None:
-    """The subtitle file of a video, or None."""
-    return next((path for suffix in SUBTITLE_SUFFIXES if (path := video.with_suffix(suffix)).is_file()), None)
-
-
-def read_cues(path: Path) -> tuple[SpokenCue, ...]:
-    """Spoken cues in temporal order, each extended by `CUE_MARGIN_S` but not beyond the middle to its neighbour.
-
-    Cues without words and cues whose end is only estimated are left out.
-
-    Raises
-    ------
-    DataError
-        The file is not a subtitle file, or contains no spoken cue.
-    """
-    read = read_subtitles(path).cues
-    spoken = [(cue.begin_s, cue.end_s, cue.text) for cue in read if cue.text and not cue.has_estimated_end]
-    if not spoken:
-        raise DataError(f"{path} contains no subtitles; export them again")
-    cues = []
-    for number, (begin, end, text) in enumerate(spoken):
-        before = spoken[number - 1][1] if number else 0.0
-        behind = spoken[number + 1][0] if number + 1 < len(spoken) else end + 2 * CUE_MARGIN_S
-        earliest, latest = min((before + begin) / 2, begin), max((end + behind) / 2, end)
-        cues.append(SpokenCue(max(begin - CUE_MARGIN_S, earliest, 0.0), min(end + CUE_MARGIN_S, latest), text))
-    return tuple(cues)
-
-
-SILENT_LABELS = frozenset({"", "sil", "sp", "spn", "<p:>", "<sil>", "pau", "#"})
-# Outside quotes only numbers have a meaning (Praat manual, "TextGrid file format").
-_TOKEN = re.compile(r'"(?P<label>(?:[^"]|"")*)"|\[[^\]\n]*\]|!.*|(?<![\w.])(?P<number>-?\d+(?:\.\d+)?)(?![\w.])')
-_TIER_ENTRY_SIZES = {"IntervalTier": 3, "TextTier": 2}  # entries of one interval or point
-
-
-def read_textgrid(path: Path) -> tuple[SpokenCue, ...]:
-    """The intervals of the first tier whose name contains "word", or else of the first interval tier.
-
-    Raises
-    ------
-    DataError
-        The file is not a TextGrid, is truncated, or contains no word.
-    """
-    items = _split_items(read_text(path))
-    if list(items[:2]) != ["ooTextFile", "TextGrid"]:
-        raise DataError(f"{path} is not a TextGrid; save it with Praat as text")
-    try:
-        tiers = list(_read_tiers(iter(items[5:])))
-    except (StopIteration, RuntimeError, TypeError, ValueError, OverflowError, KeyError) as broken:
-        raise DataError(f"{path} is a damaged TextGrid; save it with Praat again") from broken
-    named = [cues for name, cues in tiers if "word" in name.lower()]
-    spoken = next(iter(named or [cues for _, cues in tiers]), ())
-    found = tuple(cue for cue in spoken if cue.text.lower() not in SILENT_LABELS)
-    if not found:
-        raise DataError(f"{path} has no interval with a word; check the file")
-    return found
-
-
-def _split_items(text: str) -> list[str | float]:
-    """Labels and numbers in order."""
-    items: list[str | float] = []
-    for match in _TOKEN.finditer(text):
-        if match["label"] is not None:
-            items.append(match["label"].replace('""', '"'))
-        elif match["number"] is not None:
-            items.append(float(match["number"]))
-    return items
-
-
-def _read_tiers(items: Iterator[str | float]) -> Iterator[tuple[str, tuple[SpokenCue, ...]]]:
-    """Name and cues of each interval tier; point tiers are skipped."""
-    for kind in items:
-        name, _, _, size = (next(items) for _ in range(4))
-        rows = [[next(items) for _ in range(_TIER_ENTRY_SIZES[str(kind)])] for _ in range(int(size))]
-        if kind == "IntervalTier":
-            yield str(name), tuple(_parse_cue(*row) for row in rows)
-
-
-def _parse_cue(start: str | float, end: str | float, label: str | float) -> SpokenCue:
-    if not isinstance(label, str) or not 0 <= float(start) < float(end):
-        raise ValueError(label)
-    return SpokenCue(float(start), float(end), label.strip())
-
-
-UNITS_PER_S = 25_000  # Cooke et al. 2006: samples of the 25 kHz sound
-
-
-def read_word_times(path: Path) -> tuple[SpokenCue, ...]:
-    """Words and times of an .align file (start, end and word per line, in units of 1/25000 s), without silences.
-
-    Raises
-    ------
-    DataError
-        A line is malformed, or there is no word.
-    """
-    cues = []
-    for number, line in enumerate(read_text(path).splitlines(), start=1):
-        fields = line.split()
-        if not fields:
-            continue
-        if len(fields) != 3 or not (fields[0].isdecimal() and fields[1].isdecimal()):
-            raise DataError(f"{path}, line {number}: {line[:60]!r} is not start, end and word; correct it")
-        if fields[2].lower() not in SILENT_LABELS:
-            cues.append(SpokenCue(int(fields[0]) / UNITS_PER_S, int(fields[1]) / UNITS_PER_S, fields[2]))
-    if not cues:
-        raise DataError(f"{path} contains no word; check the file")
-    return tuple(cues)
-
-
-TEXT_SUFFIX = ".txt"
-READERS = {".textgrid": read_textgrid, ".align": read_word_times, **dict.fromkeys(SUBTITLE_SUFFIXES, read_cues)}
-
-
-def find_transcript(video: Path) -> Path | None:
-    """The transcript beside a video, in order of preference text, TextGrid, word times, subtitles; None without one."""
-    beside = {path.suffix.lower(): path for path in sorted(video.parent.iterdir()) if path.stem == video.stem}
-    return next((beside[suffix] for suffix in (TEXT_SUFFIX, *READERS) if suffix in beside), None)
-
-
-def read_transcript(transcript: Path) -> str:
-    """All words of a transcript, in order.
-
-    Raises
-    ------
-    DataError
-        It cannot be read or contains no word.
-    BackendError
-        A package for its format is missing.
-    """
-    suffix = transcript.suffix.lower()
-    if suffix == TEXT_SUFFIX:
-        return read_text(transcript)
-    return " ".join(cue.text for cue in READERS[suffix](transcript))
-
 
 VIDEO_SUFFIXES = frozenset({".mkv", ".mp4", ".mov", ".webm", ".avi", ".mpg", ".mpeg", ".m4v"})
 MANIFEST = "manifest.csv"
@@ -223,13 +71,7 @@ def find_recordings(folder: Path) -> tuple[Recording, ...]:
 
 
 def pronounce_recording(recording: Recording) -> PronouncedWords | None:
-    """The words of a transcript with their pronunciations; None without a transcript.
-
-    Raises
-    ------
-    DataError
-        The transcript cannot be read, contains no word, or one without a pronunciation.
-    """
+    """The words of a transcript with their pronunciations; None without a transcript."""
     if recording.words is not None or recording.transcript is None:
         return recording.words
     content = read_transcript(recording.transcript) if isinstance(recording.transcript, Path) else recording.transcript
@@ -246,11 +88,6 @@ def look_up_pronunciations(word: str, *, is_letter: bool) -> Pronunciations:
     """All pronunciations of a word as phones of the phone table; with `is_letter`, the names of the letter.
 
     Words outside the dictionary are pronounced by rule.
-
-    Raises
-    ------
-    DataError
-        No pronunciation is known.
     """
     from lexicon.dictionary import arpabet_segments
 

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.recordings.light import MEASURES
 from corpus_tools.recordings.sound import LEVEL_WINDOW_S
-from corpus_tools.recordings.video import MEASURES, NOT_COUNTED
+from corpus_tools.recordings.video import NOT_COUNTED
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, lip_opening
@@ -232,12 +233,12 @@ def picture_measures(
 
 
 def light_measures(light: NDArray[np.floating], begin: float, end: float) -> dict[str, float]:
-    """Medians of `corpus_tools.recordings.video.MEASURES` between two times in seconds; nothing without a face.
+    """Medians of `corpus_tools.recordings.light.MEASURES` between two times in seconds; nothing without a face.
 
     Parameters
     ----------
     light : (N, 5)
-        As `corpus_tools.recordings.video.measure_light` returns it.
+        As `corpus_tools.recordings.light.measure_light` returns it.
     """
     here = light[(light[:, 0] >= begin) & (light[:, 0] < end)]
     if not len(here):  # shorter than the interval of the measures

@@ -1,11 +1,7 @@
-"""Observation of one recording: pose-free landmarks, head pose, phones and loudness on one time axis.
-
-Lip opening that a shipped talker shows for the phones of a recording, to which its tracked lips are compared.
-"""
+"""Observation of one recording: pose-free landmarks, head pose, phones and loudness on one time axis."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -25,10 +21,6 @@ from corpus_tools.recordings.sound import AlignedSpeech, CachedAligner
 from corpus_tools.recordings.video import CachedTracker, TrackedVideo
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tts2face.lips.exemplar import ExemplarModel, build_exemplar_model, speech_trajectory
-from tts2face.models.landmarks import lip_opening
-from tts2face.models.talker import ShapeModel
-from tts2face.models.talker_file import load_talker
 from tts2face.sound.praat import intensity
 from tts2face.video.pose import PoseFreeLandmarks, head_angles, remove_pose
 from tts2face.video.resampling import resample_to_grid, trim_and_fill
@@ -59,7 +51,7 @@ class Quality:
     speech over noise, share of ``crowded`` frames, ``turn_deg`` away from the camera, ``frozen_s`` without a change,
     pictures a second (``frame_rate``), median distance ``eye_px`` of the outer eye corners, ``jitter`` of the lip
     opening relative to its deviation; ``brightness``, ``glare``, ``contrast`` and ``sharpness`` as
-    `corpus_tools.recordings.video.face_light` returns them.
+    `corpus_tools.recordings.light.face_light` returns them.
     """
 
     fit: float
@@ -133,11 +125,6 @@ def observe_recording(
     ----------
     judge
         Called with measures by name; by default it refuses those beyond their limits.
-
-    Raises
-    ------
-    DataError
-        The recording is unsuitable; the message states the reason.
     """
     sound = aligner.align(recording.video, pronounce_recording(recording), recording.span)
     measures = sound_measures(sound.sound, sound.phones)
@@ -174,20 +161,14 @@ def observe_recording(
         ),
         video=recording.video,
         is_recognised=sound.is_recognised,
-        mismatches=tuple(one.sentence for one in sound.mismatches),
+        mismatches=tuple(mismatch.sentence for mismatch in sound.mismatches),
     )
 
 
 def _span_landmarks(
     tracked: TrackedVideo, span: tuple[float, float] | None, timing: Timing
 ) -> tuple[NDArray[np.float32], int, int]:
-    """Landmarks of the frames of a span of the sound, the index of the first, and the number of interpolated ones.
-
-    Raises
-    ------
-    DataError
-        The video has no frames or no face there, or the face is hidden for too long.
-    """
+    """Landmarks of the frames of a span of the sound, the index of the first, and the number of interpolated ones."""
     fps = timing.fps or tracked.fps
     begin, end = (0.0, np.inf) if span is None else (span[0] - timing.lag, span[1] - timing.lag)
     near = (tracked.times > begin - N_NEIGHBOUR_FRAMES / fps) & (tracked.times < end + N_NEIGHBOUR_FRAMES / fps)
@@ -246,23 +227,3 @@ def head_motion(posed: PoseFreeLandmarks) -> NDArray[np.float32]:
 
 def _lowest_score(tracked: TrackedVideo, here: NDArray[np.bool_]) -> float:
     return float(tracked.tracking.scores[here & ~tracked.tracking.is_missing].min(initial=1.0))
-
-
-EXPECTED_RATE_HZ = 100.0  # of the curves below
-SHIPPED_TALKER = "grid_s1"
-
-ExpectedOpening = Callable[[PhoneSequence], NDArray[np.float64]]
-
-
-def shipped_talker_opening(phones: PhoneSequence) -> NDArray[np.float64]:
-    """Opening (T,) of the inner lips at `EXPECTED_RATE_HZ` from 0 s to the end of the phones, by the shipped talker."""
-    model, exemplars = _shipped_exemplars()
-    n_frames = int(phones.end * EXPECTED_RATE_HZ) + 2
-    lips = speech_trajectory(phones, exemplars, fps=EXPECTED_RATE_HZ, n_frames=n_frames)
-    return lip_opening(model.shapes(lips.values)).astype(np.float64)
-
-
-@lru_cache(maxsize=1)
-def _shipped_exemplars() -> tuple[ShapeModel, ExemplarModel]:
-    talker = load_talker(SHIPPED_TALKER)
-    return talker.model, build_exemplar_model(talker)

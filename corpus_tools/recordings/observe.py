@@ -111,18 +111,18 @@ def observe(
             found[video] = [_refuse(outcome, agreement.problem) for outcome in found[video]]
     every = [outcome for outcomes in found.values() for outcome in outcomes]
     warnings = [
-        QualityWarning(one.name, message)
-        for one in every
-        if isinstance(one, Observation)
-        for message in (*one.warnings, *agreed[one.video].warnings)
+        QualityWarning(item.name, message)
+        for item in every
+        if isinstance(item, Observation)
+        for message in (*item.warnings, *agreed[item.video].warnings)
     ]
     if is_strict:
         reasons = {warning.name: warning.message for warning in reversed(warnings)}
         every = [_refuse(outcome, reasons[outcome.name]) if outcome.name in reasons else outcome for outcome in every]
         warnings = []
     return Observations(
-        tuple(sorted((one for one in every if isinstance(one, Observation)), key=lambda one: one.name)),
-        tuple(sorted((one for one in every if isinstance(one, Refusal)), key=lambda one: one.name)),
+        tuple(sorted((item for item in every if isinstance(item, Observation)), key=lambda one: one.name)),
+        tuple(sorted((item for item in every if isinstance(item, Refusal)), key=lambda one: one.name)),
         tuple(sorted(warnings, key=lambda warning: warning.name)),
     )
 
@@ -144,7 +144,7 @@ def check_any_kept(observations: Observations) -> tuple[Observation, ...]:
 
 
 def _kept_observations(found: Mapping[Path, RecordingOutcomes]) -> list[Observation]:
-    return [one for outcomes in found.values() for one in outcomes if isinstance(one, Observation)]
+    return [outcome for outcomes in found.values() for outcome in outcomes if isinstance(outcome, Observation)]
 
 
 def _refusal(recording: Recording, reason: DataError) -> Refusal:
@@ -211,13 +211,7 @@ class _VideoReader:
 
 
 def split_long_recording(recordings: tuple[Recording, ...], aligner: CachedAligner) -> tuple[Recording, ...]:
-    """The recordings of one video; a recording of a whole long one is cut into utterances at pauses.
-
-    Raises
-    ------
-    DataError
-        The video has no sound, or the transcript cannot be read.
-    """
+    """The recordings of one video; a recording of a whole long one is cut into utterances at pauses."""
     whole = recordings[0]
     if whole.span is not None or aligner.sound(whole.video).duration <= MAX_UTTERANCE_S:
         return recordings
@@ -262,7 +256,7 @@ class RecordingChecker:
             utterances = split_long_recording((recording,), self._aligner)
         except DataError as reason:
             return (Finding(REFUSAL, UNUSABLE, str(reason)),)
-        return _worst(finding for one in utterances for finding in self._check_utterance(one))
+        return _worst(finding for utterance in utterances for finding in self._check_utterance(utterance))
 
     def _check_utterance(self, recording: Recording) -> tuple[Finding, ...]:
         measured: dict[str, float] = {}
@@ -288,17 +282,10 @@ def check_recording(
     """Findings about one video and what is said in it: a text, a file, or what lies beside the video.
 
     For several recordings, `RecordingChecker` loads the networks once.
-
-    Raises
-    ------
-    InputError
-        There is no such video.
-    BackendError
-        A package or the landmark models are missing.
     """
     recordings = recordings_to_check(video, transcript)
     checker = RecordingChecker(run_options)
-    return _worst(finding for one in recordings for finding in checker.check(one))
+    return _worst(finding for recording in recordings for finding in checker.check(recording))
 
 
 def recordings_to_check(recordings: Path, transcript: str | Path | None = None) -> tuple[Recording, ...]:

@@ -118,7 +118,7 @@ class CachedAligner:
             "phones": found.phones.phones,
             "words": [[word.text, word.first, word.last, word.confidence] for word in found.words],
             "fit": found.fit.share,
-            "mismatches": [[one.begin, one.end, one.words] for one in found.mismatches],
+            "mismatches": [[mismatch.begin, mismatch.end, mismatch.words] for mismatch in found.mismatches],
         }
         write_tensors(cached, ALIGNMENT_KIND, ALIGNMENT_VERSION, {"edges": found.phones.edges}, header)
         return AlignedSpeech(

@@ -13,14 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.recordings.expected_opening import EXPECTED_RATE_HZ, ExpectedOpening, shipped_talker_opening
 from corpus_tools.recordings.limits import check_limits, limit_warnings
-from corpus_tools.recordings.observation import (
-    EXPECTED_RATE_HZ,
-    ExpectedOpening,
-    Observation,
-    Timing,
-    shipped_talker_opening,
-)
+from corpus_tools.recordings.observation import Observation, Timing
 from lexicon.errors import DataError
 from tts2face.models.landmarks import lip_opening
 
@@ -33,6 +28,7 @@ NEAR_S = 0.05  # a short video may differ from this lag by as much
 # Lags found in five synchronous talkers lie from -0.04 to 0 s.
 MIN_LAG_S = 0.045
 RELIABLE_S = 8.0  # duration from which lags of `MIN_LAG_S` are significant; in less they must be larger
+Parts = Sequence[tuple[NDArray[np.float64], float]]  # correlations at `LAGS_S`, and seconds of each observation
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,13 +98,15 @@ def estimate_sync_by_video(
     Parameters
     ----------
     expected
-        Lip opening for phones, as `corpus_tools.recordings.observation.shipped_talker_opening` returns it.
+        Lip opening for phones, as `corpus_tools.recordings.expected_opening.shipped_talker_opening` returns it.
     """
-    together: dict[Path, list[tuple[NDArray[np.float64], float]]] = {one.video: [] for one in observations}
-    for one in observations:
-        curve = lag_correlations(one, expected)
+    together: dict[Path, list[tuple[NDArray[np.float64], float]]] = {
+        observation.video: [] for observation in observations
+    }
+    for observation in observations:
+        curve = lag_correlations(observation, expected)
         if curve is not None:
-            together[one.video].append((curve, len(one.landmarks) / one.fps))
+            together[observation.video].append((curve, len(observation.landmarks) / observation.fps))
     short = [video for video, group in together.items() if _total_seconds(group) < MIN_DURATION_S]
     pool = [part for video in short for part in together[video]]
     return {video: _estimate(group, pool if video in short else group) for video, group in together.items()}
@@ -146,9 +144,6 @@ def lag_correlations(observation: Observation, expected: ExpectedOpening) -> NDA
     size = np.linalg.norm(rows, axis=1) * np.linalg.norm(speed)
     correlations: NDArray[np.float64] = rows @ speed / np.maximum(size, 1e-9)
     return correlations
-
-
-Parts = Sequence[tuple[NDArray[np.float64], float]]  # correlations at `LAGS_S`, and seconds of each observation
 
 
 def _estimate(own: Parts, pool: Parts) -> SyncEstimate:

@@ -1,18 +1,8 @@
 """``python -m corpus_tools.shipped.make_models [STEP ...]``: every shipped model, in the order of their needs.
 
 It runs in a checkout of the repository. Steps that are named run alone, on what the earlier ones have written into
-``--out``; with the path tracer's part, all of them take some four hours on two cores.
-
-======= ============================================= ==========================================================
-phones  ``heart.phones``, ``recordings.phones``       speech of two voices, recordings of GRID's talker s1
-talker  ``grid_s1.talker``                            recordings of GRID's talker s1, lip tracks of free English
-heads   ``head.face`` with identities, nine haircuts  MakeHuman's data, released under CC0
-palette ``starter.palette``                           recordings of GRID's talker s1, ``derived_styles.tsv``
-gaze    ``conversation.gaze``                         fixations of 15 people in remote conversations
-cast    drawn and realistic characters                MakeHuman's data; `corpus_tools.shipped.drawn` says who they are
-light   their film light, their other haircuts        the path tracer of Blender's package bpy
-mouths  the light of their mouths, fitted to pictures the same
-======= ============================================= ==========================================================
+``--out``; with the path tracer's part, all of them take some four hours on two cores. docs/shipped.md has
+a table of the steps.
 """
 
 import argparse
@@ -83,7 +73,7 @@ def make_talker(making: Making) -> None:
     """The talker whose lips are the default, and the base of talkers with few recordings."""
     from corpus_tools.build_talker import build_talker
     from corpus_tools.pool_talker import pool_talker
-    from corpus_tools.training.choose_adaptation import NO_BASE
+    from corpus_tools.training.short_talker import NO_BASE
 
     path = making.out / f"{GRID}.talker"
     # Without base: it is the base of all others. Without consent to pictures: the corpus is about motion.
@@ -126,7 +116,7 @@ def make_palette(making: Making) -> None:
 
 def derive_styles(making: Making) -> None:
     """The derived styles of the palette that is there, after a change of their table alone."""
-    from corpus_tools.decomposition.decompose import read_derived_styles
+    from corpus_tools.decomposition.derived_styles import read_derived_styles
     from tts2face.models.palette_file import load_palette, write_palette
 
     path = making.out / "starter.palette"

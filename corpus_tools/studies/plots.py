@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from html import escape
 from io import BytesIO
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -54,7 +54,28 @@ class Tip:
     height: float = 0.0
 
 
-Draw = Callable[["Figure"], Sequence[Tip]]
+Draw = Callable[["Figure"], Sequence[Tip] | None]
+
+
+class Plot(NamedTuple):
+    """A figure: the function that draws it, its size in px, and its accessible name."""
+
+    draw: Draw
+    width: float
+    height: float
+    name: str = ""
+
+    def svg(self) -> str:
+        """The figure as an element of a page."""
+        return draw_svg(*self)
+
+    def svg_file(self) -> bytes:
+        """The figure as an SVG file on white."""
+        return draw_svg_file(*self)
+
+    def png(self) -> bytes:
+        """The figure as PNG bytes."""
+        return draw_png(self.draw, self.width, self.height)
 
 
 def load_matplotlib() -> None:
@@ -94,7 +115,7 @@ def open_figure(draw: Draw, width: float, height: float) -> Iterator[tuple["Figu
 
     with style.context(["default", STYLE]):
         figure = Figure(figsize=(width / PX_PER_INCH, height / PX_PER_INCH), layout="constrained")
-        yield figure, draw(figure)
+        yield figure, draw(figure) or ()
 
 
 def draw_svg(draw: Draw, width: float, height: float, name: str) -> str:

@@ -160,7 +160,7 @@ def utterance_curves(observation: Observation) -> str:
     times = np.arange(len(observation.landmarks)) / observation.fps
     width = len(times) / observation.fps * PX_PER_S + SIDES
 
-    def draw(figure: "Figure") -> tuple[()]:
+    def draw(figure: "Figure") -> None:
         figure.set_layout_engine("none")
         axes = figure.add_axes((SIDES / 2 / width, 0.3, 1 - SIDES / width, 0.38))
         axes.plot(times, np.clip(lip_opening(observation.landmarks), *GAP_RANGE), color=FIRST)
@@ -179,6 +179,5 @@ def utterance_curves(observation: Observation) -> str:
         for word in observation.words:
             middle = (edges[word.first] + edges[word.last]) / 2
             axes.text(middle, 1.35, word.text, ha="center", transform=axes.get_xaxis_transform())
-        return ()
 
     return draw_svg(draw, width, HEIGHT, f"lips and sound of {observation.name}")

@@ -53,7 +53,7 @@ def _checker(cache: Path) -> RecordingChecker:
 def prompts_answer(texts: Sequence[str], units: Sequence[Units], running: RunningText) -> dict[str, Any]:
     """The answer about prompts, as above."""
     return {
-        "prompts": [{"text": text, **_units(one)} for text, one in zip(texts, units, strict=True)],
+        "prompts": [{"text": text, **_units(unit)} for text, unit in zip(texts, units, strict=True)],
         "running": {
             "phones": dict(running.phones),
             "triphones": {" ".join(triphone): n for triphone, n in running.triphones.items()},
@@ -62,7 +62,10 @@ def prompts_answer(texts: Sequence[str], units: Sequence[Units], running: Runnin
 
 
 def _units(units: Units) -> dict[str, list[str]]:
-    return {"phones": sorted(set(units.phones)), "triphones": sorted({" ".join(one) for one in units.triphones})}
+    return {
+        "phones": sorted(set(units.phones)),
+        "triphones": sorted({" ".join(triphone) for triphone in units.triphones}),
+    }
 
 
 def _findings(video: Path, text: str | None, cache: Path) -> list[dict[str, str]]:

@@ -60,13 +60,7 @@ def gesture_report(model: str, name: str, on_progress: Progress) -> str:
 
 
 def accuracy_report(model: str, name: str, on_progress: Progress) -> str:
-    """Page of the accuracy of lips for a fifth of a talker's recordings, made by what the others teach.
-
-    Raises
-    ------
-    InputError
-        The talker has too few recordings.
-    """
+    """Page of the accuracy of lips for a fifth of a talker's recordings, made by what the others teach."""
     from corpus_tools.measures.splits import split_randomly
     from corpus_tools.studies.evaluation.evaluate import evaluate
     from corpus_tools.studies.evaluation.page import evaluation_page
@@ -88,17 +82,17 @@ def talker_observations(talker: Talker) -> tuple[Observation, ...]:
     """
     return tuple(
         Observation(
-            one.name,
+            utterance.name,
             talker.fps,
-            talker.model.shapes(one.shape),
-            one.head,
-            one.phones,
-            one.words,
-            one.intensity,
+            talker.model.shapes(utterance.shape),
+            utterance.head,
+            utterance.phones,
+            utterance.words,
+            utterance.intensity,
             Quality(0.0, 1.0, 0, 0.0),
-            Path(one.name),
+            Path(utterance.name),
         )
-        for one in talker.utterances
+        for utterance in talker.utterances
     )
 
 

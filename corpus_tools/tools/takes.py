@@ -15,7 +15,7 @@ from types import MappingProxyType
 from typing import Any
 
 from corpus_tools.build_palette import StyleSource, build_style
-from corpus_tools.decomposition.recordings import check_gesture_take
+from corpus_tools.decomposition.take_check import check_gesture_take
 from corpus_tools.dense.avatar import build_avatar
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError
@@ -31,7 +31,7 @@ def _check(order: Mapping[str, Any], call: Call) -> dict[str, Any]:
     found = check_gesture_take(Path(order["take"]), _options(order), lambda share: progress(round(100 * share), 100))
     return {
         "seconds": round(found.seconds, 2),
-        "findings": [{"severity": one.severity, "message": one.message} for one in found.findings],
+        "findings": [{"severity": finding.severity, "message": finding.message} for finding in found.findings],
     }
 
 

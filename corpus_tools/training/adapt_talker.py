@@ -73,7 +73,9 @@ def adapted_talker(
     own = build_utterances(observations, model)
     mapped = _default_base_map(base, observations, model, adaptation)
     fps = observations[0].fps
-    carried = tuple(_carry_utterance(one, base.talker, model, mapped, fps) for one in base.talker.utterances)
+    carried = tuple(
+        _carry_utterance(utterance, base.talker, model, mapped, fps) for utterance in base.talker.utterances
+    )
     network = base.talker.network
     return Talker(
         fps,
@@ -81,7 +83,7 @@ def adapted_talker(
         own + carried,
         dict(metadata),
         network=None if network is None else mapped.network(network),
-        audio_maps={name: mapped.audio_map(one) for name, one in base.talker.audio_maps.items()},
+        audio_maps={name: mapped.audio_map(audio_map) for name, audio_map in base.talker.audio_maps.items()},
     )
 
 
@@ -90,14 +92,14 @@ def carried_audio_maps(
 ) -> dict[str, AudioMap]:
     """Audio maps of a base by name, carried to the speech parameters of a person's shape model."""
     mapped = _default_base_map(base, observations, model, adaptation)
-    return {name: mapped.audio_map(one) for name, one in base.talker.audio_maps.items()}
+    return {name: mapped.audio_map(audio_map) for name, audio_map in base.talker.audio_maps.items()}
 
 
 def _default_base_map(
     base: Base, observations: Sequence[Observation], model: ShapeModel, adaptation: Adaptation
 ) -> BaseMap:
     """`learn_base_map` for the default synthesis."""
-    lips = {one.name: base_lips(base, one) for one in observations}
+    lips = {observation.name: base_lips(base, observation) for observation in observations}
     return learn_base_map(base, observations, model, adaptation, lips, amplitude=DEFAULT_OPTIONS.amplitude)
 
 
@@ -121,7 +123,10 @@ def learn_base_map(
     """
     inventory = map_inventory(base, observations)
     prior = _prior_map(base.talker.model, model, inventory)
-    terms, targets = zip(*(_own_frames(one, lips[one.name], model, inventory) for one in observations), strict=True)
+    terms, targets = zip(
+        *(_own_frames(observation, lips[observation.name], model, inventory) for observation in observations),
+        strict=True,
+    )
     together = FrameTerms.joined(terms)
     scales = tuple(
         np.maximum(part.spread[: part.n_speech].astype(np.float64), 1e-6) for part in (base.talker.model, model)
@@ -150,7 +155,7 @@ def lip_gain(model: ShapeModel, gain: tuple[float, float]) -> Floats:
 
 def map_inventory(base: Base, observations: Sequence[Observation]) -> tuple[str, ...]:
     """Phones of a map: those of English, of the base and of the recordings."""
-    spoken = {label for one in observations for label in one.phones.phones}
+    spoken = {label for observation in observations for label in observation.phones.phones}
     return tuple(sorted({*ARPABET.values(), SILENCE, *base.exemplars.tokens.inventory, *spoken}))
 
 
@@ -178,7 +183,7 @@ def combined_shapes(base: ShapeModel, observations: Sequence[Observation]) -> Sh
 
     Principal components of both together, as many as the base has, about the person's mean shape.
     """
-    frames = np.concatenate([one.landmarks for one in observations]).astype(np.float64)
+    frames = np.concatenate([observation.landmarks for observation in observations]).astype(np.float64)
     mean = frames.mean(axis=0)
     plain = replace(base, mean=mean.astype(np.float32))
     size = face_size(plain) / face_size(base)
@@ -209,19 +214,24 @@ def _prior_map(base: ShapeModel, model: ShapeModel, inventory: tuple[str, ...]) 
     return BaseMap(inventory, matrix, offset, np.zeros((N_OFFSETS, len(inventory), n_own)))
 
 
-def _carry_utterance(one: Utterance, base: Talker, model: ShapeModel, mapped: BaseMap, fps: float) -> Utterance:
+def _carry_utterance(utterance: Utterance, base: Talker, model: ShapeModel, mapped: BaseMap, fps: float) -> Utterance:
     """An utterance of the base as the person's; the rest of the face is at rest."""
-    before = np.arange(len(one.shape)) / base.fps
+    before = np.arange(len(utterance.shape)) / base.fps
     times = np.arange(int(before[-1] * fps) + 1) / fps
-    read = interpolate_columns(one.shape[:, : base.model.n_speech], before, times)
-    speech = separate_lips(mapped.parameters(frame_terms(one.phones, times, mapped.inventory, read)), model)
+    read = interpolate_columns(utterance.shape[:, : base.model.n_speech], before, times)
+    speech = separate_lips(mapped.parameters(frame_terms(utterance.phones, times, mapped.inventory, read)), model)
     shape = np.repeat(model.rest[None].astype(np.float64), len(times), axis=0)
     shape[:, : model.n_speech] = speech
-    head = interpolate_columns(one.head, before, times)
+    head = interpolate_columns(utterance.head, before, times)
     head[:, 3:] *= face_size(model) / face_size(base.model)
-    intensity = np.interp(times, before, one.intensity)
+    intensity = np.interp(times, before, utterance.intensity)
     return Utterance(
-        one.name, one.phones, one.words, shape.astype(np.float32), head.astype(np.float32), intensity.astype(np.float32)
+        utterance.name,
+        utterance.phones,
+        utterance.words,
+        shape.astype(np.float32),
+        head.astype(np.float32),
+        intensity.astype(np.float32),
     )
 
 

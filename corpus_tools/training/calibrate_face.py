@@ -1,9 +1,7 @@
-"""Calibration of a face: what the face tracker reads in its mouth for weights of the shapes that speech moves.
+"""Calibration of a face: the face tracker's reading of its mouth for weights of the shapes that speech moves.
 
 A score map is trained on scores of the face's landmarks in thousands of poses, and corrected by scores that the tracker
 reads in rendered pictures of some hundred poses.
-
-Score maps added to face files; everything else in a file keeps its bytes.
 """
 
 from dataclasses import replace
@@ -17,19 +15,12 @@ from lexicon.errors import DataError
 from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.face.mouth import SPEECH_SHAPE_PREFIXES
 from tts2face.lips.retargeting import build_retargeter
-from tts2face.models import face_file
-from tts2face.models.codec import stored_arrays
 from tts2face.models.face import Face
-from tts2face.models.face_loading import load_face
-from tts2face.models.face_schema import SCORE_INPUTS
 from tts2face.models.landmarks import N_LANDMARKS
-from tts2face.models.score_map import SCORE_SHAPES, SCORES, ScoreMap, mouth_scores
+from tts2face.models.score_map import SCORE_SHAPES, ScoreMap, mouth_scores
 from tts2face.models.talker import Talker
-from tts2face.models.talker_file import load_talker
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
-from tts2face.storage.shipped import find_file
-from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.types import Progress, Trajectory
 from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.tracking import FaceTracker
@@ -50,7 +41,6 @@ ADDED = (
 )  # fmt: skip
 JAW_SHARE, MAX_JAW = 0.6, 0.5  # share of poses with the jaw dropped further, by up to this weight
 GAINS, GAIN_SPREAD = (0.0, 1.4), 0.4  # of a pose, and of each shape in it (standard deviation of its logarithm)
-
 FloatArray = NDArray[np.float64]
 
 
@@ -65,13 +55,6 @@ def calibrate_face(
         Talker with a score map, whose speech gives the poses.
     model
         Bundle of landmark models; found if None.
-
-    Raises
-    ------
-    DataError
-        The face lacks landmarks or one of the shapes `SCORE_SHAPES`.
-    BackendError
-        The face tracker is not installed.
     """
     names = _speech_shapes(face)
     tracker, reader = FaceTracker(model), BlendshapeReader(model)
@@ -201,38 +184,3 @@ def _read_drawn(
         raise DataError("the tracker finds no face in pictures of the face, so its scores cannot be calibrated")
     scores = np.array([reader.blendshape_scores(points) for points in tracking.points[seen]])
     return poses[seen], mouth_scores(Trajectory(BLENDSHAPES, scores, 25.0))
-
-
-def calibrate_face_file(
-    face: str, out: Path, *, source: str = "grid_s1", model: Path | None = None, on_progress: Progress | None = None
-) -> None:
-    """Write a face file with its score map, which replaces one that it has; pictures show the face's own haircut.
-
-    Parameters
-    ----------
-    face
-        Shipped face, or path of a ``.face`` file.
-    source
-        Talker with a score map, whose speech gives the poses.
-
-    Raises
-    ------
-    InputError
-        There is no such face or talker.
-    DataError
-        The face cannot be calibrated, or a file is damaged.
-    BackendError
-        The face tracker or its models are missing, or the file cannot be written.
-    """
-    path = find_file(face, face_file.KIND)
-    calibrated = calibrate_face(load_face(str(path)), load_talker(source), model=model, on_progress=on_progress)
-    if calibrated.scores is not None:
-        _replace_score_map(path, out, calibrated.scores)
-
-
-def _replace_score_map(path: Path, out: Path, scores: ScoreMap) -> None:
-    arrays, header = read_tensors(path, face_file.KIND, face_file.FORMAT_VERSION)
-    kept = {name: array for name, array in arrays.items() if not name.startswith(f"{SCORES}.")}
-    header = header | {SCORE_INPUTS: list(scores.inputs)}
-    written = kept | stored_arrays(scores, SCORES)
-    write_tensors(out, face_file.KIND, face_file.FORMAT_VERSION, written, header, is_packed=True)

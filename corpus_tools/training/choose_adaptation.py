@@ -1,17 +1,11 @@
-"""Choice of how far own material changes a base talker, by cross-validation on the person's own sentences.
+"""Choice of how far own material changes a base talker, by cross-validation on the person's own sentences."""
 
-A talker from less material than stands alone: the chosen adaptation of a base, and what to record next.
-"""
-
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.measures.fingerprints import find_same, fingerprint_observations, fingerprint_talker
 from corpus_tools.measures.methods import build_methods
 from corpus_tools.measures.reference import LipCurves
 from corpus_tools.measures.scale import CurveScale
@@ -20,18 +14,14 @@ from corpus_tools.training.adapt_talker import (
     NO_CHANGE,
     Adaptation,
     Base,
-    adapted_talker,
     base_lips,
     combined_shapes,
     learn_base_map,
 )
 from corpus_tools.training.base_map import frame_terms
 from corpus_tools.training.train_talker import learn_talker
-from lexicon.phones import ARPABET
-from lexicon.sequence import SILENCE
 from tts2face.lips.motion_measures import DTW_BAND_S, correlation, range_ratio, speech_frames, warping_cost
-from tts2face.models.talker import NOT_STATED, ShapeModel, Talker
-from tts2face.models.talker_file import load_talker
+from tts2face.models.talker import ShapeModel, Talker
 from tts2face.types import Progress
 
 MAX_FOLDS = 5
@@ -51,7 +41,6 @@ ADAPTATIONS = (
     Adaptation(trust=0.3, penalty=30.0),
 )
 OWN_METHODS = {"mean face": "mean face", "mean pose": "mean phone pose", "own examples": "exemplar"}
-
 Floats = NDArray[np.float64]
 Landmarks = NDArray[np.floating]
 Synthesis = Callable[[Observation], Landmarks]  # landmarks (T, 478, 3) for the phones of an utterance
@@ -113,7 +102,7 @@ def choose_adaptation(
     """
     if len(observations) < 2:
         return ChosenAdaptation(_base_in_range(base, observations), None, {})
-    lips = {one.name: base_lips(base, one) for one in observations}
+    lips = {observation.name: base_lips(base, observation) for observation in observations}
     models: dict[tuple[str, ...], ShapeModel] = {}  # of each fold
     learners: dict[str, Learner] = {
         _name(adaptation): _adapted_learner(base, adaptation, lips, models) for adaptation in ADAPTATIONS
@@ -150,13 +139,13 @@ def cross_validate(learner: Learner, observations: Sequence[Observation]) -> Hel
     person = CurveScale.of_observations(observations)
     real, made, costs = [], [], []
     for fold in range(n_folds):
-        known = [one for at, one in enumerate(observations) if at % n_folds != fold]
+        known = [observation for at, observation in enumerate(observations) if at % n_folds != fold]
         synthesis, scale = learner(known), CurveScale.of_observations(known)
-        for one in observations[fold::n_folds]:
-            here = speech_frames(one.phones, len(one.landmarks), one.fps)
-            real.append(person.z_score(LipCurves.of(one.landmarks[here]).values()))
-            made.append(scale.z_score(LipCurves.of(synthesis(one)[here]).values()))
-            costs.append(warping_cost(real[-1], made[-1], np.ones(2), round(DTW_BAND_S * one.fps)))
+        for observation in observations[fold::n_folds]:
+            here = speech_frames(observation.phones, len(observation.landmarks), observation.fps)
+            real.append(person.z_score(LipCurves.of(observation.landmarks[here]).values()))
+            made.append(scale.z_score(LipCurves.of(synthesis(observation)[here]).values()))
+            costs.append(warping_cost(real[-1], made[-1], np.ones(2), round(DTW_BAND_S * observation.fps)))
     pooled, predicted = np.concatenate(real), np.concatenate(made)
     opening, width = (correlation(pooled[:, at], predicted[:, at]) for at in range(2))
     ranges = range_ratio(pooled[:, 0], predicted[:, 0]), range_ratio(pooled[:, 1], predicted[:, 1])
@@ -176,7 +165,7 @@ def _adapted_learner(
     models: dict[tuple[str, ...], ShapeModel],
 ) -> Learner:
     def learn(known: Sequence[Observation]) -> Synthesis:
-        names = tuple(one.name for one in known)
+        names = tuple(recording.name for recording in known)
         model = models[names] = models.get(names) or combined_shapes(base.talker.model, known)
         mapped = learn_base_map(base, known, model, adaptation, lips)
 
@@ -192,133 +181,10 @@ def _adapted_learner(
 
 def _own_learner(method: str, talkers: dict[tuple[str, ...], Talker]) -> Learner:
     def learn(known: Sequence[Observation]) -> Synthesis:
-        names = tuple(one.name for one in known)
+        names = tuple(recording.name for recording in known)
         talker = talkers[names] = talkers.get(names) or learn_talker(known, metadata={"name": "held out"})
         motion = build_methods(talker)[method]
         model: ShapeModel = talker.model
         return lambda one: model.shapes(motion(one.phones, len(one.landmarks), one.fps))
 
     return learn
-
-
-MIN_OWN_MINUTES = 10.0  # from here on a talker needs only the networks of a base
-NO_BASE = "none"
-MIN_TOKENS = 3  # of a phone; with fewer it is recommended for recording
-MIN_CONTEXTS = 3  # different pairs of neighbours of a phone, likewise
-MAX_LISTED = 12  # phones recommended at once, the rarest first
-# Words with each phone, by its ARPABET name.
-EXAMPLES = {
-    "AA": "father", "AE": "cat", "AH": "cup", "AO": "law", "AW": "how", "AY": "my", "B": "bee", "CH": "chair",
-    "D": "do", "DH": "this", "EH": "bed", "ER": "bird", "EY": "day", "F": "fee", "G": "go", "HH": "he", "IH": "sit",
-    "IY": "see", "JH": "joy", "K": "key", "L": "low", "M": "me", "N": "no", "NG": "sing", "OW": "go", "OY": "boy",
-    "P": "pea", "R": "red", "S": "so", "SH": "she", "T": "tea", "TH": "think", "UH": "book", "UW": "two", "V": "van",
-    "W": "we", "Y": "yes", "Z": "zoo", "ZH": "vision",
-}  # fmt: skip
-STATED_BY_BOTH = ("sources", "licence", "attribution")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ShortTalker:
-    """A talker with the utterances of the recordings first (``n_own``) and those of the base behind them.
-
-    ``notes`` state what to expect of it.
-    """
-
-    talker: Talker
-    n_own: int
-    chosen: ChosenAdaptation
-    notes: tuple[str, ...]
-
-
-def needs_base(observations: Sequence[Observation]) -> bool:
-    """Whether the recordings are shorter than `MIN_OWN_MINUTES`."""
-    return sum(len(one.landmarks) / one.fps for one in observations) < 60.0 * MIN_OWN_MINUTES
-
-
-def learn_short_talker(
-    observations: Sequence[Observation],
-    base: str,
-    *,
-    metadata: Mapping[str, Any],
-    on_progress: Progress | None = None,
-) -> ShortTalker:
-    """The talker of the observed recordings, completed by a base talker.
-
-    Parameters
-    ----------
-    observations
-        Of one person at one frame rate, from `observe` or from landmarks of another source.
-    base
-        Shipped talker by name, or path of a ``.talker`` file.
-
-    Raises
-    ------
-    InputError
-        There is no such talker.
-    DataError
-        The base is damaged.
-    """
-    known = load_talker(base)
-    indexed = Base.of(known)
-    chosen = choose_adaptation(indexed, observations, on_progress=on_progress)
-    talker = adapted_talker(indexed, observations, chosen.adaptation, metadata)
-    stated = {
-        **metadata,
-        **statements_of_both(metadata, indexed.talker.metadata),
-        "base": _base_metadata(indexed, chosen),
-    }
-    notes = (chosen.message, *_known_recordings(known, base, observations))
-    return ShortTalker(replace(talker, metadata=stated), len(observations), chosen, notes)
-
-
-def _known_recordings(known: Talker, base: str, observations: Sequence[Observation]) -> tuple[str, ...]:
-    """A note if the base was learnt from some of the recordings, whose held-out figures are then too good."""
-    same = find_same(fingerprint_talker(known), fingerprint_observations(observations))
-    if not same:
-        return ()
-    return (
-        f"the base {base} was learnt from {len(same)} of these recordings ({same[0][0]}, there as {same[0][1]}): the "
-        f"expected figures are too high; give another base, or `--base {NO_BASE}`",
-    )
-
-
-def recording_advice(observations: Sequence[Observation]) -> tuple[str, ...]:
-    """What to record next: English phones that are rare in the recordings, and phones in few contexts."""
-    counts: Counter[str] = Counter()
-    contexts: dict[str, set[tuple[str, str]]] = {}
-    for one in observations:
-        labels = (SILENCE, *one.phones.phones, SILENCE)
-        for before, label, behind in zip(labels, labels[1:], labels[2:], strict=False):
-            counts[label] += 1
-            contexts.setdefault(label, set()).add((before, behind))
-    spoken = {name: counts[ARPABET[name]] for name in EXAMPLES}
-    rare = sorted((name for name in EXAMPLES if spoken[name] < MIN_TOKENS), key=lambda name: (spoken[name], name))
-    narrow = [name for name in EXAMPLES if name not in rare and len(contexts.get(ARPABET[name], ())) < MIN_CONTEXTS]
-    advice = []
-    if rare:
-        listed = ", ".join(f"{name} as in {EXAMPLES[name]} ({spoken[name]})" for name in rare[:MAX_LISTED])
-        advice.append(f"record words with these phones next (times spoken so far): {listed}")
-    if narrow:
-        advice.append(f"record these phones between other phones: {', '.join(narrow)}")
-    return tuple(advice)
-
-
-def statements_of_both(own: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, str]:
-    """Sources, licence and attribution of the recordings and of the base."""
-    return {
-        name: f"recordings: {own.get(name, NOT_STATED)}; base: {base.get(name, NOT_STATED)}" for name in STATED_BY_BOTH
-    }
-
-
-def _base_metadata(base: Base, chosen: ChosenAdaptation) -> dict[str, Any]:
-    held_out = {
-        name: [round(score.opening, 3), round(score.width, 3), round(score.cost, 3)]
-        for name, score in chosen.alternatives.items()
-    }
-    return {
-        "name": base.talker.metadata.get("name", NOT_STATED),
-        "trust": chosen.adaptation.trust,
-        "penalty": chosen.adaptation.penalty,
-        "gain": [round(one, 4) for one in chosen.adaptation.gain],
-        "held_out": held_out,
-    }

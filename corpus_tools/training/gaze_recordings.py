@@ -135,10 +135,10 @@ def _read_person(path: Path, faces: Mapping[tuple[int, int], FloatArray]) -> Map
 
 def made_fixations(made: Sequence[Fixation], end_s: float) -> Fixations:
     """Fixations of a process up to a time, as if they had been recorded without a gap."""
-    start = np.array([one.time for one in made])
+    start = np.array([curve.time for curve in made])
     duration = np.diff(start, append=end_s)
     whole = np.zeros(len(made), np.int64)
-    return Fixations(start, duration, np.array([one.place for one in made]), whole, whole)
+    return Fixations(start, duration, np.array([curve.place for curve in made]), whole, whole)
 
 
 def find_looks(fixations: Fixations) -> Looks:

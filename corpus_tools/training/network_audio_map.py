@@ -1,31 +1,21 @@
-"""The network audio map: three layers, few hidden units, context frames on both sides (T07, section 3.2.2).
+"""The network audio map: three layers, few hidden units, context frames on both sides (T07, section 3.2.2)."""
 
-Training of audio maps from observations: features, context and hidden units.
-"""
-
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.recordings.observation import Observation
-from corpus_tools.run_options import StageCallback, ignore_stage
 from corpus_tools.training.linear_audio_map import (
     TrainingData,
     TrainingUtterance,
     build_training_data,
-    learn_linear_map,
     standardised_windows,
 )
 from lexicon.errors import InputError
 from lexicon.values.fields import check_fields
 from tts2face.models.audio_map import AudioMap
-from tts2face.models.talker import ShapeModel, Talker
-from tts2face.sound.features import FEATURE_RATE, speech_features, speech_level
-from tts2face.types import Progress, Waveform
-from tts2face.video.media import read_sound
 
 VALIDATION_SHARE = 0.1  # of the utterances, for early stopping
 PATIENCE = 30  # steps without a lower validation error
@@ -61,13 +51,7 @@ class NetworkMapOptions:
 
 
 def learn_network_map(utterances: Sequence[TrainingUtterance], *, feature: str, options: NetworkMapOptions) -> AudioMap:
-    """The network with the lowest validation error; equal utterances and seed give an equal network.
-
-    Raises
-    ------
-    InputError
-        There are fewer than two utterances.
-    """
+    """The network with the lowest validation error; equal utterances and seed give an equal network."""
     if len(utterances) < 2:
         raise InputError(f"a network needs at least 2 utterances, one of them for validation, not {len(utterances)}")
     rng = np.random.default_rng(options.seed)
@@ -77,14 +61,20 @@ def learn_network_map(utterances: Sequence[TrainingUtterance], *, feature: str, 
     validation_utterances = [utterances[i] for i in order[:n_validation]]
     standard = (data.mean, data.spread)
     features = np.concatenate(
-        [standardised_windows(one.features, standard, options.before, options.after) for one in validation_utterances]
+        [
+            standardised_windows(validation_utterance.features, standard, options.before, options.after)
+            for validation_utterance in validation_utterances
+        ]
     )
     centre = data.targets.mean(axis=0, dtype=np.float64)
     spread = np.maximum(data.targets.std(axis=0, dtype=np.float64), 1e-9)
     weight = spread**options.spread_exponent / np.sqrt(np.mean(spread ** (2 * options.spread_exponent)))
     targets, validation_targets = (
-        ((one - centre) / spread * weight).astype(np.float32)
-        for one in (data.targets, np.concatenate([one.parameters for one in validation_utterances]))
+        ((item - centre) / spread * weight).astype(np.float32)
+        for item in (
+            data.targets,
+            np.concatenate([validation_utterance.parameters for validation_utterance in validation_utterances]),
+        )
     )
     validation = TrainingData(features, validation_targets, data.mean, data.spread)
     layers = _train_layers(TrainingData(data.features, targets, data.mean, data.spread), validation, options, rng)
@@ -194,87 +184,3 @@ def loss_and_gradient(
         (2.0 / n) * residual.sum(axis=0),
     )
     return error, np.concatenate([slope.ravel() for slope in slopes]).astype(np.float64)
-
-
-# Chosen by inner cross-validation on the training utterances of GRID s1 (docs/accuracy.md, "Speech-driven").
-AUDIO_MAP_FEATURES = "mfcc+lsf"
-TALKER_NETWORK_OPTIONS = NetworkMapOptions(n_hidden=40)
-MIN_UTTERANCES = 20  # a tenth of them is the validation set
-MIN_FRAMES = 1000  # with fewer, canonical correlations are spurious (docs/accuracy.md)
-
-UtteranceFeatures = Mapping[str, NDArray[np.float32]]  # features of each utterance by its name
-
-
-def sound_features(
-    observations: Sequence[Observation], kinds: Sequence[str], *, on_progress: Progress | None = None
-) -> dict[str, UtteranceFeatures]:
-    """For each kind of feature, the (T, D) features of every utterance on the frames of its landmarks.
-
-    Raises
-    ------
-    DataError
-        A recording holds no sound.
-    """
-    found: dict[str, dict[str, NDArray[np.float32]]] = {kind: {} for kind in kinds}
-    for done, (observation, sound) in enumerate(_read_sounds(observations)):
-        for kind in kinds:
-            found[kind][observation.name] = utterance_features(observation, sound, kind)
-        if on_progress:
-            on_progress(done + 1, len(observations))
-    return dict(found)
-
-
-def utterance_features(observation: Observation, sound: Waveform, kind: str) -> NDArray[np.float32]:
-    """(T, D) features of the sound of a video on the frames of one utterance in it."""
-    start = observation.quality.cut + observation.quality.lag
-    n_frames = len(observation.landmarks)
-    return speech_features(sound, kind, fps=observation.fps, n_frames=n_frames, start=start).values
-
-
-def build_training_utterances(
-    observations: Sequence[Observation], model: ShapeModel, features: UtteranceFeatures
-) -> list[TrainingUtterance]:
-    """Training utterances: features of the sound and speech parameters of the landmarks."""
-    return [
-        TrainingUtterance(features[one.name], model.parameters(one.landmarks)[:, : model.n_speech])
-        for one in observations
-    ]
-
-
-def learn_audio_maps(
-    observations: Sequence[Observation],
-    talker: Talker,
-    *,
-    network: NetworkMapOptions = TALKER_NETWORK_OPTIONS,
-    stages: StageCallback = ignore_stage,
-) -> dict[str, AudioMap]:
-    """The linear and the network audio map of a talker; empty if there are too few recordings.
-
-    Raises
-    ------
-    DataError
-        A recording holds no sound.
-    """
-    if len(observations) < MIN_UTTERANCES or sum(len(one.landmarks) for one in observations) < MIN_FRAMES:
-        return {}
-    features = sound_features(
-        observations, (AUDIO_MAP_FEATURES, "level"), on_progress=stages("computing sound features")
-    )
-    utterances = build_training_utterances(observations, talker.model, features[AUDIO_MAP_FEATURES])
-    loudness = speech_level(np.concatenate(list(features["level"].values())))
-    on_map = stages("learning audio maps")
-    linear = learn_linear_map(utterances, feature=AUDIO_MAP_FEATURES)
-    on_map(1, 2)
-    nonlinear = learn_network_map(utterances, feature=AUDIO_MAP_FEATURES, options=network)
-    on_map(2, 2)
-    maps = {"linear": linear, "network": nonlinear}
-    return {name: replace(one, loudness=loudness, fps=talker.fps) for name, one in maps.items()}
-
-
-def _read_sounds(observations: Sequence[Observation]) -> Iterator[tuple[Observation, Waveform]]:
-    """Each utterance with the sound of its video; each video is read once."""
-    last: tuple[object, Waveform] | None = None
-    for observation in sorted(observations, key=lambda one: str(one.video)):
-        if last is None or last[0] != observation.video:
-            last = observation.video, read_sound(observation.video, FEATURE_RATE)
-        yield observation, last[1]

@@ -3,17 +3,14 @@
 Two hidden layers of rectified linear units. Every sum is accumulated in one order, in single precision, without BLAS
 and on one thread, so that the same data and seed give the same bytes on any number of threads. Several speakers share
 all weights but the biases of the first layer; each output counts only for the speakers for whom it is known.
-
-Codes of phones for networks: articulatory features, or one-hot.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.phones import phone_features
 from tts2face.numeric.kernels import kernel
 
 BATCH = 128  # samples per step
@@ -23,7 +20,6 @@ FINAL_RATE = 0.02
 MOMENTS = (0.9, 0.999)  # decay of the moments of the gradient (Kingma and Ba 2015)
 EPSILON = 1e-8
 POSITION_SPREAD = 0.3  # of the initial weights of the position within the phone: seconds and a share, all below 1
-
 Floats = NDArray[np.float32]
 Weights = tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats]
 """First layer of phones (C, K, H), of positions (Q, H), biases by speaker (G, H); second layer; output layer."""
@@ -68,7 +64,7 @@ def train_network(
     """
     stream = np.random.default_rng(seed)
     weights = _initial_weights(samples, table, importance.shape, options, stream)
-    moments = tuple(np.zeros_like(one) for one in weights), tuple(np.zeros_like(one) for one in weights)
+    moments = tuple(np.zeros_like(weight) for weight in weights), tuple(np.zeros_like(weight) for weight in weights)
     data = (samples.shown, samples.position, samples.targets, samples.speaker)
     n_steps = 0
     for epoch in range(options.n_epochs):
@@ -273,8 +269,3 @@ def _adam_step(values, gradient, mean, square, decay, step):  # type: ignore[no-
         first[i] = keep_mean * first[i] + (np.float32(1.0) - keep_mean) * g
         second[i] = keep_square * second[i] + (np.float32(1.0) - keep_square) * g * g
         flat[i] -= rate * (first[i] * mean_scale) / (np.sqrt(second[i] * square_scale) + np.float32(EPSILON))
-
-
-def feature_table(inventory: Iterable[str]) -> NDArray[np.float32]:
-    """(P, K) articulatory features of P phones, for their first and their second half."""
-    return np.array([[*first, *last] for first, last in map(phone_features, inventory)], np.float32)

@@ -1,14 +1,12 @@
 """Networks from phones to speech parameters, trained on a talker's utterances, with or without other lips.
 
 The inputs of some are one-hot codes of phones, those of the others articulatory features
-(`lexicon.phones.phone_features`), which generalise to unseen phones; their first layer is multiplied by the
-feature table, so that the talker's file holds all networks in the same form.
-
-With pooled speech, which is that of another speaker or of a base talker's networks, they have further outputs, the lip
-features of `corpus_tools.training.pooling`, z-scored per speaker.
-Both speakers share all weights but the biases of the first layer; the talker's parameters are learnt from the talker
-only, and then corrected to show the talker's opening and width as the network predicts them. What remains of the other
-speaker is his influence on the weights: his features and biases are not stored.
+(`lexicon.phones.phone_features`), which generalise to unseen phones; their first layer is multiplied by the feature
+table, so that the talker's file holds all networks in the same form. With pooled speech, which is that of another
+speaker or of a base talker's networks, they have further outputs, the lip features of `corpus_tools.training.pooling`,
+z-scored per speaker. Both speakers share all weights but the biases of the first layer; the talker's parameters are
+learnt from the talker only, and then corrected to show the talker's opening and width as the network predicts them.
+What remains of the other speaker is his influence on the weights: his features and biases are not stored.
 """
 
 from collections.abc import Sequence
@@ -17,14 +15,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.training.network_training import (
-    TrainingOptions,
-    Weights,
-    WindowSamples,
-    feature_table,
-    phone_layer,
-    train_network,
-)
+from corpus_tools.training.network_training import TrainingOptions, Weights, WindowSamples, phone_layer, train_network
+from corpus_tools.training.phone_codes import feature_table
 from corpus_tools.training.pooling.speech import PooledSpeech, pooled_inventory, talker_features
 from lexicon.sequence import SILENCE
 from tts2face.lips.motion_measures import speech_frames
@@ -50,7 +42,7 @@ def add_phone_network(
     if sum(len(utterance.shape) for utterance in talker.utterances) < MIN_FRAMES:
         return talker
     labels = {label for utterance in talker.utterances for label in utterance.phones.phones} | {SILENCE}
-    labels |= {label for one in pooled for label in one.phones.phones}
+    labels |= {label for track in pooled for label in track.phones.phones}
     inventory = pooled_inventory(labels) if pooled else tuple(sorted(labels))
     n_speech = talker.model.n_speech
     spread = np.maximum(talker.model.spread[:n_speech], 1e-6)
@@ -93,7 +85,7 @@ def _talker_samples(
 def _speech_statistics(
     talker: Talker, features: Sequence[NDArray[np.float64]]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    here = [speech_frames(one.phones, len(one.shape), talker.fps) for one in talker.utterances]
+    here = [speech_frames(utterance.phones, len(utterance.shape), talker.fps) for utterance in talker.utterances]
     speech = np.concatenate([values[span] for values, span in zip(features, here, strict=True)])
     return speech.mean(axis=0), np.maximum(speech.std(axis=0), 1e-9)
 
@@ -104,11 +96,11 @@ def _pooled_samples(
     if not pooled:
         return None
     parts = []
-    for one in pooled:
-        times = np.arange(len(one.features))[one.is_used] / one.fps
-        values = one.features[one.is_used]
+    for track in pooled:
+        times = np.arange(len(track.features))[track.is_used] / track.fps
+        values = track.features[track.is_used]
         targets = np.concatenate([np.zeros((len(values), n_speech)), values], axis=1)
-        parts.append((*window_features(one.phones, times, inventory), targets))
+        parts.append((*window_features(track.phones, times, inventory), targets))
     shown, position, values = (np.concatenate(column) for column in zip(*parts, strict=True))
     return shown, position, values.astype(np.float32)
 
@@ -123,7 +115,7 @@ def _join(
     importance = np.ones((len(groups), own[2].shape[1]), np.float32)
     importance[1:, :n_speech] = 0.0
     shown, position, targets = (np.concatenate(column) for column in zip(*groups, strict=True))
-    speaker = np.repeat(np.arange(len(groups)), [len(one[0]) for one in groups])
+    speaker = np.repeat(np.arange(len(groups)), [len(group[0]) for group in groups])
     return WindowSamples(shown.astype(np.int32), position, targets, speaker), importance
 
 
@@ -163,4 +155,4 @@ def expand_to_phones(
     first = np.concatenate([*phone_layer(weights, table), place])
     layers = [first, inner, outer[:, :n_speech] * spread]
     every = [layers, [biases[0], inner_biases, outer_biases[:n_speech] * spread]]
-    return [one.astype(np.float32) for one in every[0]], [one.astype(np.float32) for one in every[1]]
+    return [item.astype(np.float32) for item in every[0]], [item.astype(np.float32) for item in every[1]]

@@ -16,7 +16,7 @@ import corpus_tools
 import lexicon
 import tts2face
 from corpus_tools.build_palette import StyleSource
-from corpus_tools.decomposition.recordings import MarkerOptions
+from corpus_tools.decomposition.capture_files import MarkerOptions
 from corpus_tools.dense.person_look import LookChoices
 from corpus_tools.run_options import RunOptions
 from corpus_tools.studies.gestures.analysis import StudyOptions

@@ -21,7 +21,7 @@ PROCESS_ROOM = "tts2face.processes"
 STARTS_PYTHON = ("tts2face.sound.espeak",)
 # Modules that read JSON or TOML themselves; `lexicon.values` does it for others.
 PARSES = (
-    "corpus_tools.shipped.head.source", "lexicon.part_of_speech", "lexicon.values.json_text",
+    "corpus_tools.shipped.head.assets", "lexicon.part_of_speech", "lexicon.values.json_text",
     "lexicon.values.toml_text",
     "tts2face.processes.message", "tts2face.serving.studio.preview_bundle", "tts2face.serving.work.resources",
     "tts2face.serving.work.job_record", "tts2face.sound.espeak", "tts2face.sound.espeak_child",

@@ -6,8 +6,9 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.appearance.frame import MOUTH_LANDMARKS, align_shapes, apply_similarities, fit_similarities
+from corpus_tools.appearance.frame import MOUTH_LANDMARKS
 from corpus_tools.appearance.pca import IncrementalPca
+from corpus_tools.appearance.procrustes import align_shapes, apply_similarities, fit_similarities
 from corpus_tools.appearance.train import LearnedAppearance
 from corpus_tools.appearance.videos import AppearanceRecording
 from corpus_tools.recordings.observation import Observation

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sentences import sentences
 
-from corpus_tools.recordings.folder import read_word_times
+from corpus_tools.recordings.transcripts import read_word_times
 from corpus_tools.shipped.training.damage import babble, coded, speech_power, stationary_noise, with_echo
 from corpus_tools.shipped.training.spoken_material import resampled
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan

@@ -19,17 +19,18 @@ from corpus_tools.measures.splits import split_into_folds, split_randomly
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import observe
 from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA
-from corpus_tools.training.linear_audio_map import canonical_correlation, learn_linear_map
-from corpus_tools.training.network_audio_map import (
+from corpus_tools.training.canonical_correlation import canonical_correlation
+from corpus_tools.training.learn_audio_maps import (
     AUDIO_MAP_FEATURES,
     TALKER_NETWORK_OPTIONS,
-    NetworkMapOptions,
     build_training_utterances,
-    learn_network_map,
     sound_features,
     utterance_features,
 )
-from corpus_tools.training.train_talker import fit_pose_correction, learn_talker
+from corpus_tools.training.linear_audio_map import learn_linear_map
+from corpus_tools.training.network_audio_map import NetworkMapOptions, learn_network_map
+from corpus_tools.training.pose_correction import fit_pose_correction
+from corpus_tools.training.train_talker import learn_talker
 from tts2face.lips import explanation
 from tts2face.models.audio_map import AudioMap
 from tts2face.sound.features import FEATURE_RATE, speech_level

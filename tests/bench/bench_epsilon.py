@@ -14,12 +14,13 @@ import numpy as np
 from corpus_tools.build_palette import ESTIMATORS, StyleSource, build_basis, build_estimator
 from corpus_tools.decomposition.blend_weights import moving_average
 from corpus_tools.decomposition.capture import FaceRecording, resample_to_gesture_rate
+from corpus_tools.decomposition.capture_files import read_livelink_recording
 from corpus_tools.decomposition.decompose import weight_displacements
-from corpus_tools.decomposition.recordings import read_livelink_recording, read_video_recording
-from corpus_tools.dense.texels import find_videos
+from corpus_tools.decomposition.recordings import read_video_recording
+from corpus_tools.dense.tracked_pictures import find_videos
 from corpus_tools.recordings.video import CachedTracker
 from corpus_tools.run_options import RunOptions
-from corpus_tools.training.train_talker import fit_pose_correction
+from corpus_tools.training.pose_correction import fit_pose_correction
 from tests.corpus_tools.decomposition.weight_errors import approximation_error
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import N_MESH_LANDMARKS

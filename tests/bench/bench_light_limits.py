@@ -12,10 +12,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from corpus_tools.recordings.light import MEASURES, measure_light
 from corpus_tools.recordings.limits import landmark_measures
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import observe
-from corpus_tools.recordings.video import MEASURES, measure_light
 from corpus_tools.run_options import RunOptions
 from tests.bench.bench_recording_limits import Pictures, lip_correlations, retrack
 from tts2face.video.networks import find_bundle

@@ -13,8 +13,9 @@ import numpy as np
 from corpus_tools.decomposition.basis import transfer_basis
 from corpus_tools.decomposition.blend_weights import build_least_squares_estimator, moving_average
 from corpus_tools.decomposition.capture import resample, resample_to_gesture_rate
-from corpus_tools.decomposition.markers import read_marker_recording, read_marker_set
-from corpus_tools.decomposition.recordings import read_livelink_recording
+from corpus_tools.decomposition.capture_files import read_livelink_recording
+from corpus_tools.decomposition.marker_sets import read_marker_set
+from corpus_tools.decomposition.markers import read_marker_recording
 from tests.corpus_tools.decomposition.made_markers import FPS, SIZE, made_take, write_c3d
 from tts2face.face.deformation import rest_landmarks
 from tts2face.face.expressions import expression_landmarks

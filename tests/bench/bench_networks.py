@@ -8,7 +8,7 @@ import time
 from dataclasses import replace
 
 from corpus_tools.training.phone_network import add_phone_network
-from corpus_tools.training.pooling.speech import base_speech
+from corpus_tools.training.pooling.base_speech import base_speech
 from tts2face.models.talker_file import load_talker
 
 

@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 
 from corpus_tools.measures.methods import build_methods
 from corpus_tools.measures.reference import LipCurves
+from corpus_tools.recordings.expected_opening import shipped_talker_opening
 from corpus_tools.recordings.folder import Recording, find_recordings, pronounce_recording
 from corpus_tools.recordings.limits import check_limits, confidence_measure, landmark_measures, sound_measures
-from corpus_tools.recordings.observation import Observation, shipped_talker_opening, trim_to_picture
+from corpus_tools.recordings.observation import Observation, trim_to_picture
 from corpus_tools.recordings.observe import observe
 from corpus_tools.recordings.sound import SOUND_RATE, AlignedSpeech, suppress_noise
 from corpus_tools.recordings.sync import LAGS_S, NEAR_S, lag_correlations

@@ -23,9 +23,9 @@ from corpus_tools.decomposition.blend_weights import (
     moving_average,
 )
 from corpus_tools.decomposition.capture import resample, resample_to_gesture_rate
-from corpus_tools.decomposition.recordings import read_livelink_recording
+from corpus_tools.decomposition.capture_files import read_livelink_recording
 from corpus_tools.recordings.observe import observe
-from corpus_tools.training.train_talker import correct_pose
+from corpus_tools.training.pose_correction import correct_pose
 from tests.corpus_tools.decomposition.weight_errors import approximation_error
 from tts2face.face.deformation import rest_landmarks
 from tts2face.face.expressions import expression_landmarks

@@ -7,18 +7,16 @@ import pytest
 
 from corpus_tools.appearance.frame import (
     MOUTH_LANDMARKS,
-    align_shapes,
-    apply_similarities,
     barycentric_coordinates,
     build_reference_frame,
     face_ring,
     face_triangles,
-    fit_similarities,
     mouth_triangles,
-    points_in_polygon,
 )
+from corpus_tools.appearance.lighting import fit_lighting
 from corpus_tools.appearance.pca import IncrementalPca
-from corpus_tools.appearance.train import camera_axes, fit_lighting, speech_weights
+from corpus_tools.appearance.procrustes import align_shapes, apply_similarities, fit_similarities
+from corpus_tools.appearance.train import camera_axes, speech_weights
 from corpus_tools.appearance.videos import AppearanceRecording, build_appearance_recording
 from corpus_tools.recordings.observation import Observation, Quality
 from corpus_tools.recordings.video import TrackedVideo
@@ -26,6 +24,7 @@ from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.models.consent import consent_record
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.numeric.arrays import points_in_polygon
 from tts2face.picture.own_face import ring_triangles
 from tts2face.video.tracking import Tracking
 

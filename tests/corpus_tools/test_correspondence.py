@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from corpus_tools.shipped.head.correspondence import nearest_surface_points, read_places, write_places
+from corpus_tools.shipped.head.edge_rings import EdgeRings, find_narrowest_ring
 from corpus_tools.shipped.head.locate import intersect_ray, symmetrise
-from corpus_tools.shipped.head.skin import EdgeRings, find_narrowest_ring
 from lexicon.errors import DataError
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS

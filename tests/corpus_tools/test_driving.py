@@ -10,13 +10,13 @@ import pytest
 from cli.main import run
 from corpus_tools.build_talker import add_audio_maps
 from corpus_tools.recordings.observe import Observations
-from corpus_tools.training.network_audio_map import (
+from corpus_tools.training.learn_audio_maps import (
     AUDIO_MAP_FEATURES,
-    NetworkMapOptions,
     learn_audio_maps,
     sound_features,
     utterance_features,
 )
+from corpus_tools.training.network_audio_map import NetworkMapOptions
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError
 from tts2face.models.talker_file import read_talker, write_talker

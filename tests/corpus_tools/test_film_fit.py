@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corpus_tools.shipped.film.fit_light import HIDDEN_WEIGHT, RIDGE, principal_modes
+from corpus_tools.shipped.film.fit_light import HIDDEN_WEIGHT, RIDGE
 from corpus_tools.shipped.film.fit_pictures import SIDE_PX, fit_to_pictures
 from corpus_tools.shipped.film.fit_responses import find_partners, fit_responses, limits_of
 from corpus_tools.shipped.film.poses import LitPose
+from corpus_tools.shipped.film.texel_light import principal_modes
 from tests.picture.film.lit_face import lit_tiny_face
 from tts2face.models.baked_light import LIMIT_STEP, quantised
 from tts2face.models.face import Face

@@ -13,7 +13,7 @@ from corpus_tools.measures.splits import check_disjoint, check_unknown
 from corpus_tools.recordings.observation import Observation, Quality
 from corpus_tools.studies.evaluation.evaluate import evaluate, evaluate_across_talkers
 from corpus_tools.studies.evaluation.people import evaluate_people
-from corpus_tools.training.choose_adaptation import learn_short_talker
+from corpus_tools.training.short_talker import learn_short_talker
 from lexicon.errors import InputError
 from lexicon.sequence import PhoneSequence
 from tts2face.models.talker import Talker, Utterance

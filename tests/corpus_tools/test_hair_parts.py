@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corpus_tools.shipped.head.cards import LINE_Y, MIDDLE, Cards, StrandStyle, flat_relief, hair_share
 from corpus_tools.shipped.head.haircut import (
     ROOT_MM,
     SUNK_MM,
@@ -15,6 +14,8 @@ from corpus_tools.shipped.head.haircut import (
     sink_strands,
     thin_roots,
 )
+from corpus_tools.shipped.head.scalp import LINE_Y, MIDDLE, hair_share
+from corpus_tools.shipped.head.strands import Cards, StrandStyle, flat_relief
 from tts2face.numeric.arrays import unit_vectors
 
 SIDE = 128

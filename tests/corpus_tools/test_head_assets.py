@@ -10,7 +10,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from corpus_tools.shipped.head import source
-from corpus_tools.shipped.head.cards import Cards, StrandStyle, bake_strands, strand_angles, strand_tangents
+from corpus_tools.shipped.head.assets import Asset, asset_files, parse_asset, unpack_assets
 from corpus_tools.shipped.head.haircut import (
     AXIS_Z,
     BROW_Y,
@@ -21,9 +21,10 @@ from corpus_tools.shipped.head.haircut import (
     split_seams,
     trim_fringe,
 )
-from corpus_tools.shipped.head.mesh import grid_triangles
-from corpus_tools.shipped.head.mouth import LOWER, UPPER, follow_lips, shape_tip
-from corpus_tools.shipped.head.source import Asset, asset_files, parse_asset, unpack_assets
+from corpus_tools.shipped.head.strands import Cards, StrandStyle, bake_strands, strand_angles, strand_tangents
+from corpus_tools.shipped.head.subdivision import grid_triangles
+from corpus_tools.shipped.head.teeth import LOWER, UPPER, follow_lips
+from corpus_tools.shipped.head.tongue import shape_tip
 from lexicon.errors import DataError
 
 BASE = np.array([[-1, 7, 0], [1, 7, 0], [1, 9, 0], [-1, 9, 0], [0, 8, 1], [0, 8, -1]], float)

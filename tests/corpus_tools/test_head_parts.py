@@ -9,10 +9,12 @@ import pytest
 
 from corpus_tools.dense.texels import find_texels
 from corpus_tools.shipped.head import source
-from corpus_tools.shipped.head.build_head import PRESETS
-from corpus_tools.shipped.head.head import TABLE, Sheet, add_targets, clip_sheet, modelling_targets
-from corpus_tools.shipped.head.mesh import fit_rotation, fit_sphere, layout_coordinates
-from corpus_tools.shipped.head.mouth import LOWER, UPPER, arch_piece
+from corpus_tools.shipped.head.cage import fit_rotation, fit_sphere
+from corpus_tools.shipped.head.layout import layout_coordinates
+from corpus_tools.shipped.head.presets import PRESETS
+from corpus_tools.shipped.head.proportions import TABLE, add_targets, modelling_targets
+from corpus_tools.shipped.head.shirt import Sheet, clip_sheet
+from corpus_tools.shipped.head.teeth import LOWER, UPPER, arch_piece
 from lexicon.errors import DataError
 
 OBJ = """v 0 0 0

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corpus_tools.shipped.head.mouth import mouth_vertices, scatter_in_mouth
+from corpus_tools.shipped.head.mouth_light import mouth_vertices, scatter_in_mouth
 from corpus_tools.shipped.head.skin import HeadSkin
 from tests.picture.tiny_face import tiny_face
 from tts2face.picture.occlusion import sphere_directions

@@ -11,6 +11,16 @@ from PIL import Image
 
 from cli.main import run
 from corpus_tools.dense.hair_region import ACROSS_MM, UP_MM, Portrait, find_hair
+from corpus_tools.dense.light_colour import (
+    GLOSSY,
+    EyeColours,
+    estimate_cast,
+    log_colour,
+    remove_cast,
+    skin_texture,
+    srgb_colour,
+    without_gloss,
+)
 from corpus_tools.dense.mesh_fit import face_landmarks, part_vertices
 from corpus_tools.dense.person_look import (
     LASH_LENGTH,
@@ -23,17 +33,7 @@ from corpus_tools.dense.person_look import (
     part_colour,
     shorten_lashes,
 )
-from corpus_tools.dense.skin_colour import (
-    GLOSSY,
-    EyeColours,
-    PictureFitter,
-    estimate_cast,
-    log_colour,
-    remove_cast,
-    skin_texture,
-    srgb_colour,
-    without_gloss,
-)
+from corpus_tools.dense.skin_colour import PictureFitter
 from tests.face.posing import posed_vertices
 from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import read_face

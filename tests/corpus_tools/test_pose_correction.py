@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.training.train_talker import MIN_CHUNKS, angle_terms, correct_pose, fit_pose_correction
+from corpus_tools.training.pose_correction import MIN_CHUNKS, angle_terms, correct_pose, fit_pose_correction
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
 
 N = 40

@@ -16,13 +16,12 @@ from corpus_tools.prompts.coverage import (
 from corpus_tools.prompts.prompts import (
     MAX_MINUTES,
     choose_prompts,
-    easy_sentences,
     format_counts,
     n_prompts,
     shipped_counts,
     shipped_sentences,
-    words_of,
 )
+from corpus_tools.prompts.sentences import easy_sentences, words_of
 from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import InputError
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from corpus_tools.training.linear_audio_map import fit_ridge
+from corpus_tools.training.ridge import fit_ridge
 
 
 def test_leave_one_out_errors_equal_those_of_refitting_without_each_row() -> None:

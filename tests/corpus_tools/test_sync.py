@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.recordings.observation import EXPECTED_RATE_HZ, Observation, Timing, shipped_talker_opening
+from corpus_tools.recordings.expected_opening import EXPECTED_RATE_HZ, shipped_talker_opening
+from corpus_tools.recordings.observation import Observation, Timing
 from corpus_tools.recordings.sync import MAX_LAG_S, SyncEstimate, corrected_timings, estimate_sync_by_video
 from lexicon.sequence import SILENCE, PhoneSequence
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from corpus_tools.decomposition.marker_files import read_markers
-from corpus_tools.decomposition.markers import read_marker_set
+from corpus_tools.decomposition.marker_sets import read_marker_set
 from corpus_tools.recordings.folder import find_recordings
 from corpus_tools.studies.evaluation.tracks import read_tracks
 from lexicon.errors import DataError

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from corpus_tools.decomposition.recordings import GOOD_S, LEAST_S, check_gesture_take
+from corpus_tools.decomposition.take_check import GOOD_S, LEAST_S, check_gesture_take
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
 from tests.photo.pictures import still

@@ -5,15 +5,9 @@ import contextlib
 import numpy as np
 import pytest
 
-from corpus_tools.recordings.folder import (
-    READERS,
-    SpokenCue,
-    find_recordings,
-    find_transcript,
-    pronounce_recording,
-    read_cues,
-    read_transcript,
-)
+from corpus_tools.recordings.folder import find_recordings, pronounce_recording
+from corpus_tools.recordings.subtitle_cues import SpokenCue, read_cues
+from corpus_tools.recordings.transcripts import READERS, find_transcript, read_transcript
 from lexicon.errors import DataError
 from tts2face.interchange.subtitles.decoding import MAX_BYTES, read_text
 

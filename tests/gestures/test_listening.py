@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.studies.gestures.measures import find_blinks
+from corpus_tools.studies.gestures.blinks import find_blinks
 from lexicon.errors import InputError
 from tests.world import World
 from tts2face.gestures.elements import ListeningSpan, Nod

@@ -6,7 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from corpus_tools.studies.gestures.measures import find_blinks, wasserstein
+from corpus_tools.studies.gestures.blinks import find_blinks
+from corpus_tools.studies.gestures.measures import wasserstein
 from tts2face.gestures.blinks import PAUSE_DB
 from tts2face.gestures.elements import Gains, GazeTarget, StyleSpan
 from tts2face.gestures.head_presentation import find_accents, slow_scales

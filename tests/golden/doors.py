@@ -158,14 +158,14 @@ def live(folder: Path) -> Fingerprint:
 def similarity(folder: Path) -> Fingerprint:
     """The report of the similarity of a made talker's phones, compared with another one's: page, figures and table."""
     from corpus_tools.studies.similarity.analysis import NamedTalker, SimilarityOptions, analyse
-    from corpus_tools.studies.similarity.write import WRITERS
+    from corpus_tools.studies.similarity.write import similarity_report
     from tests.corpus_tools.similarity.steady_talker import made_talker
 
     made, other = NamedTalker("made", made_talker(20)), NamedTalker("other", made_talker(20, seed=9, gain=20.0))
     found = analyse(made, SimilarityOptions(halves=3), other)
     paths = [folder / f"report{suffix}" for suffix in (".html", ".json", ".csv")]
     for path in paths:
-        path.write_bytes(WRITERS[path.suffix](found, "both"))
+        path.write_bytes(similarity_report("both").formats[path.suffix](found))
     table = json.loads((folder / "report.json").read_text(encoding="utf-8"))["similarity"]
     return of_files(paths) | {"means": [round(sum(map(abs, row)) / len(row), 4) for row in table]}
 

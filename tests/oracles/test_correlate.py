@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from corpus_tools.training.linear_audio_map import canonical_correlation
+from corpus_tools.training.canonical_correlation import canonical_correlation
 from lexicon.errors import InputError
 from tests.bench.bench_drive import sampled_correlations
 from tests.packages import package

@@ -9,7 +9,7 @@ from corpus_tools.appearance.frame import (
     face_triangles,
     mouth_triangles,
 )
-from corpus_tools.appearance.videos import encode_plate_video
+from corpus_tools.appearance.plate import encode_plate_video
 from tts2face.models.appearance import Appearance, Plate, TextureModel
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER, N_MESH_LANDMARKS
 from tts2face.models.talker import ShapeModel, Talker

@@ -7,43 +7,44 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.shipped.drawn.brows import brow_piece
 from corpus_tools.shipped.drawn.character import DrawnCharacter
+from corpus_tools.shipped.drawn.clothes import breath, stud_pieces, sweater_piece
 from corpus_tools.shipped.drawn.elder import ELDER
-from corpus_tools.shipped.drawn.eyes import brow_piece, find_lining, lash_piece, shut_lids, still_lining, tuck_lining
+from corpus_tools.shipped.drawn.expressions import close_jaw, part_lips, rest_in, round_lips, soften, thin_lips
 from corpus_tools.shipped.drawn.girl import GIRL
+from corpus_tools.shipped.drawn.glasses import glasses_piece
 from corpus_tools.shipped.drawn.hair import OtherHair, hair_cover, hair_piece, other_palettes
+from corpus_tools.shipped.drawn.lash_bands import lash_piece
+from corpus_tools.shipped.drawn.lids import find_lining, shut_lids, still_lining, tuck_lining
 from corpus_tools.shipped.drawn.man import MAN
 from corpus_tools.shipped.drawn.paint import paint_eye, paint_skin, vertex_masks
 from corpus_tools.shipped.drawn.people import REALISTIC_MAN, REALISTIC_WOMAN
-from corpus_tools.shipped.drawn.sculpt import close_jaw, drawn_cage, part_lips, rest_in, round_lips, soften, thin_lips
+from corpus_tools.shipped.drawn.sculpt import drawn_cage
 from corpus_tools.shipped.drawn.teeth import teeth_pieces
 from corpus_tools.shipped.drawn.woman import WOMAN
-from corpus_tools.shipped.drawn.worn import breath, glasses_piece, stud_pieces, sweater_piece
 from corpus_tools.shipped.head.build_head import METADATA, shape_names
+from corpus_tools.shipped.head.cage import Cage, build_cage
 from corpus_tools.shipped.head.correspondence import add_landmarks
 from corpus_tools.shipped.head.eyes import eyeball_piece, fit_eyeballs
-from corpus_tools.shipped.head.head import PIVOT, REFERENCE_PERSON, ReferenceHead, shirt_piece, skin_piece
+from corpus_tools.shipped.head.head import PIVOT, REFERENCE_PERSON, ReferenceHead, skin_piece
+from corpus_tools.shipped.head.jaw import fit_jaw
+from corpus_tools.shipped.head.lid_edges import find_lid_edges, wet_piece
 from corpus_tools.shipped.head.lips import close_lips, lip_ring
-from corpus_tools.shipped.head.mesh import Cage, Eyeball, HeadPart, HeadPieces, assemble_face, build_cage
-from corpus_tools.shipped.head.mouth import tongue_piece
-from corpus_tools.shipped.head.shapes import (
-    LID_SHAPES,
-    clear_eyeballs,
-    correct_shapes,
-    find_lid_edges,
-    fit_jaw,
-    wet_piece,
-)
+from corpus_tools.shipped.head.parts import Eyeball, HeadPart, HeadPieces, assemble_face
+from corpus_tools.shipped.head.shapes import LID_SHAPES, clear_eyeballs, correct_shapes
+from corpus_tools.shipped.head.shirt import shirt_piece
 from corpus_tools.shipped.head.skin import HeadSkin, build_shoulders, build_skin
 from corpus_tools.shipped.head.source import SourceMesh
-from corpus_tools.training.calibrate_face import calibrate_face_file
+from corpus_tools.shipped.head.tongue import tongue_piece
+from corpus_tools.training.calibrate_file import calibrate_face_file
 from tts2face.face.body import BREATH_SHAPE, LIMIT_RAD, PUPIL_SHAPE
 from tts2face.models.face import Face, Hairdo, Texture
 from tts2face.models.face_file import write_face
 from tts2face.models.lit_hair import SWING_SHAPES
 
 CAST: Mapping[str, DrawnCharacter] = {
-    one.name: one for one in (WOMAN, MAN, ELDER, GIRL, REALISTIC_WOMAN, REALISTIC_MAN)
+    item.name: item for item in (WOMAN, MAN, ELDER, GIRL, REALISTIC_WOMAN, REALISTIC_MAN)
 }
 CLEAR_MM = 0.6  # between lid and eyeball: the edges of stretched lids are 6 mm long and sink between vertices
 BODY_SHAPES = (BREATH_SHAPE, *SWING_SHAPES, PUPIL_SHAPE)

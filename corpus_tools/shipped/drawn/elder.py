@@ -5,21 +5,8 @@ from dataclasses import replace
 from corpus_tools.shipped.drawn.character import Brow, Collar, DrawnCharacter, Hairstyle, Lock, Proportions
 from corpus_tools.shipped.drawn.woman import PALETTE as HER_PALETTE
 from corpus_tools.shipped.head.eyes import EyeStyle
+from corpus_tools.shipped.head.proportions import person_targets
 
-TARGETS = {
-    "macrodetails/asian-female-old": 0.34, "macrodetails/caucasian-female-old": 0.26,
-    "macrodetails/asian-female-young": 0.16, "macrodetails/caucasian-female-child": 0.24,
-    "macrodetails/universal-female-old-averagemuscle-averageweight": 0.60,
-    "macrodetails/universal-female-young-averagemuscle-averageweight": 0.16,
-    "macrodetails/universal-female-child-averagemuscle-averageweight": 0.24,
-    "mouth/mouth-angles-up": 0.5, "mouth/mouth-cupidsbow-decr": 0.3, "mouth/mouth-scale-horiz-incr": 0.45,
-    "mouth/mouth-upperlip-middle-up": 0.3, "mouth/mouth-laugh-lines-out": 0.2, "mouth/mouth-trans-down": 0.55,
-    "eyes/l-eye-height1-incr": 0.5, "eyes/r-eye-height1-incr": 0.5, "eyes/l-eye-height2-incr": 0.7,
-    "eyes/r-eye-height2-incr": 0.7, "eyes/l-eye-height3-incr": 0.5, "eyes/r-eye-height3-incr": 0.5,
-    "eyes/l-eye-bag-decr": 0.4, "eyes/r-eye-bag-decr": 0.4,
-    "nose/nose-flaring-decr": 0.5, "nose/nose-point-up": 0.2, "nose/nose-hump-incr": 0.15,
-    "head/head-fat-incr": 0.3, "head/head-round": 0.3, "chin/chin-cleft-decr": 0.4, "neck/neck-double-incr": 0.3,
-}  # fmt: skip
 PALETTE = replace(
     HER_PALETTE,
     skin=(0.83, 0.62, 0.485), ears=(1.0, 0.93, 0.92), lids=(0.98, 0.92, 0.90),
@@ -69,7 +56,7 @@ SIDE = (
 ELDER = DrawnCharacter(
     name="noor",
     summary="an old woman with silver hair in a bun, drawn as for an animated film",
-    targets=TARGETS,
+    targets=person_targets("noor"),
     proportions=Proportions(
         eye_gain=0.72, eye_reach=34.0, nose_gain=-0.30, lips_thinner=0.26, lips_back=2.8, jaw_taper=0.10, chin_up=10.0,
         chin_forward=3.0, upper_cheek=4.0, lower_cheek=4.4, corners_up=4.4, middle_down=0.4, skull_gain=0.08,

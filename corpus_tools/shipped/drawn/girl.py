@@ -5,23 +5,8 @@ from dataclasses import replace
 from corpus_tools.shipped.drawn.character import Brow, Collar, DrawnCharacter, Hairstyle, Lock, Proportions
 from corpus_tools.shipped.drawn.woman import PALETTE as HER_PALETTE
 from corpus_tools.shipped.head.eyes import EyeStyle
+from corpus_tools.shipped.head.proportions import person_targets
 
-TARGETS = {
-    "macrodetails/african-female-child": 0.50, "macrodetails/caucasian-female-child": 0.30,
-    "macrodetails/african-female-young": 0.20,
-    "macrodetails/universal-female-child-averagemuscle-averageweight": 0.80,
-    "macrodetails/universal-female-young-averagemuscle-averageweight": 0.20,
-    "mouth/mouth-angles-up": 0.45, "mouth/mouth-cupidsbow-decr": 0.55, "mouth/mouth-laugh-lines-out": 0.4,
-    "mouth/mouth-upperlip-height-decr": 0.5, "mouth/mouth-lowerlip-height-decr": 0.35,
-    "mouth/mouth-scale-horiz-incr": 0.40, "mouth/mouth-upperlip-volume-decr": 0.4,
-    "mouth/mouth-upperlip-middle-up": 0.2,
-    "eyes/l-eye-height1-incr": 0.5, "eyes/r-eye-height1-incr": 0.5, "eyes/l-eye-height2-incr": 0.9,
-    "eyes/r-eye-height2-incr": 0.9, "eyes/l-eye-height3-incr": 0.7, "eyes/r-eye-height3-incr": 0.7,
-    "eyes/l-eye-bag-decr": 0.9, "eyes/r-eye-bag-decr": 0.9,
-    "nose/nose-hump-decr": 0.6, "nose/nose-point-up": 0.55, "nose/nose-flaring-decr": 0.7,
-    "nose/nose-nostrils-width-decr": 0.3, "nose/nose-point-width-incr": 0.5, "nose/nose-width1-incr": 0.2,
-    "cheek/l-cheek-volume-incr": 0.4, "cheek/r-cheek-volume-incr": 0.4, "chin/chin-cleft-decr": 0.5,
-}  # fmt: skip
 PALETTE = replace(
     HER_PALETTE,
     skin=(0.47, 0.30, 0.215), ears=(1.0, 0.95, 0.93), lids=(1.0, 0.95, 0.94),
@@ -69,7 +54,7 @@ SIDE = (
 GIRL = DrawnCharacter(
     name="zuri",
     summary="a girl with two puffs of curls, drawn as for an animated film",
-    targets=TARGETS,
+    targets=person_targets("zuri"),
     proportions=Proportions(
         eye_gain=1.00, eye_reach=36.0, nose_gain=-0.44, lips_thinner=0.40, lips_back=4.2, jaw_taper=0.20, chin_up=16.0,
         chin_forward=2.0, upper_cheek=3.4, lower_cheek=4.2, corners_up=4.2, middle_down=0.0, skull_gain=0.12,

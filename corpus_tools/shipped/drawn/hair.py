@@ -9,9 +9,11 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
 
 from corpus_tools.shipped.drawn.character import CharacterColours, Curls, Hairstyle, Lock
-from corpus_tools.shipped.drawn.fields import arc_length, hair_tiles, in_tile, profile, smooth_rows, wind_outward
-from corpus_tools.shipped.head.mesh import HeadPart, MaterialSpan, grid_triangles, triangulate
+from corpus_tools.shipped.drawn.fields import arc_length, profile, smooth_rows, wind_outward
+from corpus_tools.shipped.drawn.tiles import hair_tiles, in_tile
+from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
 from corpus_tools.shipped.head.skin import HeadSkin, vertex_normals
+from corpus_tools.shipped.head.subdivision import grid_triangles, triangulate
 from tts2face.models.lit_hair import swing_shapes
 from tts2face.numeric.arrays import smoothstep, unit_vectors
 
@@ -23,6 +25,31 @@ MIDDLE = np.array([0.0, 30.0, -58.0])
 ACROSS, UP, AHEAD, BEHIND, DOWN = 80.0, 92.0, 100.0, 96.0, 118.0
 LOWEST_DEG = 60.0  # elevation of the lowest tips, below the middle
 DEPTH = (AHEAD + BEHIND) / 2
+DROP_BULGE, DROP_TAPER = 0.05, 0.10  # of its breadth: halfway down the drop, and towards the lowest tips
+# No hair grows on the ears, an ellipsoid about |x|, y, z with half sizes in mm, nor below the nape.
+EAR_MM, EAR_HALF_MM = (78, -8, -66), (24, 30, 16)
+EAR_MARGIN, EAR_DEG = 1.02, 30  # sizes of the ear at which hair begins, and degrees of height for one more
+NAPE_Y, BELOW_NAPE_DEG = -75, -6.0  # mm, and the height over the hairline there
+# Skin that hair stays outside of: above the neck's bottom and without the inner mouth, mm.
+NECK_Y = -120
+MOUTH_TOP_Y, MOUTH_HALF_X, MOUTH_Z = -45, 25, (-5, 20)
+N_NEAR_SKIN, NEAR_SKIN_MM = 6, 45  # vertices about a point of hair, and the distance from which there is no skin
+# The shell: degrees over the hairline in which it rises to two thirds, mm in a degree and most degrees of its sinking.
+SHELL_RISE_DEG, SHELL_SINK_MM, SHELL_SINK_DEG = 5.0, 0.8, 3.0
+SMOOTH_RINGS = 1.2  # rings over which the middle line of a lock is smoothed
+LENS_EXPONENT, BALL_SWELL, RIM_EXPONENT = 2.2, 0.5, 0.6  # of a lock's section, of a ball's, and of its shade
+RIDGE_HEIGHT = 0.10  # of the thickness
+LEAST_HALF_MM, LEAST_THICK_MM = 0.15, 0.1
+# Shares of half width and thickness along a lock, from root to tip, and exponents by which they run out.
+WIDTHS_FROM_ROOT, TIP_SWELL = ((0.2, 0.9), (0.5, 1)), 0.35
+THICKNESSES = ((0, 0.45), (0.2, 0.9), (0.55, 1), (1, 0.9))
+POINTED, BLUNTER, THICK_END = (2.0, 0.80), (1.0, -0.3), (2.4, 0.6)
+TIP_EXPONENT = 1.6  # of the way along a lock, by which it takes the colour of the tip
+FADED_SKIN = 0.62  # of the skin's brightness between cropped hair
+# Curls: elevation of the crown in degrees; distance, depth and half size of bumps in widths of a curl; rise at edges.
+CROWN_DEG = 89.0
+BUMP_APART, BUMP_DEPTH, BUMP_HALF, EDGE_RISE = 0.8, 0.9, 0.55, 1.5
+FULL_CURL_MM = 12  # distance from the middle line from which curls have their whole height
 N_ALONG, N_TOP, N_UNDER = 36, 11, 4
 CURLED = 56, 29, 19  # the same of locks with curls
 CURL_MM = 9.0  # width of a curl
@@ -58,7 +85,7 @@ def hair_piece(skin: HeadSkin, style: Hairstyle, palette: CharacterColours) -> H
     for number, (tube, tile) in enumerate(zip(tubes, hair_tiles(len(tubes)), strict=True)):
         colour = _colours(tube, palette)
         if style.fade and number == 0:
-            own = np.array(palette.skin) * 0.62
+            own = np.array(palette.skin) * FADED_SKIN
             colour = own + (colour - own) * scalp.fade()[:, None]
         points.append(tube.points)
         faces.append(tube.triangles + count)
@@ -90,9 +117,9 @@ def other_palettes(palette: CharacterColours) -> tuple[CharacterColours, ...]:
     Between its pictures in these, hair is drawn in any colour.
     """
     own = float(np.mean(palette.hair))
-    others = [one for one, is_far in ((BLACK, own > BLACK_TO), (LIGHT, own < LIGHT_FROM)) if is_far]
+    others = [item for item, is_far in ((BLACK, own > BLACK_TO), (LIGHT, own < LIGHT_FROM)) if is_far]
     to_tip = np.clip(np.divide(palette.hair_tip, palette.hair), 1.0, MOST_TO_TIP)
-    return tuple(replace(palette, hair=one, hair_tip=tuple((np.array(one) * to_tip).tolist())) for one in others)
+    return tuple(replace(palette, hair=other, hair_tip=tuple((np.array(other) * to_tip).tolist())) for other in others)
 
 
 def hair_cover(skin: HeadSkin, style: Hairstyle) -> Floats:
@@ -110,7 +137,7 @@ def on_volume(azimuth: float, elevation: float, lift: float) -> Floats:
         normal = place / half**2
     else:
         down = -elevation / LOWEST_DEG
-        bulge = 1 + 0.05 * np.sin(down * np.pi) - 0.10 * down**2
+        bulge = 1 + DROP_BULGE * np.sin(down * np.pi) - DROP_TAPER * down**2
         place = np.array([half[0] * bulge * np.sin(turn), -DOWN * down, half[2] * bulge * np.cos(turn)])
         normal = place / half**2 * [1, 0, 1]
     return np.asarray(MIDDLE + place + lift * normal / np.linalg.norm(normal))
@@ -122,9 +149,11 @@ def height_over_hairline(points: Floats, style: Hairstyle) -> Floats:
     azimuth = np.degrees(np.arctan2(points[:, 0], points[:, 2] - MIDDLE[2]))
     elevation = np.degrees(np.arctan2(off[:, 1], np.hypot(off[:, 0], off[:, 2])))
     mirrored = np.column_stack([np.abs(points[:, 0]), points[:, 1:]])
-    off_ear = np.linalg.norm((mirrored - [78, -8, -66]) / [24, 30, 16], axis=1)
-    height: Floats = np.minimum(elevation - np.interp(azimuth, *np.array(style.hairline).T), (off_ear - 1.02) * 30)
-    return np.where(points[:, 1] < -75, -6.0, height)
+    off_ear = np.linalg.norm((mirrored - EAR_MM) / EAR_HALF_MM, axis=1)
+    height: Floats = np.minimum(
+        elevation - np.interp(azimuth, *np.array(style.hairline).T), (off_ear - EAR_MARGIN) * EAR_DEG
+    )
+    return np.where(points[:, 1] < NAPE_Y, BELOW_NAPE_DEG, height)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -159,8 +188,8 @@ class Scalp:
         self._height = height_over_hairline(skin.vertices, style)
         self._normals = vertex_normals(skin.vertices, skin.quads, skin.base)
         x, y, z = skin.vertices.T
-        in_mouth = (y < -45) & (np.abs(x) < 25) & (z > -5) & (z < 20)
-        self._rows = np.flatnonzero((y > -120) & ~in_mouth)
+        in_mouth = (y < MOUTH_TOP_Y) & (np.abs(x) < MOUTH_HALF_X) & (z > MOUTH_Z[0]) & (z < MOUTH_Z[1])
+        self._rows = np.flatnonzero((y > NECK_Y) & ~in_mouth)
         self._places = cKDTree(skin.vertices[self._rows])
         triangles = triangulate(skin.quads)
         self._used, packed = np.unique(triangles[self._height[triangles].max(axis=1) > -1], return_inverse=True)
@@ -168,11 +197,11 @@ class Scalp:
 
     def keep_outside(self, points: Floats, clearance: float) -> Floats:
         """Points (N, 3) at least `clearance` mm above the skin near them."""
-        distance, near = (np.asarray(found) for found in self._places.query(points, 6))
+        distance, near = (np.asarray(found) for found in self._places.query(points, N_NEAR_SKIN))
         places, normals = self._skin.vertices[self._rows[near]], self._normals[self._rows[near]]
         heights = np.einsum("pkd,pkd->pk", points[:, None] - places, normals)
         lowest, row = heights.argmin(axis=1), np.arange(len(points))
-        lack = np.maximum(clearance - heights[row, lowest], 0) * (distance[:, 0] < 45)
+        lack = np.maximum(clearance - heights[row, lowest], 0) * (distance[:, 0] < NEAR_SKIN_MM)
         moved: Floats = points + lack[:, None] * normals[row, lowest]
         return moved
 
@@ -186,7 +215,8 @@ class Scalp:
     def shell(self) -> Tube:
         """The cap under the locks; it sinks through the skin along a level line, so that its edge is smooth."""
         height, lift = self._height[self._used], self._style.shell_lift
-        up = np.where(height > 0, lift * (1 - np.exp(-np.maximum(height, 0) / 5.0)), 0.8 * np.maximum(height, -3.0))
+        risen = lift * (1 - np.exp(-np.maximum(height, 0) / SHELL_RISE_DEG))
+        up = np.where(height > 0, risen, SHELL_SINK_MM * np.maximum(height, -SHELL_SINK_DEG))
         points = self._skin.vertices[self._used] + up[:, None] * self._normals[self._used]
         off = points - MIDDLE
         from_top = np.arccos(unit_vectors(off)[:, 1]) / np.pi  # places as on a map about the crown
@@ -207,7 +237,7 @@ def lock_tube(lock: Lock, scalp: Scalp) -> Tube:
     n_along, n_top, n_under = CURLED if lock.curls else (N_ALONG, N_TOP, N_UNDER)
     length = arc_length(known)
     at = 1 - (1 - np.linspace(0, 1, n_along)) ** TIP_DENSITY
-    middle = smooth_rows(scalp.keep_outside(CubicSpline(length / length[-1], known)(at), lock.clearance), 1.2)
+    middle = smooth_rows(scalp.keep_outside(CubicSpline(length / length[-1], known)(at), lock.clearance), SMOOTH_RINGS)
     along = unit_vectors(np.gradient(middle, axis=0))
     axis = np.column_stack([np.zeros(n_along), np.clip(middle[:, 1], -200, MIDDLE[1]), np.full(n_along, MIDDLE[2])])
     out = unit_vectors((middle - axis) / np.array([ACROSS, UP, DEPTH]) ** 2)
@@ -215,14 +245,14 @@ def lock_tube(lock: Lock, scalp: Scalp) -> Tube:
     side = np.cross(along, out)
     half, thick = _sizes(lock, at)
     place = np.sin(np.linspace(-1, 1, n_top) * np.pi / 2)
-    swell = 0.5 if lock.is_ball else 1.0
-    lens = (1 - np.abs(place) ** 2.2) ** swell
-    ridge = 1 + 0.10 * np.cos(np.pi * (lock.ridges + 0.5) * place) * lens
+    swell = BALL_SWELL if lock.is_ball else 1.0
+    lens = (1 - np.abs(place) ** LENS_EXPONENT) ** swell
+    ridge = 1 + RIDGE_HEIGHT * np.cos(np.pi * (lock.ridges + 0.5) * place) * lens
     under = np.linspace(1, -1, n_under + 2)[1:-1]
     across = half[:, None] * np.concatenate([place, under])
     up = thick[:, None] * np.concatenate([lens * ridge, -lock.hollow * (1 - under**2) ** swell])
     rings = middle[:, None] + across[..., None] * side[:, None] + up[..., None] * out[:, None]
-    shade = np.concatenate([RIM_SHADE + (1 - RIM_SHADE) * lens**0.6, np.full(n_under, UNDER_SHADE)])
+    shade = np.concatenate([RIM_SHADE + (1 - RIM_SHADE) * lens**RIM_EXPONENT, np.full(n_under, UNDER_SHADE)])
     closed = np.append(np.arange(n_top + n_under), 0)  # the texture is cut open along the first column
     if lock.curls:
         rings = _curled(rings, middle, lock.curls)
@@ -246,7 +276,7 @@ def curled_tube(curls: Curls, scalp: "Scalp") -> Tube:
     """Curls all over the head: a dome from the crown to the edge of the hair, with a round bump for each curl."""
     turn = np.linspace(-180, 180, N_ROUND + 1)
     down = np.linspace(0, 1, N_DOWN)
-    elevation = 89.0 + (scalp.hairline(turn) - 89.0) * down[:, None]
+    elevation = CROWN_DEG + (scalp.hairline(turn) - CROWN_DEG) * down[:, None]
     volume = np.array([[on_volume(a, e, 0.0) for a, e in zip(turn, row, strict=True)] for row in elevation])
     out = unit_vectors(volume - MIDDLE)
     raised = ((scalp.keep_outside(volume.reshape(-1, 3), 0.0).reshape(out.shape) - volume) * out).sum(axis=2)
@@ -257,9 +287,9 @@ def curled_tube(curls: Curls, scalp: "Scalp") -> Tube:
     dome = volume + (raised[:, [*range(N_ROUND), 0]] + lift)[..., None] * out
     points, triangles = dome.reshape(-1, 3), grid_triangles(N_DOWN, N_ROUND + 1)
     triangles = wind_outward(points, triangles)
-    near, _ = cKDTree(_spread(points, 0.8 * curls.width)).query(points)
-    bump = np.sqrt(np.clip(1 - 0.9 * (np.asarray(near) / (0.55 * curls.width)) ** 2, 0, 1))
-    rise = (curls.height * (bump - 0.5)).reshape(lift.shape) * np.minimum(1.5 * edge, 1)
+    near, _ = cKDTree(_spread(points, BUMP_APART * curls.width)).query(points)
+    bump = np.sqrt(np.clip(1 - BUMP_DEPTH * (np.asarray(near) / (BUMP_HALF * curls.width)) ** 2, 0, 1))
+    rise = (curls.height * (bump - 0.5)).reshape(lift.shape) * np.minimum(EDGE_RISE * edge, 1)
     dome = dome + rise[..., None] * out
     around = np.tile((turn + 180) / 360, N_DOWN)
     return Tube(
@@ -295,20 +325,23 @@ def _curled(rings: Floats, middle: Floats, height: float) -> Floats:
     outline = arc_length(np.column_stack([arc_length(middle), far.mean(axis=1)[:, 0], np.zeros(len(middle))]))
     rows = np.pi * outline / curl
     bumps = np.cos(np.pi * n_around * across) * np.cos(rows)[:, None]
-    return np.asarray(rings + height * bumps[..., None] * off / np.maximum(far, 1e-6) * np.minimum(far / 12, 1))
+    return np.asarray(
+        rings + height * bumps[..., None] * off / np.maximum(far, 1e-6) * np.minimum(far / FULL_CURL_MM, 1)
+    )
 
 
 def _sizes(lock: Lock, at: Floats) -> tuple[Floats, Floats]:
     """Half width and thickness (n,) of a lock along it, mm; both run out at the tip."""
     if lock.is_ball:
         ball = np.sqrt(np.clip(1 - (2 * at - 1) ** 2, 0, 1))
-        return np.maximum(lock.half_width * ball, 0.15), np.maximum(lock.thickness * ball, 0.1)
+        return np.maximum(lock.half_width * ball, LEAST_HALF_MM), np.maximum(lock.thickness * ball, LEAST_THICK_MM)
     end = np.clip((at - 0.5) / 0.5, 0, 1)
     blunt = lock.bluntness
-    widths = profile(((0, lock.root), (0.2, 0.9), (0.5, 1), (1, 1 + 0.35 * (lock.tip - 1))), at)
-    half = lock.half_width * widths * (1 - end ** (2.0 + blunt)) ** (0.80 - 0.3 * blunt)
-    thick = lock.thickness * profile(((0, 0.45), (0.2, 0.9), (0.55, 1), (1, 0.9)), at) * (1 - end**2.4) ** 0.6
-    return np.maximum(half, 0.15), np.maximum(thick, 0.1)
+    widths = profile(((0, lock.root), *WIDTHS_FROM_ROOT, (1, 1 + TIP_SWELL * (lock.tip - 1))), at)
+    runs_out, power = (pointed + more * blunt for pointed, more in zip(POINTED, BLUNTER, strict=True))
+    half = lock.half_width * widths * (1 - end**runs_out) ** power
+    thick = lock.thickness * profile(THICKNESSES, at) * (1 - end ** THICK_END[0]) ** THICK_END[1]
+    return np.maximum(half, LEAST_HALF_MM), np.maximum(thick, LEAST_THICK_MM)
 
 
 def _capped(rings: Floats) -> tuple[Floats, Ints]:
@@ -327,5 +360,5 @@ def _colours(tube: Tube, palette: CharacterColours) -> Floats:
     """(N, 3) colours of a lock: lighter tips, slightly darker rims; highlights are left to the light."""
     own, tip = np.array(palette.hair), np.array(palette.hair_tip)
     shade = 1 - PAINTED_SHADE * (1 - tube.shade[:, None])
-    mixed: Floats = (own + TIP_SHARE * (tip - own) * tube.along[:, None] ** 1.6) * shade
+    mixed: Floats = (own + TIP_SHARE * (tip - own) * tube.along[:, None] ** TIP_EXPONENT) * shade
     return mixed

@@ -6,20 +6,8 @@ from corpus_tools.shipped.drawn.character import Brow, Collar, DrawnCharacter, H
 from corpus_tools.shipped.drawn.woman import PALETTE as HER_PALETTE
 from corpus_tools.shipped.drawn.woman import WOMAN
 from corpus_tools.shipped.head.eyes import EyeStyle
+from corpus_tools.shipped.head.proportions import person_targets
 
-TARGETS = {
-    "macrodetails/caucasian-male-young": 0.22, "macrodetails/african-male-young": 0.30,
-    "macrodetails/asian-male-young": 0.10, "macrodetails/caucasian-male-child": 0.38,
-    "macrodetails/universal-male-young-averagemuscle-averageweight": 0.62,
-    "macrodetails/universal-male-child-averagemuscle-averageweight": 0.38,
-    "mouth/mouth-angles-up": 0.4, "mouth/mouth-scale-horiz-incr": 0.45, "mouth/mouth-upperlip-middle-up": 0.3,
-    "mouth/mouth-cupidsbow-decr": 0.2, "mouth/mouth-laugh-lines-out": 0.4,
-    "eyes/l-eye-height1-incr": 0.5, "eyes/r-eye-height1-incr": 0.5, "eyes/l-eye-height2-incr": 0.75,
-    "eyes/r-eye-height2-incr": 0.75, "eyes/l-eye-height3-incr": 0.6, "eyes/r-eye-height3-incr": 0.6,
-    "eyes/l-eye-bag-decr": 0.8, "eyes/r-eye-bag-decr": 0.8,
-    "nose/nose-hump-decr": 0.5, "nose/nose-point-up": 0.35, "nose/nose-flaring-decr": 0.7,
-    "nose/nose-nostrils-width-decr": 0.4, "chin/chin-cleft-decr": 0.5,
-}  # fmt: skip
 PALETTE = replace(
     HER_PALETTE,
     skin=(0.60, 0.415, 0.32), ears=(1.0, 0.95, 0.93), lids=(1.0, 0.95, 0.94),
@@ -96,7 +84,7 @@ SIDE = (
 MAN = DrawnCharacter(
     name="ben",
     summary="a young man with a dark quiff, drawn as for an animated film",
-    targets=TARGETS,
+    targets=person_targets("ben"),
     proportions=Proportions(
         eye_gain=0.90, eye_reach=34.0, nose_gain=-0.28, lips_thinner=0.26, lips_back=2.4, jaw_taper=0.15, chin_up=11.0,
         chin_forward=4.0, upper_cheek=2.0, lower_cheek=0.8, corners_up=4.2, middle_down=0.4, skull_gain=0.05,

@@ -11,10 +11,12 @@ from corpus_tools.dense.texels import Texels, find_texels
 from corpus_tools.shipped.drawn.character import Brow, CharacterColours, Colour, DrawnCharacter
 from corpus_tools.shipped.drawn.fields import profile, smooth_line
 from corpus_tools.shipped.head.eyes import TEXTURE_SIDE, EyeStyle
-from corpus_tools.shipped.head.mesh import gaussian_bump, layout_coordinates, triangulate
-from corpus_tools.shipped.head.shapes import LidEdge
+from corpus_tools.shipped.head.layout import layout_coordinates
+from corpus_tools.shipped.head.lid_edges import LidEdge
+from corpus_tools.shipped.head.noise import gaussian_bump
 from corpus_tools.shipped.head.skin import HeadSkin
 from corpus_tools.shipped.head.source import SourceMesh
+from corpus_tools.shipped.head.subdivision import triangulate
 from corpus_tools.shipped.head.texture import INNER_LIP_Z, fill_gaps, in_mouth, line_distance, sample_mask
 from tts2face.numeric.arrays import smoothstep
 from tts2face.picture.baked.eyes import EDGE_RAD

@@ -13,58 +13,10 @@ from corpus_tools.shipped.drawn.woman import HAIRLINE, LOCKS
 from corpus_tools.shipped.drawn.woman import PALETTE as DRAWN_WOMAN
 from corpus_tools.shipped.drawn.worn import comb, grow, lay_closer
 from corpus_tools.shipped.head.eyes import EyeStyle
+from corpus_tools.shipped.head.proportions import person_targets
 
 DRAWN = 0.5  # of the smoothing and changes of drawn faces: with less, MakeHuman's planes are seen at nose and cheeks
 SEAMS = 2.6
-HER_TARGETS = {
-    "macrodetails/caucasian-female-young": 1.0, "macrodetails/universal-female-young-averagemuscle-averageweight": 1.0,
-    "head/head-oval": 0.825, "head/head-invertedtriangular": 0.5, "chin/chin-triangle": 0.25,
-    "chin/chin-width-decr": 0.98, "chin/chin-height-decr": 0.728, "chin/chin-prominent-decr": 0.1,
-    "cheek/l-cheek-bones-incr": 0.5, "cheek/r-cheek-bones-incr": 0.5, "cheek/l-cheek-volume-decr": 0.1,
-    "cheek/r-cheek-volume-decr": 0.1, "eyes/l-eye-scale-incr": 0.869, "eyes/r-eye-scale-incr": 0.869,
-    "eyes/l-eye-corner2-down": 0.15, "eyes/r-eye-corner2-down": 0.15, "mouth/mouth-angles-up": 0.45,
-    "mouth/mouth-cupidsbow-incr": 0.6, "mouth/mouth-lowerlip-volume-incr": 0.15,
-    "mouth/mouth-upperlip-volume-incr": 0.35, "mouth/mouth-scale-horiz-incr": 0.25, "neck/neck-scale-horiz-decr": 0.6,
-    "eyebrows/eyebrows-trans-up": 0.4, "eyebrows/eyebrows-angle-up": 0.293, "nose/nose-scale-horiz-decr": 0.765,
-    "nose/nose-point-width-decr": 0.6, "nose/nose-width3-decr": 0.3, "head/head-scale-horiz-decr": 0.42,
-    "head/head-scale-vert-incr": 0.087, "chin/chin-bones-decr": 0.92, "chin/chin-jaw-drop-incr": 0.3,
-    "cheek/l-cheek-inner-decr": 0.242, "cheek/r-cheek-inner-decr": 0.242, "cheek/l-cheek-trans-up": 0.396,
-    "cheek/r-cheek-trans-up": 0.396, "mouth/mouth-scale-vert-incr": 0.041, "mouth/mouth-trans-down": 0.275,
-    "mouth/mouth-upperlip-height-decr": 0.075, "mouth/mouth-lowerlip-height-decr": 0.165,
-    "eyes/l-eye-height1-incr": 0.15, "eyes/r-eye-height1-incr": 0.15, "eyes/l-eye-height2-incr": 0.256,
-    "eyes/r-eye-height2-incr": 0.256, "eyes/l-eye-height3-incr": 0.25, "eyes/r-eye-height3-incr": 0.25,
-    "eyes/l-eye-corner1-down": 0.3, "eyes/r-eye-corner1-down": 0.3, "eyes/l-eye-trans-down": 0.35,
-    "eyes/r-eye-trans-down": 0.35, "eyes/l-eye-trans-out": 0.058, "eyes/r-eye-trans-out": 0.058,
-    "eyes/l-eye-push1-in": 0.15, "eyes/r-eye-push1-in": 0.15, "nose/nose-trans-down": 0.077,
-    "nose/nose-scale-vert-decr": 0.116, "nose/nose-base-down": 0.119, "forehead/forehead-temple-incr": 0.325,
-    "head/head-fat-decr": 0.45, "nose/nose-point-up": 0.3, "forehead/forehead-scale-vert-decr": 0.2,
-    "mouth/mouth-lowerlip-width-decr": 0.3, "nose/nose-width2-decr": 0.2, "nose/nose-volume-decr": 0.15,
-    "mouth/mouth-philtrum-volume-incr": 0.15,
-}  # fmt: skip
-HIS_TARGETS = {
-    "macrodetails/caucasian-male-young": 0.45, "macrodetails/asian-male-young": 0.25,
-    "macrodetails/african-male-young": 0.30,
-    "head/head-oval": 0.067, "head/head-rectangular": 0.075, "head/head-invertedtriangular": 0.45,
-
-    "macrodetails/universal-male-young-averagemuscle-averageweight": 1.0,
-    "mouth/mouth-angles-up": 0.4, "eyebrows/eyebrows-trans-up": 1.2, "eyebrows/eyebrows-angle-up": 0.5,
-    "head/head-fat-decr": 0.5, "head/head-scale-horiz-decr": 0.375, "head/head-scale-vert-incr": 0.339,
-    "chin/chin-bones-decr": 0.795, "chin/chin-height-decr": 0.446, "chin/chin-jaw-drop-incr": 0.3,
-    "chin/chin-width-incr": 0.2, "cheek/l-cheek-bones-decr": 0.038, "cheek/r-cheek-bones-decr": 0.038,
-    "cheek/l-cheek-volume-incr": 0.1, "cheek/r-cheek-volume-incr": 0.1, "cheek/l-cheek-trans-down": 0.25,
-    "cheek/r-cheek-trans-down": 0.25, "mouth/mouth-scale-vert-decr": 0.348, "mouth/mouth-trans-up": 0.041,
-    "mouth/mouth-upperlip-height-incr": 0.057, "mouth/mouth-lowerlip-height-decr": 0.25,
-    "eyes/l-eye-scale-incr": 0.499, "eyes/r-eye-scale-incr": 0.499, "eyes/l-eye-height2-incr": 0.6,
-    "eyes/r-eye-height2-incr": 0.6, "eyes/l-eye-height3-incr": 0.6, "eyes/r-eye-height3-incr": 0.6,
-    "eyes/l-eye-corner2-down": 0.35, "eyes/r-eye-corner2-down": 0.35, "eyes/l-eye-trans-down": 0.35,
-    "eyes/r-eye-trans-down": 0.35, "eyes/l-eye-trans-out": 0.165, "eyes/r-eye-trans-out": 0.165,
-    "eyes/l-eye-push1-in": 0.149, "eyes/r-eye-push1-in": 0.149, "eyes/l-eye-push2-out": 0.15,
-    "eyes/r-eye-push2-out": 0.15, "eyes/l-eye-eyefold-up": 0.174, "eyes/r-eye-eyefold-up": 0.174,
-    "nose/nose-trans-up": 0.3, "nose/nose-scale-vert-decr": 0.15, "nose/nose-scale-horiz-decr": 0.3,
-    "nose/nose-width3-incr": 0.242, "nose/nose-base-down": 0.1, "forehead/forehead-scale-vert-decr": 0.9,
-    "forehead/forehead-temple-incr": 0.5, "neck/neck-scale-horiz-decr": 0.3, "nose/nose-point-width-decr": 0.3,
-    "nose/nose-flaring-decr": 0.5, "chin/chin-prominent-incr": 0.3, "mouth/mouth-lowerlip-volume-incr": 0.15,
-}  # fmt: skip
 HER_PALETTE = replace(
     DRAWN_WOMAN,
     skin=(0.80, 0.60, 0.50), ears=(1.0, 0.94, 0.93), lids=(0.97, 0.92, 0.90),
@@ -169,7 +121,7 @@ HIS_HAIR = Hairstyle(
 REALISTIC_WOMAN = DrawnCharacter(
     name="mara",
     summary="a woman of about thirty with brown hair to her shoulders, in film light",
-    targets=HER_TARGETS,
+    targets=person_targets("mara"),
     proportions=Proportions(drawn=DRAWN),
     palette=HER_PALETTE,
     eyes=EyeStyle(iris=0.42, pupil=0.155, bulge=0.02),
@@ -190,7 +142,7 @@ REALISTIC_WOMAN = DrawnCharacter(
 REALISTIC_MAN = DrawnCharacter(
     name="tomas",
     summary="a man of about thirty-five with short brown hair, in film light",
-    targets=HIS_TARGETS,
+    targets=person_targets("tomas"),
     proportions=Proportions(drawn=DRAWN),
     palette=HIS_PALETTE,
     eyes=EyeStyle(iris=0.415, pupil=0.155, bulge=0.02),

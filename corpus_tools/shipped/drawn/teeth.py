@@ -7,10 +7,15 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from corpus_tools.shipped.drawn.character import DrawnCharacter
+from corpus_tools.shipped.head.cage import Cage
 from corpus_tools.shipped.head.head import COVERED_POSES, ReferenceHead, cover_in_pose
-from corpus_tools.shipped.head.lips import add_retreat, lip_front
-from corpus_tools.shipped.head.mesh import Cage, HeadPart, MaterialSpan, grid_triangles
-from corpus_tools.shipped.head.mouth import (
+from corpus_tools.shipped.head.jaw import Jaw
+from corpus_tools.shipped.head.lips import lip_front
+from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
+from corpus_tools.shipped.head.retreat import add_retreat
+from corpus_tools.shipped.head.skin import HeadSkin
+from corpus_tools.shipped.head.subdivision import grid_triangles
+from corpus_tools.shipped.head.teeth import (
     COVER_MM,
     LOWER,
     UPPER,
@@ -21,8 +26,6 @@ from corpus_tools.shipped.head.mouth import (
     gum_piece,
     keep_behind,
 )
-from corpus_tools.shipped.head.shapes import Jaw
-from corpus_tools.shipped.head.skin import HeadSkin
 from tts2face.numeric.arrays import smoothstep
 
 Floats = NDArray[np.float64]

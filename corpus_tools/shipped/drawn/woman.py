@@ -13,24 +13,8 @@ from corpus_tools.shipped.drawn.character import (
     Proportions,
 )
 from corpus_tools.shipped.head.eyes import EyeStyle
+from corpus_tools.shipped.head.proportions import person_targets
 
-TARGETS = {
-    "macrodetails/caucasian-female-young": 0.34, "macrodetails/african-female-young": 0.22,
-    "macrodetails/caucasian-female-child": 0.44,
-    "macrodetails/universal-female-young-averagemuscle-averageweight": 0.56,
-    "macrodetails/universal-female-child-averagemuscle-averageweight": 0.44,
-    "mouth/mouth-angles-up": 0.45, "mouth/mouth-cupidsbow-decr": 0.55, "mouth/mouth-cupidsbow-width-incr": 0.3,
-    "mouth/mouth-laugh-lines-out": 0.4, "mouth/mouth-upperlip-volume-incr": 0.1,
-    "mouth/mouth-upperlip-height-decr": 0.25, "mouth/mouth-upperlip-middle-up": 0.6,
-    "mouth/mouth-lowerlip-height-decr": 0.25, "mouth/mouth-scale-horiz-incr": 0.40,
-    "eyes/l-eye-height1-incr": 0.60, "eyes/r-eye-height1-incr": 0.60, "eyes/l-eye-height2-incr": 0.95,
-    "eyes/r-eye-height2-incr": 0.95, "eyes/l-eye-height3-incr": 0.75, "eyes/r-eye-height3-incr": 0.75,
-    "eyes/l-eye-bag-decr": 0.8, "eyes/r-eye-bag-decr": 0.8,
-    "nose/nose-hump-decr": 0.6, "nose/nose-point-up": 0.55, "nose/nose-width1-decr": 0.4,
-    "nose/nose-nostrils-width-decr": 0.5, "nose/nose-flaring-decr": 0.7, "nose/nose-scale-horiz-decr": 0.1,
-    "nose/nose-point-width-incr": 0.5,
-    "cheek/l-cheek-volume-incr": 0.25, "cheek/r-cheek-volume-incr": 0.25, "chin/chin-cleft-decr": 0.4,
-}  # fmt: skip
 # Rosy rather than yellow skin, as the warm key light adds the yellow. The hair is two values darker than the skin, as
 # auburn has its value and hue; the green of the eyes is the hair's complement, and an echo of the wall.
 PALETTE = CharacterColours(
@@ -149,7 +133,7 @@ HAIRLINE = (  # on her right it lies under the fringe
 WOMAN = DrawnCharacter(
     name="ada",
     summary="a young woman with a chestnut bob, drawn as for an animated film",
-    targets=TARGETS,
+    targets=person_targets("ada"),
     proportions=Proportions(
         eye_gain=0.92, nose_gain=-0.46, lips_thinner=0.36, lips_back=2.6, jaw_taper=0.24, chin_up=15.5,
         chin_forward=2.0, upper_cheek=3.2, lower_cheek=2.8, corners_up=4.2, middle_down=0.0, skull_gain=0.10,

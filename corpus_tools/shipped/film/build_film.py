@@ -1,4 +1,4 @@
-"""Film light of drawn characters, baked into their files. Needs bpy."""
+"""Film light of drawn characters, baked into their files, which needs bpy."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -7,13 +7,14 @@ from pathlib import Path
 from corpus_tools.shipped.drawn.build_drawn import drawn_face, face_masks, other_hair, own_hairdo
 from corpus_tools.shipped.drawn.character import DrawnCharacter
 from corpus_tools.shipped.drawn.worn import HAIRCUTS, lit_haircut
-from corpus_tools.shipped.film.bake import HAIRCUT, Effort, bake_poses
+from corpus_tools.shipped.film.bake_poses import HAIRCUT, Effort, bake_poses
 from corpus_tools.shipped.film.fit_light import fit_haircut, fit_light
 from corpus_tools.shipped.film.look import look_of
-from corpus_tools.shipped.film.poses import PoseLight, lit_poses
+from corpus_tools.shipped.film.pose_light import PoseLight
+from corpus_tools.shipped.film.poses import lit_poses
 from corpus_tools.shipped.film.scene import FilmScene
 from corpus_tools.shipped.head.source import SourceMesh
-from corpus_tools.training.calibrate_face import calibrate_face_file
+from corpus_tools.training.calibrate_file import calibrate_face_file
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.face_names import OF_FACE

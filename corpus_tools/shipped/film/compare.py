@@ -72,7 +72,7 @@ def _regions(scene: LitScene, pose: LitPose) -> dict[str, Mask]:
 
 def differences(drawn: Pixels, traced: Pixels, regions: Mapping[str, Mask]) -> dict[str, float]:
     """Mean difference of 255 by region between pictures (S, S, 4), both over grey."""
-    first, second = (over_grey(one).astype(np.float64) for one in (drawn, traced))
+    first, second = (over_grey(item).astype(np.float64) for item in (drawn, traced))
     apart = np.abs(first - second).mean(axis=2)
     return {name: float(apart[mask].mean()) for name, mask in regions.items() if mask.any()}
 

@@ -65,7 +65,7 @@ def fit_to_pictures(face: Face, poses: Sequence[LitPose], pictures: Mapping[str,
     alike = np.zeros((len(light.mouth_responses), 3, len(parts)))
     for name in np.unique(parts):
         own = parts == name
-        alike[:, :, own] = _alike([_among(one, own) for one in mouth])[:, :, None]
+        alike[:, :, own] = _alike([_among(item, own) for item in mouth])[:, :, None]
     near, among = _neighbours(face, drawn.rows), _neighbours(face, light.mouth_rows)
     changes = _changes(skin, near)
     of_skin = _corrected((_responses(light.responses, light.response_sizes), light.limits), rows, skin, changes, near)
@@ -136,16 +136,16 @@ def _shares(scene: LitScene, pose: LitPose, wanted: NDArray[np.bool_]) -> tuple[
     return sparse.csr_matrix((shares.ravel(), corners.ravel(), starts), (len(corners), len(table))), (down, across)
 
 
-def _among(one: Missing, own: NDArray[np.bool_]) -> Missing:
+def _among(missing: Missing, own: NDArray[np.bool_]) -> Missing:
     """What is missing in the pixels of some vertices (N,) of a part."""
-    shares = one.shares[:, own]
+    shares = missing.shares[:, own]
     seen = np.asarray(shares.sum(axis=1)).ravel() > 0
-    return Missing(shares[seen], one.light[seen], one.terms[:, own])
+    return Missing(shares[seen], missing.light[seen], missing.terms[:, own])
 
 
 def _alike(missing: Sequence[Missing]) -> Floats:
     """(T, 3) change of the responses of all vertices of a part; each pose counts by the root of its pixels."""
-    rows = [(one.shares @ one.terms.T, one.light, max(len(one.light), 1) ** -0.5) for one in missing]
+    rows = [(view.shares @ view.terms.T, view.light, max(len(view.light), 1) ** -0.5) for view in missing]
     gram = sum(share * terms.T @ terms for terms, _, share in rows)
     sizes = np.sqrt(np.diag(gram)) + 1e-9
     moments = sum(share * terms.T @ light for terms, light, share in rows)
@@ -173,9 +173,9 @@ def _corrected(
     found, limits = answers
     found[:, :, rows] += changes
     least, most = limits[:, :, rows].astype(np.float64) * LIMIT_STEP
-    for one in missing:
-        shown = np.asarray(one.shares.sum(axis=0)).ravel() > 0
-        change = np.where(shown, np.einsum("tn,tcn->cn", one.terms, found[:, :, rows]), 0.0)
+    for view in missing:
+        shown = np.asarray(view.shares.sum(axis=0)).ravel() > 0
+        change = np.where(shown, np.einsum("tn,tcn->cn", view.terms, found[:, :, rows]), 0.0)
         least, most = np.minimum(least, change), np.maximum(most, change)
     for _ in range(LIMIT_ROUNDS):
         least, most = least @ near.T, most @ near.T
@@ -212,20 +212,20 @@ def _unstriped(values: Floats, near: Any) -> Floats:
 
 def _changes(missing: Sequence[Missing], near: Any) -> Floats:
     """(T, 3, N) changes of responses that add what is missing, smooth over neighbours (N, N)."""
-    sizes = np.sqrt(np.mean([(one.terms**2).mean(axis=1) for one in missing], axis=0)) + 1e-9
-    terms = [(one.terms / sizes[:, None])[:, :, None] for one in missing]
-    back = [one.shares.T.tocsr() for one in missing]
+    sizes = np.sqrt(np.mean([(view.terms**2).mean(axis=1) for view in missing], axis=0)) + 1e-9
+    terms = [(view.terms / sizes[:, None])[:, :, None] for view in missing]
+    back = [view.shares.T.tocsr() for view in missing]
 
     def normal(change: Floats) -> Floats:
         spread = _smoothed(change, near, TONE_ROUNDS)
         total = sum(
-            own * (gather @ (one.shares @ (own * spread).sum(axis=0)))
-            for one, own, gather in zip(missing, terms, back, strict=True)
+            own * (gather @ (view.shares @ (own * spread).sum(axis=0)))
+            for view, own, gather in zip(missing, terms, back, strict=True)
         )
         return RIDGE * change + _smoothed(total, near.T, TONE_ROUNDS)
 
     change = np.zeros((*terms[0].shape[:2], 3))
-    rest = sum(own * (gather @ (one.light @ OPPONENT)) for one, own, gather in zip(missing, terms, back, strict=True))
+    rest = sum(own * (gather @ (view.light @ OPPONENT)) for view, own, gather in zip(missing, terms, back, strict=True))
     rest = _smoothed(rest, near.T, TONE_ROUNDS)
     step, size = rest.copy(), (rest**2).sum(axis=(0, 1))
     for _ in range(ROUNDS):

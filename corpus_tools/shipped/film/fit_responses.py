@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from corpus_tools.shipped.film.poses import PoseLight, mouth_middle
+from corpus_tools.shipped.film.pose_light import PoseLight
+from corpus_tools.shipped.film.seen_triangles import mouth_middle
 from tts2face.face.deformation import build_rig
 from tts2face.models.baked_light import LIMIT_STEP
 from tts2face.models.face import Face

@@ -119,10 +119,6 @@ class Wall:
     f_stop: float = 0.35
 
 
-def _amber(place: Vector, target: Vector, watts: float, colour: Vector, size: float) -> Lamp:
-    return Lamp(place=place, target=target, width=size, height=size, watts=watts, colour=colour)
-
-
 LAMPS = {
     "key": Lamp(
         place=(-3.4, 3.4, 4.9), target=(0, -0.2, 0), width=2.2, height=2.6, watts=460, colour=(1, 0.84, 0.67)
@@ -150,8 +146,10 @@ LAMPS = {
 }  # fmt: skip
 WALL = Wall(
     lamps=(
-        _amber((5.0, 3.2, -6.5), (3.0, 1.2, -9.0), 1000, (1, 0.66, 0.36), 1.5),
-        _amber((-6, 4, -4), (-4, 1, -9), 150, (0.55, 0.75, 1.0), 2.0),
+        Lamp(
+            place=(5.0, 3.2, -6.5), target=(3.0, 1.2, -9.0), width=1.5, height=1.5, watts=1000, colour=(1, 0.66, 0.36)
+        ),
+        Lamp(place=(-6, 4, -4), target=(-4, 1, -9), width=2.0, height=2.0, watts=150, colour=(0.55, 0.75, 1.0)),
     ),
     boxes=(
         Box(low=(1.6, -6, -8.4), high=(4.4, 0.6, -7.6), colour=(0.5, 0.33, 0.24)),

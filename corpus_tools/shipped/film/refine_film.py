@@ -1,4 +1,4 @@
-"""Light of mouths, fitted to pictures of the fitted poses. Needs bpy.
+"""Light of mouths, fitted to pictures of the fitted poses, which needs bpy.
 
 It takes what `corpus_tools.shipped.film.build_film` has written.
 """
@@ -18,7 +18,7 @@ from corpus_tools.shipped.film.measure_film import build_scene
 from corpus_tools.shipped.film.poses import LitPose, lit_poses
 from corpus_tools.shipped.film.scene import FilmScene
 from corpus_tools.shipped.head.source import SourceMesh
-from corpus_tools.training.calibrate_face import calibrate_face_file
+from corpus_tools.training.calibrate_file import calibrate_face_file
 from tts2face.face.deformation import build_rig
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face

@@ -1,4 +1,4 @@
-"""A face in the path tracer: its parts as meshes that take poses, lamps, a wall and cameras. Needs bpy."""
+"""A face in the path tracer, by bpy: its parts as meshes that take poses, lamps, a wall and cameras."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,9 +9,10 @@ import numpy as np
 from mathutils import Matrix, Vector
 from numpy.typing import NDArray
 
-from corpus_tools.shipped.drawn.fields import COLLAR, strand_places
+from corpus_tools.shipped.drawn.tiles import COLLAR, strand_places
 from corpus_tools.shipped.film.look import Lamp, Look
-from corpus_tools.shipped.film.materials import UNIT_MM, Shader, part_materials, rgba
+from corpus_tools.shipped.film.materials import UNIT_MM, part_materials
+from corpus_tools.shipped.film.shader import Shader, rgba
 from tts2face.face.deformation import build_rig, eye_rotations, head_transform
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import decode_srgb, smoothstep

@@ -24,13 +24,7 @@ IRIS_SIDES = np.array([(0, 0), (1, 0), (0, 1), (-1, 0), (0, -1)], np.float64)
 
 
 def read_places(path: Path = TABLE) -> dict[int, Floats]:
-    """Position (3,) of each landmark on the skin of the source's base mesh, in its units.
-
-    Raises
-    ------
-    DataError
-        The table is missing or damaged.
-    """
+    """Position (3,) of each landmark on the skin of the source's base mesh, in its units."""
     try:
         with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
@@ -58,11 +52,6 @@ def add_landmarks(face: Face, base: Floats) -> Face:
         Its first vertices are the skin's.
     base : (N, 3)
         Where each vertex of the skin lies on the source's base mesh.
-
-    Raises
-    ------
-    DataError
-        The table does not fit the mesh.
     """
     table = read_places()
     skin = face.triangles[(face.triangles < len(base)).all(axis=1)].astype(np.int64)

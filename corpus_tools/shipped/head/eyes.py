@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from corpus_tools.shipped.head.cage import Cage, fit_sphere
 from corpus_tools.shipped.head.cards import EYE_TEXTURE
-from corpus_tools.shipped.head.mesh import Cage, Eyeball, HeadPart, MaterialSpan, fit_sphere
+from corpus_tools.shipped.head.parts import Eyeball, HeadPart, MaterialSpan
 from tts2face.numeric.arrays import smoothstep
 from tts2face.picture.baked.eyes import EDGE_RAD
 

@@ -10,31 +10,33 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from corpus_tools.dense.texels import find_texels
-from corpus_tools.shipped.head.cards import (
+from corpus_tools.shipped.head.assets import ASSETS_PACKAGE, Asset, read_asset
+from corpus_tools.shipped.head.cage import Cage
+from corpus_tools.shipped.head.noise import value_noise
+from corpus_tools.shipped.head.scalp import (
     MIDDLE,
-    Cards,
-    StrandStyle,
-    bake_strands,
     covered_share,
-    edge_graph,
     hair_share,
-    number_islands,
     paint_scalp,
     paint_stubble,
     share_levels,
-    strand_tangents,
     stubble_share,
 )
-from corpus_tools.shipped.head.mesh import Cage, triangulate, value_noise
 from corpus_tools.shipped.head.skin import HeadSkin, vertex_normals
-from corpus_tools.shipped.head.source import ASSETS_PACKAGE, Asset, read_asset
+from corpus_tools.shipped.head.strands import (
+    Cards,
+    StrandStyle,
+    bake_strands,
+    edge_graph,
+    number_islands,
+    strand_tangents,
+)
+from corpus_tools.shipped.head.subdivision import triangulate
 from tts2face.models.hair import Hair
 from tts2face.numeric.arrays import smoothstep, unit_vectors
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-
 Edit = Callable[[Cards], Cards]
 Finish = Callable[[Cards, NDArray[np.uint8], Floats], tuple[NDArray[np.uint8], Floats]]  # of coverage and tangents
 AXIS_Z, FRONT_DEG = -60.0, (36.0, 60.0)  # the vertical axis of the head; a fringe lies in front of these angles
@@ -48,6 +50,13 @@ PARTING_MM, PARTING_Y, ROOT_TURN = 9.0, (50.0, 75.0), 1.0
 CURL_TOP, CURL_ROOT, CURL_SIDE, CURL_SPREAD = 0.68, (0.86, 0.98), 0.08, 0.03  # shares of the texture
 CURL_HAZE, CURL_SOLID, CURL_TURN = 70.0, 190.0, 0.42  # coverage of haze and of curls, of 255; spread of directions
 CROWN_Y, N_CROWN_MEANS = (40.0, 80.0), 12  # heights between which the crown begins
+CROPPED = "cropped"
+N_ANCHORS = 180
+N_SAMPLES = 60_000  # points on the cards
+SOLID = 0.4  # coverage of a card from which it hides the scalp
+SCALP_SIDE, STUBBLE_SIDE = 1024, 1024
+FUZZ_MM, FUZZ, FUZZ_SIDE = 1.6, 0.42, 512  # height of the layer above a cropped scalp, coverage, pixels
+SEED = 11
 
 
 def trim_fringe(cards: Cards) -> Cards:
@@ -201,13 +210,6 @@ HAIRCUTS: Mapping[str, Haircut] = {
     "short03": Haircut("short bob with a side fringe", edits=(trim_fringe,)),
     "short04": Haircut("short, combed back", 768, edits=(sink_strands,)),
 }
-CROPPED = "cropped"
-N_ANCHORS = 180
-N_SAMPLES = 60_000  # points on the cards
-SOLID = 0.4  # coverage of a card from which it hides the scalp
-SCALP_SIDE, STUBBLE_SIDE = 1024, 1024
-FUZZ_MM, FUZZ, FUZZ_SIDE = 1.6, 0.42, 512  # height of the layer above a cropped scalp, coverage, pixels
-SEED = 11
 
 
 def build_haircuts(folder: Path, cage: Cage, skin: HeadSkin, head: Floats) -> Iterator[tuple[str, Hair]]:

@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from corpus_tools.shipped.head.build_head import default_cage, fetch_all, head_face
+from corpus_tools.shipped.head.cage import Cage
 from corpus_tools.shipped.head.correspondence import nearest_surface_points, write_places
+from corpus_tools.shipped.head.edge_rings import EdgeRings, find_narrowest_ring
 from corpus_tools.shipped.head.eyes import fit_eyeballs
-from corpus_tools.shipped.head.mesh import Cage, triangulate
-from corpus_tools.shipped.head.skin import EdgeRings, HeadSkin, build_skin, find_narrowest_ring
+from corpus_tools.shipped.head.skin import HeadSkin, build_skin
+from corpus_tools.shipped.head.subdivision import triangulate
 from lexicon.errors import DataError
 from tts2face.models.face import Face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LID_RINGS, N_MESH_LANDMARKS
@@ -125,13 +127,7 @@ def median_places(hits: Floats, is_reliable: NDArray[np.bool_]) -> Floats:
 
 
 def mirrored_landmarks(face: Face, tracker: FaceTracker) -> Ints:
-    """(468,) index of each landmark's mirror image on the other half of the face; its own index on the midline.
-
-    Raises
-    ------
-    DataError
-        The pairs are not mutual: the tracker does not recognise the head as a face.
-    """
+    """(468,) index of each landmark's mirror image on the other half of the face; its own index on the midline."""
     picture = Picture(size="900x900", camera="0,3")
     renderer, features = mesh_renderer(face, picture), []
     for shown in EXPRESSIONS:

@@ -1,25 +1,19 @@
-"""Corrections of MakeHuman's face units: smoother cheeks, stronger brows, lids that slide over the eyeballs.
+"""Corrections of MakeHuman's face units: smoother cheeks, stronger brows, lids that slide over the eyeballs."""
 
-Edges of the lids: the rings where they meet, the dark line of the upper lid, and the wet line of the lower one.
-
-Motion of the lower jaw by shape, which lower teeth and tongue follow.
-"""
-
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from corpus_tools.shipped.head.eyes import RECEDE_MM, ball_radius
-from corpus_tools.shipped.head.mesh import Cage, Eyeball, HeadPart, MaterialSpan, fit_rotation, grid_triangles
-from corpus_tools.shipped.head.skin import EdgeRings, HeadSkin, find_narrowest_ring
+from corpus_tools.shipped.head.parts import Eyeball
+from corpus_tools.shipped.head.skin import HeadSkin
 from tts2face.face.deformation import rotation_matrix
 from tts2face.numeric.arrays import smoothstep
 
 Floats = NDArray[np.float64]
-
 SMOOTHED_SHAPES = ("mouthSmileLeft", "mouthSmileRight", "mouthDimpleLeft", "mouthDimpleRight", "cheekPuff")
 SHAPE_GAINS = {  # brows of MakeHuman hardly rise; its upper lids hardly follow an upward gaze
     "browInnerUp": 2.4,
@@ -42,6 +36,10 @@ MOUTH = np.array([0.0, 6.585, 1.50])  # on the source's base mesh, its units
 UPPER_LIP = np.array([0.0, 6.64, 1.60])
 NEAR, FAR = 0.30, 0.46  # distance from the mouth where smoothing begins (lips keep their shape) and is full (cheeks)
 BELOW_EYES = 7.10
+CLEAR_MM = 0.30  # between lid and eyeball; edges of 2 mm lie below the surface by a tenth of it
+STEPS = (0.3, 0.4, 0.5, 0.6, 0.75, 0.9, 1.0)  # weights at which the clearance is computed
+LID_SHAPES = ("eyeBlink", "eyeLookDown", "eyeLookUp", "eyeLookIn", "eyeLookOut", "eyeSquint", "eyeWide", "cheekSquint")
+N_SPREAD = 4  # edges over which the correction decays
 
 
 def correct_shapes(skin: HeadSkin) -> HeadSkin:
@@ -90,12 +88,6 @@ def neighbour_means(skin: HeadSkin) -> sparse.csr_array:
     mean = sparse.csr_array(sparse.diags_array(1.0 / one.sum(axis=1)) @ one).tocoo()
     rows = sparse.csr_array((mean.data, (mean.row, first[mean.col])), shape=(m, n))
     return sparse.csr_array(rows[weld])
-
-
-CLEAR_MM = 0.30  # between lid and eyeball; edges of 2 mm lie below the surface by a tenth of it
-STEPS = (0.3, 0.4, 0.5, 0.6, 0.75, 0.9, 1.0)  # weights at which the clearance is computed
-LID_SHAPES = ("eyeBlink", "eyeLookDown", "eyeLookUp", "eyeLookIn", "eyeLookOut", "eyeSquint", "eyeWide", "cheekSquint")
-N_SPREAD = 4  # edges over which the correction decays
 
 
 def clear_eyeballs(
@@ -159,81 +151,3 @@ def _push(vertices: Floats, shape: tuple[Floats, float], ball: Eyeball, name: st
     for _ in range(N_SPREAD):
         length = np.maximum(length, 0.9 * (means @ length))
     return length[:, None] * out
-
-
-Ints = NDArray[np.int64]
-
-REACH_MM = 30.0
-WET_MM, WET_OFF_MM = 0.75, 0.06  # height of the wet line, and its distance from the eyeball
-WET_COLOUR = np.array([0.76, 0.60, 0.56])
-WET_MATERIAL = {"specular": 0.35, "shininess": 90.0, "kind": "eye"}
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LidEdge:
-    """Vertices of the skin along the edges of the lids of one eye, from the smaller x to the larger."""
-
-    upper: Ints
-    lower: Ints
-
-
-def find_lid_edges(skin: HeadSkin, balls: tuple[Eyeball, Eyeball]) -> tuple[LidEdge, LidEdge]:
-    """Edges of the lids of the left and the right eye."""
-    strips = EdgeRings(skin.quads, skin.base)
-    found = []
-    for ball in balls:
-        ring = find_narrowest_ring(strips, skin.vertices, ball.centre, REACH_MM, ball.radius)
-        ring = np.roll(ring, -int(skin.vertices[ring, 0].argmin()))
-        turn = int(skin.vertices[ring, 0].argmax())
-        arcs = [ring[: turn + 1], np.append(ring[turn:], ring[0])[::-1]]
-        upper, lower = sorted(arcs, key=lambda arc: -float(skin.vertices[arc, 1].mean()))
-        found.append(LidEdge(upper, lower))
-    return found[0], found[1]
-
-
-def wet_piece(skin: HeadSkin, balls: tuple[Eyeball, Eyeball], edges: tuple[LidEdge, LidEdge]) -> HeadPart:
-    """Thin strips of tear fluid between the lower lids and the eyeballs."""
-    points, triangles, shapes, count = [], [], [], 0
-    for ball, edge in zip(balls, edges, strict=True):
-        line = edge.lower[1:-1]
-        rim = skin.vertices[line]
-        off = rim + np.array([0.0, WET_MM, 0.0]) - ball.centre
-        distance = np.linalg.norm(off, axis=1)
-        angle = np.arccos(np.clip(off[:, 2] / distance, -1, 1))
-        on_ball = ball.centre + off * ((ball_radius(ball, angle) + WET_OFF_MM) / distance)[:, None]
-        points += [rim, on_ball]
-        triangles.append(grid_triangles(2, len(line)) + count)
-        shapes += [line, line]
-        count += 2 * len(line)
-    rows = np.concatenate(shapes)
-    vertices = np.concatenate(points)
-    moved = {name: shape[rows] for name, shape in skin.shapes.items() if shape[rows].any()}
-    for side, sign in (("Left", 1.0), ("Right", -1.0)):  # behind the shut lids, as the eyeball
-        moved[f"eyeBlink{side}"] = moved[f"eyeBlink{side}"] - np.outer(sign * vertices[:, 0] > 0, [0, 0, RECEDE_MM])
-    return HeadPart(
-        vertices,
-        (MaterialSpan("wet", np.concatenate(triangles), WET_MATERIAL),),
-        np.tile(WET_COLOUR, (len(vertices), 1)),
-        moved,
-    )
-
-
-JAW_SHAPES = ("jawOpen", "jawForward", "jawLeft", "jawRight")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Jaw:
-    """Rotation (3, 3) and translation (3,) in mm of the lower jaw by shape, at weight 1."""
-
-    motions: Mapping[str, tuple[Floats, Floats]]
-
-    def shapes(self, points: Floats) -> dict[str, Floats]:
-        """Displacements (N, 3) by shape of points (N, 3) that move with the lower jaw."""
-        return {name: points @ turn.T + shift - points for name, (turn, shift) in self.motions.items()}
-
-
-def fit_jaw(cage: Cage) -> Jaw:
-    """Rigid motion of a cage's lower jaw, fitted to MakeHuman's lower teeth."""
-    teeth = cage.group("helper-lower-teeth")
-    rest = cage.vertices[teeth]
-    return Jaw({name: fit_rotation(rest, rest + cage.units[name][teeth]) for name in JAW_SHAPES})

@@ -1,20 +1,15 @@
-"""The skin: MakeHuman's head after one step of subdivision.
+"""The skin: MakeHuman's head after one step of subdivision."""
 
-Rings of edges around the mouth and the eyes: where lips and lids meet.
-"""
-
-from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.shipped.head.mesh import Cage, catmull_clark
-from lexicon.errors import DataError
+from corpus_tools.shipped.head.cage import Cage
+from corpus_tools.shipped.head.subdivision import catmull_clark
 
 Floats = NDArray[np.float64]
-
 LOWEST, WIDEST = 4.1, 3.2  # of the bust, in units of the source
 NECK_Y, NECK_SLOPE = 5.80, -0.272  # the head ends below this plane, under the shirt's collar
 HEAD_WIDEST = 1.2  # half the width of head and neck; arms are further out
@@ -104,97 +99,3 @@ def vertex_normals(vertices: Floats, quads: NDArray[np.int64], base: Floats) -> 
         np.add.at(total, weld[corner], faces)
     unit: Floats = (total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12))[weld]
     return unit
-
-
-Ints = NDArray[np.int64]
-
-LONGEST = 400  # vertices; the head's own rings around mouth and eyes have under 100
-
-
-class EdgeRings:
-    """Edge rings of a quad mesh: at each vertex of four edges a ring continues with the opposite edge.
-
-    Parameters
-    ----------
-    quads : (F, 4)
-    places : (N, 3)
-        Vertices at one position count as one, because texture seams split the mesh.
-    """
-
-    def __init__(self, quads: Ints, places: Floats) -> None:
-        rounded = np.rint(places * 1e6).astype(np.int64)
-        _, first, where = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
-        self._beside: defaultdict[int, set[int]] = defaultdict(set)
-        self._around: defaultdict[int, list[set[int]]] = defaultdict(list)
-        for quad in first[where.ravel()][quads].tolist():
-            for k, corner in enumerate(quad):
-                self._beside[corner] |= {quad[k - 1], quad[(k + 1) % 4]}
-                self._around[corner].append(set(quad))
-        self.vertices = sorted(self._beside)
-
-    def ring(self, start: int, towards: int) -> list[int] | None:
-        """The closed ring of vertices beginning with the edge from `start` to `towards`; None if it is open."""
-        path = [start, towards]
-        while len(path) < LONGEST:
-            onward = self._onward(path[-2], path[-1])
-            if onward is None or onward == start:
-                return path if onward is not None else None
-            path.append(onward)
-        return None
-
-    def rings_from(self, start: int) -> list[list[int]]:
-        """Closed rings through `start`."""
-        found = [self.ring(start, towards) for towards in sorted(self._beside[start])]
-        return [ring for ring in found if ring is not None]
-
-    def _onward(self, before: int, here: int) -> int | None:
-        passed = [quad for quad in self._around[here] if before in quad]
-        ahead = [n for n in self._beside[here] if n != before and not any(n in quad for quad in passed)]
-        return ahead[0] if len(ahead) == 1 and len(self._beside[here]) == 4 else None
-
-
-def find_narrowest_ring(strips: EdgeRings, vertices: Floats, inside: Floats, reach: float, clear: float = 0.0) -> Ints:
-    """The ring around an opening with the smallest area in the frontal view: the edge of lips or lids.
-
-    Parameters
-    ----------
-    vertices : (N, 3)
-    inside : (3,)
-        A point in the opening, or behind it.
-    reach
-        Maximum distance of a ring from the point in the frontal view, mm.
-    clear
-        Minimum mean distance of a ring from the point, mm: an eyeball's radius.
-
-    Raises
-    ------
-    DataError
-        No ring encloses the point.
-    """
-    near = np.hypot(*(vertices[strips.vertices] - inside).T[:2]) < reach
-    best, least = None, np.inf
-    seen: set[int] = set()
-    for start in np.array(strips.vertices)[near].tolist():
-        for ring in strips.rings_from(start) if start not in seen else ():
-            seen.update(ring)
-            flat = vertices[ring, :2] - inside[:2]
-            is_clear = np.linalg.norm(vertices[ring] - inside, axis=1).mean() > clear
-            if np.hypot(*flat.T).max() > reach or not _encloses_origin(flat) or not is_clear:
-                continue
-            area = abs(_area(flat))
-            if area < least:
-                best, least = ring, area
-    if best is None:
-        raise DataError(f"no edge ring encloses {inside}; use the pinned source mesh")
-    return np.array(best, np.int64)
-
-
-def _encloses_origin(flat: Floats) -> bool:
-    """Whether a closed line winds once around the origin."""
-    angles = np.unwrap(np.arctan2(*np.concatenate([flat, flat[:1]]).T[::-1]))
-    return bool(abs(abs(angles[-1] - angles[0]) - 2 * np.pi) < 0.1)
-
-
-def _area(flat: Floats) -> float:
-    after = np.roll(flat, -1, axis=0)
-    return float((flat[:, 0] * after[:, 1] - flat[:, 1] * after[:, 0]).sum() / 2)

@@ -11,10 +11,12 @@ from scipy.spatial import cKDTree
 
 from corpus_tools.dense.texels import Texels, find_texels
 from corpus_tools.shipped.head.cards import BROW_COLOUR
-from corpus_tools.shipped.head.mesh import SIDE, gaussian_bump, layout_coordinates, triangulate, value_noise
-from corpus_tools.shipped.head.shapes import LidEdge
+from corpus_tools.shipped.head.layout import SIDE, layout_coordinates
+from corpus_tools.shipped.head.lid_edges import LidEdge
+from corpus_tools.shipped.head.noise import gaussian_bump, value_noise
 from corpus_tools.shipped.head.skin import HeadSkin
 from corpus_tools.shipped.head.source import SourceMesh
+from corpus_tools.shipped.head.subdivision import triangulate
 from tts2face.numeric.arrays import smoothstep
 
 Floats = NDArray[np.float64]

@@ -51,7 +51,7 @@ def damage(sound: Waveform, others: Sequence[Waveform], rng: np.random.Generator
     if rng.random() < ECHO_SHARE:
         samples = with_echo(samples, rate, (float(rng.uniform(*ECHO_S)), float(rng.uniform(*ECHO_LEVELS))), rng)
     if rng.random() < BABBLE_SHARE:
-        noise = babble(len(samples), [one.samples for one in others], rng)
+        noise = babble(len(samples), [other.samples for other in others], rng)
     else:
         noise = stationary_noise(len(samples), rate, float(rng.uniform(*NOISE_TILT)), rng)
     samples = samples + noise * np.sqrt(power / 10 ** (float(rng.uniform(*NOISE_DB)) / 10))
@@ -137,7 +137,7 @@ def coded(samples: Floats, rate: int, codec: str, container: str, bit_rate: int)
     file.seek(0)
     with av.open(file, "r") as read:
         resampler = av.AudioResampler("fltp", "mono", rate)
-        frames = [part.to_ndarray()[0] for one in read.decode(audio=0) for part in resampler.resample(one)]
+        frames = [part.to_ndarray()[0] for item in read.decode(audio=0) for part in resampler.resample(item)]
     heard = np.concatenate(frames).astype(np.float64)
     n = len(samples) + len(heard)
     agreement = np.fft.irfft(np.fft.rfft(heard, n) * np.conj(np.fft.rfft(samples, n)), n)

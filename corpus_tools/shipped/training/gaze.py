@@ -48,7 +48,9 @@ def learn_gaze(folder: Path) -> GazeModel:
 def fit_people(people: Sequence[Mapping[str, Fixations]]) -> GazeModel:
     """Distribution over people from the fixations of each by state."""
     found = [[estimate(person[state]) for state in STATES] for person in people]
-    values, counts = (np.array([[getattr(one, name) for one in row] for row in found]) for name in ("values", "counts"))
+    values, counts = (
+        np.array([[getattr(item, name) for item in row] for row in found]) for name in ("values", "counts")
+    )
     mean = (values * counts).sum(axis=0) / counts.sum(axis=0)
     apart = counts / (counts + FEW) * (values - mean)
     mean = mean + apart.mean(axis=0)
@@ -77,9 +79,9 @@ def estimate(fixations: Fixations) -> Estimate:
         "roam": _known(roams[roams >= LEAST_JUMP_DEG]),
     }
     named = {"spot": (float(np.log(spot)), float(len(shifts))), **_directions(looks.landed)}
-    for name, one in lengths.items():
-        median, spread = fit_lognormal(one)
-        n = float(one.is_complete.sum())
+    for name, length in lengths.items():
+        median, spread = fit_lognormal(length)
+        n = float(length.is_complete.sum())
         named |= {name: (median, n), f"{name}_spread": (spread, n)}
     values, counts = np.array([named[name] for name in PARAMETERS]).T
     return Estimate(values, counts + 1e-3)

@@ -64,11 +64,11 @@ def train_voice_classifier(*, on_progress: Progress, report: Told) -> PhoneClass
         parts += [(sound, stated, at % TEST_SHARE == 0) for sound, _, stated in spoken]
         on_progress(at + 1, len(texts))
     seen = [frame_features(sound).astype(np.float16) for sound, *_ in parts]
-    is_test = np.concatenate([np.full(len(one), test) for one, (*_, test) in zip(seen, parts, strict=True)])
+    is_test = np.concatenate([np.full(len(observed), test) for observed, (*_, test) in zip(seen, parts, strict=True)])
     features = np.concatenate(seen)
     aligned = [_stated_sequence(stated, sound.duration) for sound, stated, _ in parts]
     for _ in range(N_ROUNDS):
-        labels = [phone_labels(phones, len(one)) for phones, one in zip(aligned, seen, strict=True)]
+        labels = [phone_labels(phones, len(observed)) for phones, observed in zip(aligned, seen, strict=True)]
         classifier = _fit(Frames(features, np.concatenate(labels), is_test), (N_UNITS, N_EPOCHS), report)
         aligned = [_found_sequence(sound, stated, classifier) for sound, stated, _ in parts]
     return replace(classifier, durations=_durations(classifier.inventory, aligned))
@@ -84,16 +84,16 @@ def train_recording_classifier(recordings: Path, *, on_progress: Progress, repor
     """
     rng, recogniser = np.random.default_rng(0), PhoneRecogniser()
     stated, others = spoken_material(recordings, rng)
-    sounds = [*(one.sound for one in stated), *(one.sound for one in others)]
-    known: list[PhoneSequence | None] = [*(one.phones for one in stated), *([None] * len(others))]
+    sounds = [*(item.sound for item in stated), *(other.sound for other in others)]
+    known: list[PhoneSequence | None] = [*(item.phones for item in stated), *([None] * len(others))]
     lessons = _lessons(sounds, rng, recogniser, on_progress)
     delays = _delays(stated, recogniser)
     first, *rounds = EPOCHS_OF_RECORDINGS
     classifier = _fit_lessons(lessons, known, delays, first, report)
     for n_epochs in rounds:
         aligner = Aligner(classifier)
-        for at, one in enumerate(others, len(stated)):
-            known[at] = one.align(aligner) or known[at]
+        for at, other in enumerate(others, len(stated)):
+            known[at] = other.align(aligner) or known[at]
         classifier = _fit_lessons(lessons, known, delays, n_epochs, report)
     return classifier
 
@@ -117,15 +117,15 @@ def phone_labels(phones: PhoneSequence, n_frames: int) -> NDArray[np.str_]:
 
 def _stated_sequence(stated: Sequence[StatedPhone], duration: float) -> PhoneSequence:
     """Phones as the voice states them; pauses without punctuation are left out."""
-    kept = [one for one in stated if one.is_marked or not one.may_be_skipped]
-    edges = np.array([0.0, *(one.begin for one in kept[1:]), duration])
-    return PhoneSequence([one.label for one in kept], enforce_increasing(np.minimum(edges, duration)))
+    kept = [item for item in stated if item.is_marked or not item.may_be_skipped]
+    edges = np.array([0.0, *(recording.begin for recording in kept[1:]), duration])
+    return PhoneSequence([recording.label for recording in kept], enforce_increasing(np.minimum(edges, duration)))
 
 
 def _found_sequence(sound: Waveform, stated: Sequence[StatedPhone], classifier: PhoneClassifier) -> PhoneSequence:
     """Phones as they are found in the sound."""
     edges = find_edges(sound, stated, classifier)
-    kept = [at for at, one in enumerate(stated) if not one.may_be_skipped or edges[at + 1] > edges[at]]
+    kept = [at for at, item in enumerate(stated) if not item.may_be_skipped or edges[at + 1] > edges[at]]
     return PhoneSequence([stated[at].label for at in kept], [*edges[kept], sound.duration])
 
 
@@ -159,12 +159,14 @@ def _fit_lessons(
 ) -> PhoneClassifier:
     """Classifier of damaged speech whose phones are known; it tells them as if most of them were equally frequent."""
     rng, parts = np.random.default_rng(0), []
-    for one in lessons:
-        if (phones := known[one.number]) is not None:
-            labels = one.labels(phones)
+    for lesson in lessons:
+        if (phones := known[lesson.number]) is not None:
+            labels = lesson.labels(phones)
             kept = (labels != SILENCE) | (rng.random(len(labels)) < SILENCE_SHARE)
-            parts.append(Frames(one.features[kept], labels[kept], np.full(kept.sum(), one.number % TEST_SHARE == 0)))
-    frames = Frames(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Frames)))
+            parts.append(
+                Frames(lesson.features[kept], labels[kept], np.full(kept.sum(), lesson.number % TEST_SHARE == 0))
+            )
+    frames = Frames(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Frames)))
     classifier = _fit(frames, (N_UNITS_OF_RECORDINGS, n_epochs), report)
     counts = np.unique(frames.labels[~frames.is_test], return_counts=True)[1]  # sorted, as the inventory
     inner, outer = classifier.biases
@@ -181,22 +183,22 @@ def _fit_lessons(
 def _durations(inventory: Sequence[str], sequences: Sequence[PhoneSequence]) -> NDArray[np.float32]:
     """Mean and deviation (P, 2) of the log seconds of phones."""
     logs: dict[str, list[float]] = {label: [] for label in inventory}
-    for one in sequences:
-        for label, seconds in zip(one.phones, one.durations, strict=True):
+    for sequence in sequences:
+        for label, seconds in zip(sequence.phones, sequence.durations, strict=True):
             logs[label].append(float(np.log(max(seconds, LEAST_DURATION_S))))
     everything = [value for values in logs.values() for value in values]
     known = [logs[label] or everything for label in inventory]
-    return np.array([[np.mean(one), max(np.std(one), LEAST_DEVIATION)] for one in known], np.float32)
+    return np.array([[np.mean(recording), max(np.std(recording), LEAST_DEVIATION)] for recording in known], np.float32)
 
 
 def _delays(stated: Sequence[KnownSpeech], recogniser: PhoneRecogniser) -> dict[str, float]:
     """Median seconds from the middle of each phone to the instant at which the recogniser says it."""
     apart: dict[str, list[float]] = {}
-    for one in stated:
-        phones = one.phones
+    for item in stated:
+        phones = item.phones
         said = [at for at, label in enumerate(phones.phones) if label != SILENCE]
         labels = [phones.phones[at] for at in said]
-        heard = recogniser.hear(one.sound).log_probabilities(tuple(labels))
+        heard = recogniser.hear(item.sound).log_probabilities(tuple(labels))
         spikes = find_spikes(heard, [[list(range(len(labels)))]], NEVER)
         moments = (np.arange(len(spikes)) + 0.5) * FRAME_S
         middles = (phones.edges[said] + phones.edges[[at + 1 for at in said]]) / 2

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from corpus_tools.prompts.prompts import shipped_sentences
-from corpus_tools.recordings.folder import read_word_times
+from corpus_tools.recordings.transcripts import read_word_times
 from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence
 from tts2face.sound.alignment import Aligner
@@ -65,7 +65,7 @@ def spoken_material(recordings: Path, rng: np.random.Generator) -> tuple[list[Kn
     rng.shuffle(texts)
     voice = load_voice(STATING_VOICE, "en-us")
     spoken = [voice.speak(text, rate=float(rng.choice(SPEECH_RATES))) for text in texts[:N_TEXTS]]
-    known = [KnownSpeech(resampled(one.waveform), one.phones) for one in spoken]
+    known = [KnownSpeech(resampled(utterance.waveform), utterance.phones) for utterance in spoken]
     return known, [*_spoken_by_another(texts[N_TEXTS : N_TEXTS + N_OTHER], rng), *_recorded(recordings / "grid_s1")]
 
 

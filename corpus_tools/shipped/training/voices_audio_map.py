@@ -56,14 +56,14 @@ def learn_voices_map(
     """
     rng, aligner = np.random.default_rng(0), Aligner()
     known, others = spoken_material(recordings, rng)
-    for one in others:
-        if phones := one.align(aligner):
-            known.append(KnownSpeech(one.sound, phones))
+    for other in others:
+        if phones := other.align(aligner):
+            known.append(KnownSpeech(other.sound, phones))
     lessons = _lessons(talker, known, rng, on_progress)
-    audio_map = replace(_fit([one for one in lessons if not one.is_test]), fps=talker.fps)
-    tests = [one for one in lessons if one.is_test]
-    made = np.concatenate([audio_map.parameters(one.features) for one in tests])
-    real = np.concatenate([one.lips for one in tests])
+    audio_map = replace(_fit([lesson for lesson in lessons if not lesson.is_test]), fps=talker.fps)
+    tests = [lesson for lesson in lessons if lesson.is_test]
+    made = np.concatenate([audio_map.parameters(test.features) for test in tests])
+    real = np.concatenate([test.lips for test in tests])
     first = np.corrcoef(made[:, 0], real[:, 0])[0, 1]
     report(f"{len(lessons)} sounds; r of the first parameter of lips of others {first:.3f}")
     return audio_map
@@ -73,7 +73,7 @@ def _lessons(
     talker: Talker, known: Sequence[KnownSpeech], rng: np.random.Generator, on_progress: Progress
 ) -> list[_Lesson]:
     """Each sound several times, damaged in several ways and at several levels."""
-    model, sounds, found = build_exemplar_model(talker), [one.sound for one in known], []
+    model, sounds, found = build_exemplar_model(talker), [recording.sound for recording in known], []
     for at, (number, damaged) in enumerate(damaged_copies(sounds, N_DAMAGED, rng)):
         gain = 10.0 ** (float(rng.uniform(*GAINS_DB)) / 20.0)
         sound = Waveform(np.clip(damaged.sound.samples * np.float32(gain), -1.0, 1.0), damaged.sound.rate)
@@ -89,11 +89,13 @@ def _lessons(
 def _fit(lessons: Sequence[_Lesson]) -> AudioMap:
     from sklearn.neural_network import MLPRegressor
 
-    features, lips = (np.concatenate([getattr(one, part) for one in lessons]) for part in ("features", "lips"))
+    features, lips = (np.concatenate([getattr(lesson, part) for lesson in lessons]) for part in ("features", "lips"))
     mean, spread = features.mean(axis=0), np.maximum(features.std(axis=0), LEAST_SPREAD)
     centre, range_of_motion = lips.mean(axis=0), np.maximum(lips.std(axis=0), 1e-6)
     weight = range_of_motion**SPREAD_EXPONENT / np.sqrt(np.mean(range_of_motion ** (2 * SPREAD_EXPONENT)))
-    inputs = np.concatenate([standardised_windows(one.features, (mean, spread), BEFORE, AFTER) for one in lessons])
+    inputs = np.concatenate(
+        [standardised_windows(lesson.features, (mean, spread), BEFORE, AFTER) for lesson in lessons]
+    )
     targets = ((lips - centre) / range_of_motion * weight).astype(np.float32)
     model = MLPRegressor(hidden_layer_sizes=N_UNITS, batch_size=BATCH, alpha=WEIGHT_DECAY)
     fit_epochs(model, inputs, targets, LEARNING_RATES, N_EPOCHS)

@@ -55,7 +55,7 @@ class CurvePoint:
         samples: dict[str, dict[str, Floats]] = {}
         for method, each in figures.items():
             for name, _ in FIGURE_HEADS:
-                values = np.stack([one[name] for one in each], axis=1)  # (W, C)
+                values = np.stack([item[name] for item in each], axis=1)  # (W, C)
                 mean = samples.setdefault(method, {})[name] = np.einsum("wc,wc->w", weights, values)
                 deviation = float(values[0].std(ddof=1)) if n_choices > 1 else None
                 interval = interval_of(mean)
@@ -77,7 +77,9 @@ class CurveDifference:
     def surely_worse(self) -> tuple[str, ...]:
         """Names of the figures that are worse by more than their interval."""
         return tuple(
-            name for name, one in self.figures.items() if (one.low > 0 if name in LOWER_IS_BETTER else one.high < 0)
+            name
+            for name, figure in self.figures.items()
+            if (figure.low > 0 if name in LOWER_IS_BETTER else figure.high < 0)
         )
 
 
@@ -105,19 +107,19 @@ class LearningCurve:
         """Dictionary for JSON."""
         points = [
             {
-                "seconds": one.seconds,
-                "n_choices": one.n_choices,
-                "figures": {name: {key: asdict(x) for key, x in some.items()} for name, some in one.figures.items()},
+                "seconds": point.seconds,
+                "n_choices": point.n_choices,
+                "figures": {name: {key: asdict(x) for key, x in some.items()} for name, some in point.figures.items()},
             }
-            for one in self.points
+            for point in self.points
         ]
         return {
             "n_test": self.n_test,
             "test_seconds": self.test_seconds,
             "base": self.base,
             "points": points,
-            "steps": [asdict(one) for one in self.steps],
-            "gains": [asdict(one) for one in self.gains],
+            "steps": [asdict(step) for step in self.steps],
+            "gains": [asdict(gain) for gain in self.gains],
         }
 
 
@@ -129,7 +131,7 @@ def compare_points(
         _difference(after, method, before, method) for before, after in pairwise(points) for method in after.figures
     )
     first, *others = points[0].figures
-    gains = tuple(_difference(one, first, one, other) for one in points for other in others)
+    gains = tuple(_difference(point, first, point, other) for point in points for other in others)
     return LearningCurve(n_test, test_seconds, base, tuple(points), steps, gains)
 
 

@@ -1,10 +1,5 @@
 """Learning curves as a page, a picture and tables in files."""
 
-import csv
-import io
-import json
-from collections.abc import Callable, Mapping
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from corpus_tools.studies.evaluation.curve import LearningCurve
@@ -12,7 +7,8 @@ from corpus_tools.studies.evaluation.curve_tables import curve_rows, figure_rows
 from corpus_tools.studies.evaluation.learning_curve import MEAN_FACE
 from corpus_tools.studies.evaluation.people_tables import FIGURE_HEADS
 from corpus_tools.studies.pages import note_paragraph, page, paragraphs, scroll_box, table
-from corpus_tools.studies.plots import SERIES, draw_png, draw_svg, draw_svg_file
+from corpus_tools.studies.plots import SERIES, Plot
+from corpus_tools.studies.report import Report, as_csv, as_html, as_json, as_png, as_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +31,7 @@ def learning_curve_page(curve: LearningCurve) -> str:
         "Tables: mean ± standard deviation over the random choices of the material. Bands and parentheses: 95 % "
         "bootstrap intervals over held-out utterances and choices."
     )
-    parts = [paragraphs(about), scroll_box(draw_svg(_draw(curve), WIDTH, HEIGHT, NAME)), paragraphs(monotony(curve))]
+    parts = [paragraphs(about), scroll_box(_plot(curve).svg()), paragraphs(monotony(curve))]
     for name, head in FIGURE_HEADS:
         heads, *rows = figure_rows(curve, name)
         parts += [f"<h2>{head}</h2>", table(heads, rows, numbers=range(len(heads)))]
@@ -45,8 +41,8 @@ def learning_curve_page(curve: LearningCurve) -> str:
     return page("Learning curves", parts)
 
 
-def _draw(curve: LearningCurve) -> "Callable[[Figure], tuple[()]]":
-    def draw(figure: "Figure") -> tuple[()]:
+def _plot(curve: LearningCurve) -> Plot:
+    def draw(figure: "Figure") -> None:
         for at, (name, head) in enumerate(FIGURE_HEADS[:N_DRAWN], start=1):
             axes = figure.add_subplot(1, N_DRAWN, at)
             _draw_figure(axes, curve, name)
@@ -54,9 +50,8 @@ def _draw(curve: LearningCurve) -> "Callable[[Figure], tuple[()]]":
             _label_seconds(axes, [point.seconds for point in curve.points])
         handles, labels = axes.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(curve.methods))
-        return ()
 
-    return draw
+    return Plot(draw, WIDTH, HEIGHT, NAME)
 
 
 def _draw_figure(axes: "Axes", curve: LearningCurve, name: str) -> None:
@@ -64,9 +59,10 @@ def _draw_figure(axes: "Axes", curve: LearningCurve, name: str) -> None:
     shown = [method for method in curve.methods if method != FLAT]
     for method, (colour, dash) in zip(shown, SERIES, strict=False):
         figures = [point.figures[method][name] for point in curve.points]
-        axes.fill_between(seconds, [one.low for one in figures], [one.high for one in figures], color=colour,
-                          alpha=BAND, linewidth=0)  # fmt: skip
-        axes.plot(seconds, [one.value for one in figures], color=colour, linestyle=dash, label=method)
+        low = [figure.low for figure in figures]
+        high = [figure.high for figure in figures]
+        axes.fill_between(seconds, low, high, color=colour, alpha=BAND, linewidth=0)
+        axes.plot(seconds, [figure.value for figure in figures], color=colour, linestyle=dash, label=method)
 
 
 def _label_seconds(axes: "Axes", seconds: list[float]) -> None:
@@ -76,18 +72,12 @@ def _label_seconds(axes: "Axes", seconds: list[float]) -> None:
     axes.xaxis.set_minor_locator(NullLocator())
 
 
-def _csv(curve: LearningCurve) -> bytes:
-    rows = io.StringIO()
-    csv.writer(rows, lineterminator="\n").writerows(curve_rows(curve))
-    return rows.getvalue().encode()
-
-
-WRITERS: Mapping[str, Callable[[LearningCurve], bytes]] = MappingProxyType(
+REPORT: Report[LearningCurve] = Report(
     {
-        ".html": lambda curve: learning_curve_page(curve).encode(),
-        ".svg": lambda curve: draw_svg_file(_draw(curve), WIDTH, HEIGHT, NAME),
-        ".png": lambda curve: draw_png(_draw(curve), WIDTH, HEIGHT),
-        ".json": lambda curve: json.dumps(curve.to_json(), indent=1).encode(),
-        ".csv": _csv,
+        ".html": as_html(learning_curve_page),
+        ".svg": as_svg(_plot),
+        ".png": as_png(_plot),
+        ".json": as_json(LearningCurve.to_json, is_ascii=True),
+        ".csv": as_csv(curve_rows),
     }
 )

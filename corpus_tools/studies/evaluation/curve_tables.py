@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from corpus_tools.measures.intervals import IntervalEstimate
 from corpus_tools.studies.evaluation.curve import ChoiceEstimate, CurveDifference, LearningCurve
 from corpus_tools.studies.evaluation.people_tables import FIGURE_HEADS
+from corpus_tools.studies.report import markdown_table
 
 CSV_HEAD = ("table", "seconds", "method", "minus", "figure", "value", "low", "high", "deviation")
 HEADS = dict(FIGURE_HEADS)
@@ -12,8 +13,8 @@ HEADS = dict(FIGURE_HEADS)
 
 def curve_tables(curve: LearningCurve) -> str:
     """Markdown: a table for each figure, the gains of the built talker, and a sentence on the steps."""
-    tables = [f"{head}\n\n{_markdown(figure_rows(curve, name))}" for name, head in FIGURE_HEADS]
-    return "\n\n".join([*tables, _markdown(gain_rows(curve)), monotony(curve)])
+    tables = [f"{head}\n\n{markdown_table(figure_rows(curve, name))}" for name, head in FIGURE_HEADS]
+    return "\n\n".join([*tables, markdown_table(gain_rows(curve)), monotony(curve)])
 
 
 def figure_rows(curve: LearningCurve, figure: str) -> list[tuple[str, ...]]:
@@ -28,16 +29,16 @@ def figure_rows(curve: LearningCurve, figure: str) -> list[tuple[str, ...]]:
 def gain_rows(curve: LearningCurve) -> list[tuple[str, ...]]:
     """Heads, and a row for each amount and other method: differences of the first method with 95 % intervals."""
     rows: list[tuple[str, ...]] = [("own material (s)", f"{curve.methods[0]} minus", *HEADS.values())]
-    for one in curve.gains:
-        cells = (_interval_text(one.figures[name]) for name in HEADS)
-        rows.append((f"{one.seconds:.0f}", one.minus, *cells))
+    for gain in curve.gains:
+        cells = (_interval_text(gain.figures[name]) for name in HEADS)
+        rows.append((f"{gain.seconds:.0f}", gain.minus, *cells))
     return rows
 
 
 def monotony(curve: LearningCurve) -> str:
     """Sentence: whether a figure becomes worse from one amount to the next by more than its interval."""
     names = curve.methods
-    worse = [_step_text(one) for name in names for one in curve.steps if one.method == name and one.surely_worse()]
+    worse = [_step_text(step) for name in names for step in curve.steps if step.method == name and step.surely_worse()]
     if not worse:
         return "No figure becomes worse from one amount to the next by more than its 95 % interval."
     return f"Worse than with less material by more than the 95 % interval: {'; '.join(worse)}."
@@ -48,9 +49,9 @@ def curve_rows(curve: LearningCurve) -> Iterator[tuple[str, ...]]:
     yield CSV_HEAD
     for point in curve.points:
         for method, figures in point.figures.items():
-            for name, one in figures.items():
-                deviation = "" if one.deviation is None else f"{one.deviation:.6g}"
-                numbers = (f"{one.value:.6g}", f"{one.low:.6g}", f"{one.high:.6g}", deviation)
+            for name, figure in figures.items():
+                deviation = "" if figure.deviation is None else f"{figure.deviation:.6g}"
+                numbers = (f"{figure.value:.6g}", f"{figure.low:.6g}", f"{figure.high:.6g}", deviation)
                 yield "curve", f"{point.seconds:g}", method, "", name, *numbers
     for table, differences in (("step", curve.steps), ("gain", curve.gains)):
         for some in differences:
@@ -60,20 +61,15 @@ def curve_rows(curve: LearningCurve) -> Iterator[tuple[str, ...]]:
                 yield table, f"{some.seconds:g}", some.method, minus, name, *numbers
 
 
-def _step_text(one: CurveDifference) -> str:
-    figures = ", ".join(HEADS[name] for name in one.surely_worse())
-    return f"{one.method} at {one.seconds:.0f} s ({figures})"
+def _step_text(difference: CurveDifference) -> str:
+    figures = ", ".join(HEADS[name] for name in difference.surely_worse())
+    return f"{difference.method} at {difference.seconds:.0f} s ({figures})"
 
 
-def _estimate_text(one: ChoiceEstimate) -> str:
-    value = f"{round(one.value, 3) + 0.0:.3f}"  # no minus before 0.000
-    return value if one.deviation is None else f"{value} ± {one.deviation:.3f}"
+def _estimate_text(estimate: ChoiceEstimate) -> str:
+    value = f"{round(estimate.value, 3) + 0.0:.3f}"  # no minus before 0.000
+    return value if estimate.deviation is None else f"{value} ± {estimate.deviation:.3f}"
 
 
-def _interval_text(one: IntervalEstimate) -> str:
-    return f"{one.value:+.3f} ({one.low:+.3f} to {one.high:+.3f})"
-
-
-def _markdown(rows: list[tuple[str, ...]]) -> str:
-    lines = [f"| {' | '.join(row)} |" for row in rows]
-    return "\n".join([lines[0], "| --- |" + " --- |" * (len(rows[0]) - 1), *lines[1:]])
+def _interval_text(interval: IntervalEstimate) -> str:
+    return f"{interval.value:+.3f} ({interval.low:+.3f} to {interval.high:+.3f})"

@@ -19,7 +19,8 @@ from corpus_tools.studies.evaluation.tracks import ExternalTrack, map_tracks
 from corpus_tools.training.phone_network import add_phone_network
 from corpus_tools.training.pooling.lip_tracks import LipTrack
 from corpus_tools.training.pooling.speech import align_lip_tracks
-from corpus_tools.training.train_talker import correct_pose, fit_pose_correction, learn_talker
+from corpus_tools.training.pose_correction import correct_pose, fit_pose_correction
+from corpus_tools.training.train_talker import learn_talker
 from tts2face.lips.options import SynthesisOptions
 from tts2face.models.talker import ShapeModel, Talker
 from tts2face.sound.voice import Voice
@@ -111,11 +112,11 @@ def evaluate(
                 train, test, options=options, tracks=tracks, voice=voice, lips=lips, on_progress=on_split_progress
             )
         )
-    limits = Thresholds.of([one for each in runs for one in each.real])
+    limits = Thresholds.of([reference for each in runs for reference in each.real])
     n_train = len(parts[0][0]) if len(parts) == 1 else min(len(train) for train, _ in parts)
     result = Evaluation(
         n_train,
-        sum(len(one.real) for one in runs),
+        sum(len(run.real) for run in runs),
         _pooled_scores(runs, limits),
         as_tracked=_tracked_scores(runs, limits),
         own=_pooled_own_scores(runs, limits),
@@ -152,7 +153,7 @@ def evaluate_split(  # noqa: PLR0913 - those of `evaluate`, for one split
             on_progress(number + 1, len(methods))
     if tracks is not None:
         synthesised[TRACKS_METHOD], synthesis_s[TRACKS_METHOD] = map_tracks(tracks, talker, real), 0.0
-    synthesised[CEILING_METHOD], synthesis_s[CEILING_METHOD] = tuple(one.parameters for one in real), 0.0
+    synthesised[CEILING_METHOD], synthesis_s[CEILING_METHOD] = tuple(reference.parameters for reference in real), 0.0
     return SplitResult(talker, real, synthesised, synthesis_s, tracked, own)
 
 
@@ -190,8 +191,8 @@ def evaluate_across_talkers(
         compute_scores(
             name,
             [
-                compare_across_talkers(one, values, talker.model, own_scale)
-                for one, values in zip(real, synthesised[name], strict=True)
+                compare_across_talkers(reference, values, talker.model, own_scale)
+                for reference, values in zip(real, synthesised[name], strict=True)
             ],
             limits,
             synthesis_s[name],
@@ -211,7 +212,9 @@ def _synthesise(
     method: SynthesisMethod, real: Sequence[ReferenceUtterance]
 ) -> tuple[tuple[NDArray[np.float32], ...], float]:
     began = time.perf_counter()
-    synthesised = tuple(method(one.observation.phones, len(one.parameters), one.observation.fps) for one in real)
+    synthesised = tuple(
+        method(reference.observation.phones, len(reference.parameters), reference.observation.fps) for reference in real
+    )
     return synthesised, time.perf_counter() - began
 
 
@@ -222,7 +225,7 @@ def _synthesise_own_durations(
     model: ShapeModel,
 ) -> tuple[UtteranceComparison, ...]:
     pairs = zip(real, voiced, strict=True)
-    return tuple(compare_own_durations(method, one, spoken, model) for one, spoken in pairs if spoken is not None)
+    return tuple(compare_own_durations(method, pair, spoken, model) for pair, spoken in pairs if spoken is not None)
 
 
 def _pooled_scores(runs: Sequence[SplitResult], limits: Thresholds) -> tuple[Scores, ...]:
@@ -258,7 +261,11 @@ def _pooled_own_scores(runs: Sequence[SplitResult], limits: Thresholds) -> tuple
 def _score_folds(parts: Sequence[Split], runs: Sequence[SplitResult], limits: Thresholds) -> tuple[Fold, ...]:
     """Scores of each run alone, with the thresholds of all runs."""
     return tuple(
-        Fold(len(train), len(test), {one.method: one.values() for one in _pooled_scores([each], limits)})
+        Fold(
+            len(train),
+            len(test),
+            {score.method: score.values() for score in _pooled_scores([each], limits)},
+        )
         for (train, test), each in zip(parts, runs, strict=True)
     )
 

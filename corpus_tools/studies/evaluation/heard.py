@@ -36,37 +36,40 @@ def find_sounds(folder: Path, utterances: Sequence[Observation]) -> Mapping[str,
         An utterance has no sound in the folder.
     """
     found = {}
-    for one in utterances:
-        paths = [folder / f"{one.name}{suffix}" for suffix in SOUND_SUFFIXES]
+    for utterance in utterances:
+        paths = [folder / f"{utterance.name}{suffix}" for suffix in SOUND_SUFFIXES]
         existing = [path for path in paths if path.is_file()]
         if not existing:
-            raise InputError(f"{folder} holds no sound of {one.name} ({', '.join(SOUND_SUFFIXES)}); add it")
-        found[one.name] = existing[0]
+            raise InputError(f"{folder} holds no sound of {utterance.name} ({', '.join(SOUND_SUFFIXES)}); add it")
+        found[utterance.name] = existing[0]
     return found
 
 
 def with_hand_edges(utterances: Sequence[Observation], sounds: Mapping[str, Path]) -> tuple[Observation, ...]:
     """The utterances with edges that were set by hand, where there are some beside the sounds."""
-    return tuple(_with_edges(one, sounds[one.name].with_name(f"{one.name}{EDGES_SUFFIX}")) for one in utterances)
+    return tuple(
+        _with_edges(utterance, sounds[utterance.name].with_name(f"{utterance.name}{EDGES_SUFFIX}"))
+        for utterance in utterances
+    )
 
 
-def _with_edges(one: Observation, path: Path) -> Observation:
+def _with_edges(observation: Observation, path: Path) -> Observation:
     if not path.is_file():
-        return one
+        return observation
     head, *rows = [line.split("\t") for line in path.read_text(encoding="utf-8").splitlines() if line] or [[]]
     if missing := [name for name in COLUMNS if name not in head]:
         raise DataError(f"{path} has no column {missing[0]}; it needs {', '.join(COLUMNS)}")
     start, end, label = (head.index(name) for name in COLUMNS)
     edges = [parse_cell(rows[0][start], path, 2)] + [parse_cell(row[end], path, at) for at, row in enumerate(rows, 2)]
-    return replace(one, phones=PhoneSequence([row[label] for row in rows], edges))
+    return replace(observation, phones=PhoneSequence([row[label] for row in rows], edges))
 
 
 def heard_phones(utterances: Sequence[Observation], sounds: Mapping[str, Path]) -> dict[str, list[PhoneSequence]]:
     """Phones of each utterance as the program finds them in its sound: of its words, and without them."""
     found: dict[str, list[PhoneSequence]] = {OWN_ALIGNMENT: [], SOUND_ALONE: []}
-    for one in utterances:
-        sound = read_sound(sounds[one.name], RATE)
-        words = pronounce_transcript(" ".join(word.text for word in one.words), "en-us")
+    for utterance in utterances:
+        sound = read_sound(sounds[utterance.name], RATE)
+        words = pronounce_transcript(" ".join(word.text for word in utterance.words), "en-us")
         found[OWN_ALIGNMENT].append(align_recording(sound, words)[0])
         found[SOUND_ALONE].append(recognise_phones(sound))
     return found
@@ -77,7 +80,7 @@ def mapped_motion(
 ) -> list[NDArray[np.float32]]:
     """Parameters (T, S) of each utterance by an audio map of the talker."""
     found = []
-    for one in utterances:
-        motion = map_audio_to_motion(sounds[one.name], talker.audio_maps[name], talker, one.fps)[1].values
-        found.append(motion[np.minimum(np.arange(len(one.landmarks)), len(motion) - 1)])
+    for utterance in utterances:
+        motion = map_audio_to_motion(sounds[utterance.name], talker.audio_maps[name], talker, utterance.fps)[1].values
+        found.append(motion[np.minimum(np.arange(len(utterance.landmarks)), len(motion) - 1)])
     return found

@@ -20,9 +20,11 @@ from corpus_tools.studies.evaluation.curve import ChoiceFigures, CurvePoint, Lea
 from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA
 from corpus_tools.studies.evaluation.people import TestUtterance, pair_curves, synthesise_people, z_score_people
 from corpus_tools.training.adapt_talker import Base, adapted_talker
-from corpus_tools.training.choose_adaptation import choose_adaptation, needs_base
+from corpus_tools.training.choose_adaptation import choose_adaptation
 from corpus_tools.training.phone_network import add_phone_network
-from corpus_tools.training.train_talker import correct_pose, fit_pose_correction, learn_talker
+from corpus_tools.training.pose_correction import correct_pose, fit_pose_correction
+from corpus_tools.training.short_talker import needs_base
+from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import InputError
 from tts2face.lips.exemplar import DEFAULT_OPTIONS
 from tts2face.types import Progress
@@ -75,7 +77,7 @@ def measure_learning_curve(
     if base is not None:
         check_unknown(base.talker, test)
     leak = fit_pose_correction(train)
-    task = CurveTask(tuple(train), z_score_people([[leak.apply(one) for one in test]]), base)
+    task = CurveTask(tuple(train), z_score_people([[leak.apply(observation) for observation in test]]), base)
     weights = draw_weights(len(task.tests))
     choices = choose_material(train, amounts_s, seed)
     constant = () if base is None else (_base_alone(task, base),)
@@ -91,7 +93,7 @@ def measure_learning_curve(
                 on_progress(done, sum(map(len, choices)))
         seconds = float(np.mean([_duration_s(part) for part in chosen]))
         points.append(CurvePoint.of(seconds, len(points), figures))
-    test_seconds = sum(len(one.observation.landmarks) / one.observation.fps for one in task.tests)
+    test_seconds = sum(len(each_test.observation.landmarks) / each_test.observation.fps for each_test in task.tests)
     base_name = None if base is None else str(base.talker.metadata.get("name", ""))
     return compare_points(points, n_test=len(task.tests), test_seconds=test_seconds, base=base_name)
 
@@ -103,11 +105,6 @@ def choose_material(
 
     A choice holds the number of utterances whose duration is nearest to the amount, in their given order; the last
     amount is all material, once.
-
-    Raises
-    ------
-    InputError
-        An amount is not positive, or there is none.
     """
     if not amounts_s or not all(0 < amount < np.inf for amount in amounts_s):
         raise InputError("the amounts of a learning curve must be seconds above 0, such as 10,20,40")
@@ -130,7 +127,7 @@ def _nearest_choice(
 
 
 def _duration_s(observations: Sequence[Observation]) -> float:
-    return sum(len(one.landmarks) / one.fps for one in observations)
+    return sum(len(observation.landmarks) / observation.fps for observation in observations)
 
 
 def _base_alone(task: CurveTask, base: Base) -> tuple[str, Sequence[NDArray[np.float64]]]:

@@ -40,10 +40,10 @@ class FeatureMap:
         """Conditional mean of a talker's parameters given its lip features, both in its recorded speech."""
         n_speech = talker.model.n_speech
         features, parameters = [], []
-        for at, one in enumerate(talker.utterances):
-            here = speech_frames(one.phones, len(one.shape), talker.fps)
+        for at, utterance in enumerate(talker.utterances):
+            here = speech_frames(utterance.phones, len(utterance.shape), talker.fps)
             features.append(talker_features(talker, at)[here])
-            parameters.append(one.shape[here, :n_speech].astype(np.float64))
+            parameters.append(utterance.shape[here, :n_speech].astype(np.float64))
         seen, wanted = np.concatenate(features), np.concatenate(parameters)
         scored = (seen - seen.mean(axis=0)) / np.maximum(seen.std(axis=0), 1e-9)
         centred = wanted - wanted.mean(axis=0)
@@ -65,7 +65,7 @@ def lip_observations(pooled: Sequence[PooledSpeech], talker: Talker) -> tuple[Ob
     The opening is moved so that the lips touch in a small share of frames; curves that are z-scored do not change.
     """
     feature_map, model = FeatureMap.of(talker), talker.model
-    opening = np.concatenate([one.features[one.is_used, OPENING] for one in pooled])
+    opening = np.concatenate([each_track.features[each_track.is_used, OPENING] for each_track in pooled])
     gap = _touching_opening(feature_map, talker) - np.quantile(opening, CLOSED_SHARE)
     found = []
     for track in pooled:

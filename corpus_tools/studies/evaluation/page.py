@@ -11,8 +11,10 @@ from corpus_tools.measures.intervals import CONFIDENCE
 from corpus_tools.measures.scores import Scores, available_figures
 from corpus_tools.studies.evaluation.evaluate import CEILING_METHOD, SplitResult
 from corpus_tools.studies.evaluation.tables import Evaluation, class_rows, figure_rows
-from corpus_tools.studies.pages import MethodVideos, page, paragraphs, scroll_box, table
+from corpus_tools.studies.pages import page, paragraphs, scroll_box, table
 from corpus_tools.studies.plots import RULE, SERIES, draw_svg
+from corpus_tools.studies.report import Report, as_csv, as_html, as_json
+from corpus_tools.studies.videos import MethodVideos
 from lexicon.sequence import SILENCE, PhoneSequence
 
 if TYPE_CHECKING:
@@ -42,9 +44,9 @@ ABOUT_OWN = (
 
 def evaluation_page(result: Evaluation, runs: Sequence[SplitResult]) -> str:
     """The page (HTML)."""
-    compared = [one.method for one in result.scores if one.method != CEILING_METHOD]
+    compared = [score.method for score in result.scores if score.method != CEILING_METHOD]
     method = SHOWN if SHOWN in compared else compared[-1]
-    head, *classes = class_rows([one for one in result.scores if one.method != CEILING_METHOD])
+    head, *classes = class_rows([score for score in result.scores if score.method != CEILING_METHOD])
     about = ABOUT[result.is_across].format(n_test=result.n_test, n_train=result.n_train)
     return page(
         "Accuracy of synthesised lips",
@@ -59,9 +61,9 @@ def evaluation_page(result: Evaluation, runs: Sequence[SplitResult]) -> str:
             "<h2>DTW cost of the sentences</h2>",
             cost_histogram(
                 {
-                    one.method: [u.dtw_cost for u in one.utterances]
-                    for one in result.scores
-                    if one.method != CEILING_METHOD
+                    score.method: [u.dtw_cost for u in score.utterances]
+                    for score in result.scores
+                    if score.method != CEILING_METHOD
                 }
             ),
             *_sentences(result, runs, method, PLAIN if PLAIN in compared and method != PLAIN else None),
@@ -91,12 +93,12 @@ def _folds(result: Evaluation) -> Iterator[str]:
         return
     heads = available_figures(result.scores)
     rows = []
-    for one in result.scores:
+    for score in result.scores:
         for number, fold in enumerate(result.folds, start=1):
-            cells = (f"{fold.figures[one.method][name]:.{digits}f}" for name, _, digits in heads)
-            rows.append((one.method, f"{number} ({fold.n_test} held out, {fold.n_train} for training)", *cells))
-        over = ((result.fold_mean_and_deviation(one.method, name), digits) for name, _, digits in heads)
-        rows.append((one.method, "mean ± spread", *(f"{mean:.{n}f} ± {spread:.{n}f}" for (mean, spread), n in over)))
+            cells = (f"{fold.figures[score.method][name]:.{digits}f}" for name, _, digits in heads)
+            rows.append((score.method, f"{number} ({fold.n_test} held out, {fold.n_train} for training)", *cells))
+        over = ((result.fold_mean_and_deviation(score.method, name), digits) for name, _, digits in heads)
+        rows.append((score.method, "mean ± spread", *(f"{mean:.{n}f} ± {spread:.{n}f}" for (mean, spread), n in over)))
     yield f"<h2>{len(result.folds)} folds</h2>"
     yield paragraphs(
         "Each fold is tested with methods learnt from the others. Spread: standard deviation over the folds."
@@ -106,8 +108,8 @@ def _folds(result: Evaluation) -> Iterator[str]:
 
 def _sentences(result: Evaluation, runs: Sequence[SplitResult], method: str, plain: str | None) -> Iterator[str]:
     """Curves of real and synthesised lips, as in T07, figs 6-8, and videos of the worst sentences."""
-    scores = next(one for one in result.scores if one.method == method)
-    order = np.argsort([one.dtw_cost for one in scores.utterances], kind="stable")
+    scores = next(score for score in result.scores if score.method == method)
+    order = np.argsort([utterance.dtw_cost for utterance in scores.utterances], kind="stable")
     middle = len(order) // 2 - N_SHOWN // 2
     places = [(run, at) for run in runs for at in range(len(run.real))]
     videos = MethodVideos(method)
@@ -142,13 +144,12 @@ def _curves(run: SplitResult, at: int, names: Sequence[str]) -> str:
 def curves_plot(times: Floats, curves: Mapping[str, Floats], label: str, phones: PhoneSequence) -> str:
     """Plot of named curves (T,) at times (T,) in seconds, with the phones above (SVG)."""
 
-    def draw(figure: "Figure") -> tuple[()]:
+    def draw(figure: "Figure") -> None:
         axes = _series_axes(figure, label, "seconds")
         for (name, values), (colour, dash) in zip(curves.items(), cycle(SERIES), strict=False):
             axes.plot(times, values, color=colour, linestyle=dash, label=name)
         label_phones(axes, phones, float(times[-1]))
         figure.legend(loc="outside lower right", ncols=len(curves))
-        return ()
 
     return scroll_box(draw_svg(draw, WIDTH, HEIGHT, f"{label} over time"))
 
@@ -166,7 +167,7 @@ def cost_histogram(samples: Mapping[str, Sequence[float]]) -> str:
     """Histogram of the DTW costs of utterances, one outline for each method (SVG)."""
     edges = np.histogram_bin_edges(np.concatenate([np.asarray(values) for values in samples.values()]), N_BINS)
 
-    def draw(figure: "Figure") -> tuple[()]:
+    def draw(figure: "Figure") -> None:
         from matplotlib.ticker import MaxNLocator
 
         axes = _series_axes(figure, "utterances", "DTW cost")
@@ -174,7 +175,6 @@ def cost_histogram(samples: Mapping[str, Sequence[float]]) -> str:
             axes.stairs(np.histogram(values, edges)[0], edges, color=colour, linestyle=dash, linewidth=1.5, label=name)
         axes.yaxis.set_major_locator(MaxNLocator(integer=True))
         figure.legend(loc="outside lower right", ncols=len(samples))
-        return ()
 
     return scroll_box(draw_svg(draw, WIDTH, HEIGHT, "histogram of DTW costs"))
 
@@ -184,3 +184,12 @@ def _series_axes(figure: "Figure", y_label: str, x_label: str) -> "Axes":
     axes.grid(visible=False, axis="x")
     axes.set(xlabel=x_label, ylabel=y_label)
     return axes
+
+
+REPORT: Report[tuple[Evaluation, Sequence[SplitResult]]] = Report(
+    {
+        ".json": as_json(lambda found: found[0].to_json(), is_ascii=True),
+        ".csv": as_csv(lambda found: found[0].rows()),
+        ".html": as_html(lambda found: evaluation_page(*found)),
+    }
+)

@@ -79,9 +79,10 @@ class PeopleEvaluation:
             "n_utterances": self.n_utterances,
             "figures": {name: _plain(values) for name, values in self.figures.items()},
             "differences": [
-                {"method": one, "minus": other, **_plain(values)} for (one, other), values in self.differences.items()
+                {"method": difference, "minus": other, **_plain(values)}
+                for (difference, other), values in self.differences.items()
             ],
-            "phones": [asdict(one) for one in self.phones],
+            "phones": [asdict(phone) for phone in self.phones],
             "heard": {name: list(values) for name, values in self.heard.items()},
             "warnings": list(self.warnings),
         }
@@ -105,18 +106,18 @@ def evaluate_people(
         of the talker's.
     """
     tests = z_score_people(people)
-    warnings = check_unknown(talker, [one.observation for one in tests])
+    warnings = check_unknown(talker, [test.observation for test in tests])
     methods = dict(build_methods(talker))
     if talker.network is not None:
         methods[NETWORKS_METHOD] = _networks_method(talker.network)
     curves = synthesise_people(talker, methods, tests)
     if tracks is not None:
-        real = [ReferenceUtterance.of(one.observation, talker.model) for one in tests]
+        real = [ReferenceUtterance.of(test.observation, talker.model) for test in tests]
         mapped = iter(map_tracks(tracks, talker, real))
         curves |= synthesise_people(talker, {TRACKS_METHOD: lambda *_: next(mapped)}, tests)
     if sounds is not None:
         curves |= _heard_curves(talker, methods[DEFAULT_METHOD], tests, sounds)
-    heard = {label for one in talker.utterances for label in one.phones.phones}
+    heard = {label for utterance in talker.utterances for label in utterance.phones.phones}
     return replace(compare_people(tests, curves, n_people=len(people), heard=heard), warnings=warnings)
 
 
@@ -124,12 +125,12 @@ def _heard_curves(
     talker: Talker, method: SynthesisMethod, tests: Sequence[TestUtterance], sounds: Mapping[str, Path]
 ) -> dict[str, tuple[Floats, ...]]:
     """Curves of the default on phones that are found in the sounds, and of the audio maps."""
-    seen = [one.observation for one in tests]
+    seen = [test.observation for test in tests]
     curves: dict[str, tuple[Floats, ...]] = {}
     for name, phones in heard_phones(seen, sounds).items():
         spoken = [
-            replace(one, observation=replace(one.observation, phones=found))
-            for one, found in zip(tests, phones, strict=True)
+            replace(test, observation=replace(test.observation, phones=found))
+            for test, found in zip(tests, phones, strict=True)
         ]
         curves |= synthesise_people(talker, {name: method}, spoken)
     for name in talker.audio_maps:
@@ -146,23 +147,19 @@ def _networks_method(network: PhoneNetwork) -> SynthesisMethod:
 
 
 def z_score_people(people: Sequence[Sequence[Observation]]) -> tuple[TestUtterance, ...]:
-    """Utterances of all people with curves z-scored per person.
-
-    Raises
-    ------
-    InputError
-        There is no person, or a person has no utterance.
-    """
+    """Utterances of all people with curves z-scored per person."""
     if not people or not all(people):
         raise InputError("there is no utterance to test; give folders with tracks of people")
     found: list[TestUtterance] = []
     for utterances in people:
-        here = [speech_frames(one.phones, len(one.landmarks), one.fps) for one in utterances]
-        curves = [LipCurves.of(one.landmarks[span]).values() for one, span in zip(utterances, here, strict=True)]
+        here = [speech_frames(utterance.phones, len(utterance.landmarks), utterance.fps) for utterance in utterances]
+        curves = [
+            LipCurves.of(utterance.landmarks[span]).values() for utterance, span in zip(utterances, here, strict=True)
+        ]
         scale = CurveScale.of(curves)
         found += [
-            TestUtterance(one, span, scale.z_score(values))
-            for one, span, values in zip(utterances, here, curves, strict=True)
+            TestUtterance(utterance, span, scale.z_score(values))
+            for utterance, span, values in zip(utterances, here, curves, strict=True)
         ]
     return tuple(found)
 
@@ -181,7 +178,7 @@ def synthesise_people(
         motion = method(seen.phones, len(seen.landmarks), seen.fps)
         return scale.z_score(LipCurves.of_parameters(talker.model, motion[one.evaluated]).values())
 
-    return {name: tuple(curves(method, one) for one in tests) for name, method in methods.items()}
+    return {name: tuple(curves(method, test) for test in tests) for name, method in methods.items()}
 
 
 def compare_people(
@@ -208,12 +205,12 @@ def compare_people(
     return PeopleEvaluation(
         n_people,
         len(tests),
-        {name: estimate(one) for name, one in paired.items()},
+        {name: estimate(item) for name, item in paired.items()},
         {
-            (one, other): estimate_difference(paired[one], paired[other])
-            for one in paired
+            (item, other): estimate_difference(paired[item], paired[other])
+            for item in paired
             for other in others
-            if one != other and other in paired
+            if item != other and other in paired
         },
         _phone_figures(tests, curves, heard),
         {name: _heard_correlations(tests, values, heard) for name, values in curves.items()},
@@ -223,21 +220,21 @@ def compare_people(
 def pair_curves(tests: Sequence[TestUtterance], curves: Sequence[Floats]) -> PairedCurves:
     """Statistics of a method whose z-scored curves (T, 2) are given for each utterance."""
     costs = [
-        warping_cost(one.real, made, np.ones(2), round(DTW_BAND_S * one.observation.fps))
-        for one, made in zip(tests, curves, strict=True)
+        warping_cost(test.real, made, np.ones(2), round(DTW_BAND_S * test.observation.fps))
+        for test, made in zip(tests, curves, strict=True)
     ]
-    return PairedCurves.of([one.real for one in tests], curves, costs)
+    return PairedCurves.of([test.real for test in tests], curves, costs)
 
 
 def _phone_figures(
     tests: Sequence[TestUtterance], curves: Mapping[str, Sequence[Floats]], heard: Collection[str]
 ) -> tuple[PhoneFigures, ...]:
     rows: dict[str, list[Floats]] = {}  # by phone, for each token (1 + methods, 2)
-    for at, one in enumerate(tests):
-        every = np.stack([one.real, *(values[at] for values in curves.values())])
-        labels = _frame_phones(one)
+    for at, test in enumerate(tests):
+        every = np.stack([test.real, *(values[at] for values in curves.values())])
+        labels = _frame_phones(test)
         for number in np.unique(labels):
-            label = one.observation.phones.phones[number]
+            label = test.observation.phones.phones[number]
             if label != SILENCE:
                 rows.setdefault(label, []).append(every[:, labels == number].mean(axis=1))
     found = []
@@ -252,9 +249,9 @@ def _heard_correlations(
     tests: Sequence[TestUtterance], curves: Sequence[Floats], heard: Collection[str]
 ) -> tuple[float, float]:
     parts = []
-    for one in tests:
-        is_heard = np.array([label in heard or label == SILENCE for label in one.observation.phones.phones])
-        parts.append(is_heard[_frame_phones(one)])
+    for test in tests:
+        is_heard = np.array([label in heard or label == SILENCE for label in test.observation.phones.phones])
+        parts.append(is_heard[_frame_phones(test)])
     known = np.concatenate(parts)
     real, made = (np.concatenate([values[:, 0] for values in some]) for some in ([t.real for t in tests], curves))
 
@@ -264,10 +261,10 @@ def _heard_correlations(
     return correlation(known), correlation(~known)
 
 
-def _frame_phones(one: TestUtterance) -> NDArray[np.int64]:
+def _frame_phones(test: TestUtterance) -> NDArray[np.int64]:
     """(T,) index of the phone at each evaluated frame."""
-    phones = one.observation.phones
-    times = np.arange(one.evaluated.start, one.evaluated.start + len(one.real)) / one.observation.fps
+    phones = test.observation.phones
+    times = np.arange(test.evaluated.start, test.evaluated.start + len(test.real)) / test.observation.fps
     return np.clip(np.searchsorted(phones.edges, times, side="right") - 1, 0, len(phones) - 1)
 
 

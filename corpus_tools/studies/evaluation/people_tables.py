@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from corpus_tools.measures.intervals import IntervalEstimate
 from corpus_tools.studies.evaluation.people import PeopleEvaluation
-from corpus_tools.studies.evaluation.tables import markdown_table
+from corpus_tools.studies.report import Report, as_csv, as_json, markdown_table
 
 FIGURE_HEADS = (
     ("r_opening", "r opening"), ("r_width", "r width"), ("dtw_cost", "DTW cost"),
@@ -25,8 +25,8 @@ def people_table(found: PeopleEvaluation) -> str:
 def difference_table(found: PeopleEvaluation, method: str) -> str:
     """Markdown table of the differences of a method from the others, with paired intervals."""
     rows = [(f"{method} minus", *(head for _, head in FIGURE_HEADS))]
-    for (one, other), values in found.differences.items():
-        if one == method:
+    for (difference, other), values in found.differences.items():
+        if difference == method:
             rows.append((other, *(_interval_text(values[name], signed=True) for name, _ in FIGURE_HEADS)))
     return markdown_table(rows)
 
@@ -34,9 +34,11 @@ def difference_table(found: PeopleEvaluation, method: str) -> str:
 def phone_table(found: PeopleEvaluation, methods: Sequence[str]) -> str:
     """Markdown table of mean opening and width by phone in z, recorded and of some methods."""
     rows = [("phone", "tokens", "in the talker", "recorded: opening, width", *methods)]
-    for one in found.phones:
-        cells = (_pair_text(one.made[method]) for method in methods)
-        rows.append((one.phone, str(one.n_tokens), "yes" if one.is_heard else "no", _pair_text(one.real), *cells))
+    for phone in found.phones:
+        cells = (_pair_text(phone.made[method]) for method in methods)
+        rows.append(
+            (phone.phone, str(phone.n_tokens), "yes" if phone.is_heard else "no", _pair_text(phone.real), *cells)
+        )
     return markdown_table(rows)
 
 
@@ -46,9 +48,9 @@ def people_rows(found: PeopleEvaluation) -> Iterator[tuple[str, ...]]:
     for method, figures in found.figures.items():
         for name, value in figures.items():
             yield "people", method, name, *_interval_cells(value)
-    for (one, other), values in found.differences.items():
+    for (difference, other), values in found.differences.items():
         for name, value in values.items():
-            yield f"minus {other}", one, name, *_interval_cells(value)
+            yield f"minus {other}", difference, name, *_interval_cells(value)
 
 
 def _interval_text(value: IntervalEstimate, *, signed: bool) -> str:
@@ -66,3 +68,8 @@ def _plain_text(value: float) -> str:
 
 def _pair_text(pair: tuple[float, float]) -> str:
     return f"{pair[0]:+.2f}, {pair[1]:+.2f}"
+
+
+REPORT: Report[PeopleEvaluation] = Report(
+    {".json": as_json(PeopleEvaluation.to_json, is_ascii=True), ".csv": as_csv(people_rows)}
+)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from corpus_tools.measures.scores import FIGURES, Scores, available_figures
+from corpus_tools.studies.report import markdown_table
 
 TRUE_DURATIONS, OWN_DURATIONS, OTHER_TALKER = "true durations", "own durations", "another talker"
 AS_TRACKED = "true durations, recorded face not corrected for head pose"
@@ -67,10 +68,10 @@ class Evaluation:
         """Markdown table of the standard deviation of each figure over the folds, one method a line."""
         heads = available_figures(self.scores)
         rows = [("method", *(head for _, head, _ in heads))]
-        for one in self.scores:
-            spreads = (self.fold_mean_and_deviation(one.method, name)[1] for name, _, _ in heads)
+        for score in self.scores:
+            spreads = (self.fold_mean_and_deviation(score.method, name)[1] for name, _, _ in heads)
             cells = (f"{spread:.{digits}f}" for spread, (_, _, digits) in zip(spreads, heads, strict=True))
-            rows.append((one.method, *cells))
+            rows.append((score.method, *cells))
         return markdown_table(rows)
 
     def fold_mean_and_deviation(self, method: str, figure: str) -> tuple[float, float]:
@@ -84,7 +85,7 @@ class Evaluation:
         Cells are empty for values that a table lacks and for the intervals of folds.
         """
         head = ("table", "method", *(part for name, _, _ in FIGURES for part in (name, f"{name}_low", f"{name}_high")))
-        rows = [(name, one.method, *_interval_cells(one)) for name, scores in self.tables() for one in scores]
+        rows = [(name, score.method, *_interval_cells(score)) for name, scores in self.tables() for score in scores]
         for number, fold in enumerate(self.folds, start=1):
             rows += [(f"fold {number}", name, *_value_cells(values)) for name, values in fold.figures.items()]
         return (head, *rows)
@@ -94,25 +95,21 @@ def figure_rows(scores: Sequence[Scores], *, intervals: bool = False) -> list[tu
     """Heads of a table of figures, and a row for each method."""
     heads = available_figures(scores)
     rows = [("method", *(head for _, head, _ in heads))]
-    for one in scores:
-        rows.append((one.method, *(figure_text(one, name, digits, intervals=intervals) for name, _, digits in heads)))
+    for score in scores:
+        rows.append(
+            (score.method, *(figure_text(score, name, digits, intervals=intervals) for name, _, digits in heads))
+        )
     return rows
 
 
 def class_rows(scores: Sequence[Scores]) -> list[tuple[str, ...]]:
     """Heads of a table of the classes of phones, and a row for each method and class."""
     rows: list[tuple[str, ...]] = [("method", "phones", "frames", "RMSE z", "opening error", "opening bias")]
-    for one in scores:
-        for some in one.classes:
+    for score in scores:
+        for some in score.classes:
             error, bias = f"{some.opening_error:.4f}", f"{some.opening_bias:+.4f}"
-            rows.append((one.method, some.phones, str(some.n_frames), f"{some.rmse_z:.3f}", error, bias))
+            rows.append((score.method, some.phones, str(some.n_frames), f"{some.rmse_z:.3f}", error, bias))
     return rows
-
-
-def markdown_table(rows: Sequence[Sequence[str]]) -> str:
-    """A table in Markdown; the first row is its heading."""
-    lines = [f"| {' | '.join(row)} |" for row in rows]
-    return "\n".join([lines[0], "| --- |" + " --- |" * (len(rows[0]) - 1), *lines[1:]])
 
 
 def figure_text(scores: Scores, name: str, digits: int, *, intervals: bool) -> str:

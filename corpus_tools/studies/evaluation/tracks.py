@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.measures.reference import ReferenceUtterance
-from corpus_tools.training.linear_audio_map import fit_ridge
+from corpus_tools.training.ridge import fit_ridge
 from lexicon.errors import DataError, InputError
 from lexicon.values.tables import parse_cell, read_table
 from tts2face.models.talker import Talker
@@ -60,14 +60,8 @@ def read_tracks(path: Path) -> Mapping[str, ExternalTrack]:
 def map_tracks(
     tracks: Mapping[str, ExternalTrack], talker: Talker, real: Sequence[ReferenceUtterance]
 ) -> tuple[NDArray[np.float32], ...]:
-    """Speech parameters (T, S) of the held-out utterances, by a ridge regression fitted on the training ones.
-
-    Raises
-    ------
-    InputError
-        A held-out utterance has no track, or too few training ones have.
-    """
-    if missing := [one.observation.name for one in real if one.observation.name not in tracks]:
+    """Speech parameters (T, S) of the held-out utterances, by a ridge regression fitted on the training ones."""
+    if missing := [reference.observation.name for reference in real if reference.observation.name not in tracks]:
         raise InputError(f"the tracks lack {missing[0]} ({len(missing)} of {len(real)} held-out utterances); add them")
     known = [utterance for utterance in talker.utterances if utterance.name in tracks]
     if len(known) < MIN_TRAINING_UTTERANCES:
@@ -75,8 +69,10 @@ def map_tracks(
             f"the tracks hold {len(known)} training utterances; their linear map needs {MIN_TRAINING_UTTERANCES}"
         )
     n_speech = talker.model.n_speech
-    terms = np.concatenate([tracks[one.name].at(np.arange(len(one.shape)) / talker.fps) for one in known])
-    targets = np.concatenate([one.shape[:, :n_speech] for one in known]).astype(np.float64)
+    terms = np.concatenate(
+        [tracks[recording.name].at(np.arange(len(recording.shape)) / talker.fps) for recording in known]
+    )
+    targets = np.concatenate([recording.shape[:, :n_speech] for recording in known]).astype(np.float64)
     spread = np.maximum(terms.std(axis=0), 1e-9)
     middle = targets.mean(axis=0)
     fit = fit_ridge(terms / spread, targets - middle)
@@ -86,4 +82,4 @@ def map_tracks(
         seen = tracks[one.observation.name].at(times) / spread
         return np.asarray(middle + (seen - fit.mean) @ fit.weights, np.float32)
 
-    return tuple(mapped_parameters(one) for one in real)
+    return tuple(mapped_parameters(reference) for reference in real)

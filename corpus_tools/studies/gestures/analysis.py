@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.studies.gestures.blinks import find_blinks
+from corpus_tools.studies.gestures.body import BodyMeasure, measure_body
 from corpus_tools.studies.gestures.clips import (
     LongRun,
     field_clip,
@@ -18,21 +20,16 @@ from corpus_tools.studies.gestures.clips import (
 )
 from corpus_tools.studies.gestures.gaze import GazeStudy, study_gaze
 from corpus_tools.studies.gestures.measures import (
-    BodyMeasure,
     Spectrum,
-    Trait,
     diversity,
-    find_blinks,
     frame_midpoints,
-    in_display_units,
-    measure_body,
     random_halves,
     ratio,
     spectrum,
     split_recordings,
-    style_traits,
     wasserstein,
 )
+from corpus_tools.studies.gestures.traits import Trait, in_display_units, style_traits
 from lexicon.errors import InputError
 from lexicon.values.fields import check_fields
 from tts2face.gestures.stream import GestureFields
@@ -128,8 +125,8 @@ class FeatureComparison:
     @property
     def fast_power(self) -> tuple[float, ...]:
         """Power above `measures.FAST_HZ` of field, noise and published field, over that of the recordings."""
-        real, *others = (one.fast_power for one in self.spectra)
-        return tuple(ratio(one, real) for one in others)
+        real, *others = (each_spectrum.fast_power for each_spectrum in self.spectra)
+        return tuple(ratio(other, real) for other in others)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,9 +164,16 @@ class GestureStudy:
     def targets(self) -> tuple[int, int]:
         """Number of targets of measured styles and of the gaze that are met, and number of targets."""
         measured = [style for style in self.styles if style.source is None]
-        kept = [one.is_met for style in measured for one in style.trait_comparisons if one.trait.has_target]
-        kept += [one.follows_sound for style in measured for one in style.motion_comparisons if one.feature == "head"]
-        kept += [one.is_met for one in self.gaze.comparisons] if self.gaze is not None else []
+        kept = [
+            compared.is_met for style in measured for compared in style.trait_comparisons if compared.trait.has_target
+        ]
+        kept += [
+            moving.follows_sound
+            for style in measured
+            for moving in style.motion_comparisons
+            if moving.feature == "head"
+        ]
+        kept += [comparison.is_met for comparison in self.gaze.comparisons] if self.gaze is not None else []
         return sum(kept), len(kept)
 
 
@@ -254,8 +258,8 @@ def _compare_trait(trait: Trait, held_out: Style, kinds: list[list[Motion]], opt
     clips, noises, published = ([np.concatenate(values_of(clip)) for clip in kind] for kind in kinds[1:])
     generator = np.random.default_rng([options.seed, 2])
     between_halves = [
-        wasserstein(np.concatenate([parts[i] for i in one]), np.concatenate([parts[i] for i in other]))
-        for one, other in random_halves(len(parts), options.halves, generator)
+        wasserstein(np.concatenate([parts[i] for i in half]), np.concatenate([parts[i] for i in other]))
+        for half, other in random_halves(len(parts), options.halves, generator)
         if len(parts) > 1
     ]
     real = np.concatenate(parts)
@@ -287,14 +291,16 @@ def _compare_motion(palette: Palette, held_out: Style, kinds: list[list[Motion]]
             float(
                 np.mean(
                     [
-                        pearson(trait.values_of(split_recordings(one[feature], held_out.lengths)), intensity)
-                        for one in kind
+                        pearson(trait.values_of(split_recordings(item[feature], held_out.lengths)), intensity)
+                        for item in kind
                     ]
                 )
             )
             for kind in kinds
         ]
-        diversities = [_diversity([one[feature] for one in kind], real[feature], held_out) for kind in (clips, noises)]
+        diversities = [
+            _diversity([item[feature] for item in kind], real[feature], held_out) for kind in (clips, noises)
+        ]
         unit = trait.unit.removesuffix("/s")
         found.append(
             FeatureComparison(

@@ -25,6 +25,11 @@ from tts2face.types import Waveform
 
 Floats = NDArray[np.float32]
 NO_SOUND = Waveform(np.zeros(2, np.float32), 16000)
+MINUTES = 10
+VISITED_AFTER = (1, 3, MINUTES)  # minutes
+LAGS_S = 300  # half of the clip, so that each lag is averaged over at least five minutes
+FROM_S = 5  # shorter lags are within one gesture
+Doubles = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,14 +107,6 @@ def noise_clip(fields: GestureFields, style: str, n_frames: int, seed: int) -> M
     """All features of a style from noise, which does not depend on the sound."""
     stream = NoiseStream(fields, style=style, seed=seed, fps=GESTURE_FPS)
     return stream.next(NO_SOUND, n_frames, Timeline())
-
-
-MINUTES = 10
-VISITED_AFTER = (1, 3, MINUTES)  # minutes
-LAGS_S = 300  # half of the clip, so that each lag is averaged over at least five minutes
-FROM_S = 5  # shorter lags are within one gesture
-
-Doubles = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -108,8 +108,8 @@ def compare(people: Sequence[Mapping[str, Fixations]], model: GazeModel, *, n_ma
         measured[state] = tuple(measures(person[state]) for person in people)
         made[state] = tuple(measures(made_person(model, state, seed + at)) for at in range(n_made))
         for trait, distance in TRAITS.items():
-            between = [distance(one, other) for one, other in combinations(measured[state], 2)]
-            to_made = [distance(one, other) for one in measured[state] for other in made[state]]
+            between = [distance(taken, other) for taken, other in combinations(measured[state], 2)]
+            to_made = [distance(item, other) for item in measured[state] for other in made[state]]
             found.append(GazeComparison(state, trait, float(np.nanmedian(between)), float(np.nanmedian(to_made))))
     return GazeStudy(measured, made, tuple(found))
 

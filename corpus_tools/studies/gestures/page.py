@@ -1,7 +1,4 @@
-"""HTML page of a gesture study.
-
-Plots of a style: distributions, spectra and autocorrelations of recordings, fields and noise.
-"""
+"""HTML page of a gesture study."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -23,7 +20,7 @@ from corpus_tools.studies.gestures.clips import FROM_S, LAGS_S, MINUTES, VISITED
 from corpus_tools.studies.gestures.gaze import GazeStudy
 from corpus_tools.studies.gestures.measures import FAST_HZ, ratio
 from corpus_tools.studies.pages import note_paragraph, page, paragraphs, scroll_box, table
-from corpus_tools.studies.plots import SERIES, draw_png, draw_svg
+from corpus_tools.studies.plots import SERIES, Plot, draw_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,6 +34,7 @@ SHOWN = 0.995  # share of the values within a plot; the others count in its firs
 DECADES = 7  # of a spectrum
 MOST_HZ = 15.0  # half of the frame rate of gestures
 SUMMARY_TRAITS = ("head speed", "brow height", "blink interval", "blink duration")  # traits in the picture
+LAYOUT = "<style>.panels { display: flex; flex-wrap: wrap; gap: .5rem 1rem; }</style>"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,25 +53,23 @@ def series_names(style: StyleStudy) -> tuple[str, ...]:
 def panel_svg(panel: Panel) -> str:
     """A panel for a page."""
 
-    def draw(figure: "Figure") -> tuple[()]:
+    def draw(figure: "Figure") -> None:
         figure.set_layout_engine("none")  # a constrained layout takes twice as long
         panel.draw(figure.subplots(gridspec_kw=MARGINS))
-        return ()
 
     return draw_svg(draw, WIDTH, HEIGHT, panel.title)
 
 
-def panels_png(title: str, panels: Sequence[Panel]) -> bytes:
-    """The panels in rows of `COLUMNS` below a title, as PNG bytes."""
+def panels_plot(title: str, panels: Sequence[Panel]) -> Plot:
+    """The panels in rows of `COLUMNS` below a title."""
     rows = -(-len(panels) // COLUMNS)
 
-    def draw(figure: "Figure") -> tuple[()]:
+    def draw(figure: "Figure") -> None:
         figure.suptitle(title)
         for at, panel in enumerate(panels, start=1):
             panel.draw(figure.add_subplot(rows, COLUMNS, at))
-        return ()
 
-    return draw_png(draw, COLUMNS * WIDTH, rows * HEIGHT + HEAD)
+    return Plot(draw, COLUMNS * WIDTH, rows * HEIGHT + HEAD, title)
 
 
 def distribution_panel(style: StyleStudy, compared: TraitComparison) -> Panel:
@@ -106,10 +102,12 @@ def spectrum_panel(style: StyleStudy, moving: FeatureComparison) -> Panel:
     def draw(axes: "Axes") -> None:
         from matplotlib.ticker import NullLocator
 
-        highest = [np.nanmax(one.power[1:]) for one in moving.spectra[:2] if np.isfinite(one.power[1:]).any()]
+        highest = [
+            np.nanmax(spectrum.power[1:]) for spectrum in moving.spectra[:2] if np.isfinite(spectrum.power[1:]).any()
+        ]
         top = float(np.ceil(np.log10(max(highest, default=1.0))))
-        for name, one, (colour, dash) in zip(series_names(style), moving.spectra, SERIES, strict=False):
-            axes.plot(one.hz[1:], np.maximum(one.power[1:], 1e-30), color=colour, linestyle=dash, label=name)
+        for name, spectrum, (colour, dash) in zip(series_names(style), moving.spectra, SERIES, strict=False):
+            axes.plot(spectrum.hz[1:], np.maximum(spectrum.power[1:], 1e-30), color=colour, linestyle=dash, label=name)
         axes.set(
             title=title, xlabel="frequency, Hz", ylabel=f"power, {moving.unit}²/Hz" if moving.unit else "power, 1/Hz"
         )
@@ -138,8 +136,14 @@ def autocorrelation_panel(style: StyleStudy, feature: str) -> Panel:
 
 def summary_panels(style: StyleStudy) -> Sequence[Panel]:
     """The panels of the summary picture."""
-    traits = [distribution_panel(style, one) for one in style.trait_comparisons if one.trait.name in SUMMARY_TRAITS]
-    spectra = [spectrum_panel(style, one) for one in style.motion_comparisons if one.feature in {"head", "brows"}]
+    traits = [
+        distribution_panel(style, compared)
+        for compared in style.trait_comparisons
+        if compared.trait.name in SUMMARY_TRAITS
+    ]
+    spectra = [
+        spectrum_panel(style, moving) for moving in style.motion_comparisons if moving.feature in {"head", "brows"}
+    ]
     return [*traits, *spectra] or [distribution_panel(style, style.trait_comparisons[0])]
 
 
@@ -149,9 +153,6 @@ def _limits(values: NDArray[np.float64]) -> tuple[float, float]:
     low, high = np.quantile(values, [1 - SHOWN, SHOWN])
     low = 0.0 if values.min() >= 0 else float(low)
     return (low, float(high)) if high > low else (low - 0.5, low + 0.5)
-
-
-LAYOUT = "<style>.panels { display: flex; flex-wrap: wrap; gap: .5rem 1rem; }</style>"
 
 
 def gestures_page(study: GestureStudy) -> str:
@@ -167,8 +168,14 @@ def gestures_page(study: GestureStudy) -> str:
 
 def _gaze(study: GazeStudy) -> list[str]:
     rows = [
-        (one.state, one.trait, format_number(one.people, 3), format_number(one.made, 3), _met(one.is_met))
-        for one in study.comparisons
+        (
+            comparison.state,
+            comparison.trait,
+            format_number(comparison.people, 3),
+            format_number(comparison.made, 3),
+            _met(comparison.is_met),
+        )
+        for comparison in study.comparisons
     ]
     head = ("state", "trait", "two people", "a made one and a person", "target")
     n_made = len(next(iter(study.made.values())))
@@ -190,15 +197,15 @@ def gaze_panels(study: GazeStudy) -> list[Panel]:
 
 def _survival_panel(study: GazeStudy, state: str, name: str, trait: str) -> Panel:
     title = f"{state}: {name.partition(',')[0]}"
-    people, made = ([getattr(one, trait) for one in kind[state]] for kind in (study.people, study.made))
+    people, made = ([getattr(item, trait) for item in kind[state]] for kind in (study.people, study.made))
 
     def draw(axes: "Axes") -> None:
         from matplotlib.ticker import NullFormatter
 
         kinds = ("people", people, 1.4), ("made", made[: len(people)], 0.8)
         for (label, ones, width), (colour, _) in zip(kinds, SERIES, strict=False):
-            for at, one in enumerate([one for one in ones if one is not None]):
-                (line,) = axes.step(one.values, 100 * one.shares, where="post", label=label if at == 0 else None)
+            for at, item in enumerate([item for item in ones if item is not None]):
+                (line,) = axes.step(item.values, 100 * item.shares, where="post", label=label if at == 0 else None)
                 line.set(color=colour, linewidth=width, alpha=0.5)
         axes.set(title=title, xlabel=name, ylabel="% longer", xscale="log", ylim=(0, 100))
         axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
@@ -211,8 +218,14 @@ def _survival_panel(study: GazeStudy, state: str, name: str, trait: str) -> Pane
 
 def _body(study: GestureStudy) -> str:
     rows = [
-        (one.name, format_number(one.value), one.unit, f"{one.published[0]:g} to {one.published[1]:g}", one.source)
-        for one in study.body
+        (
+            measure.name,
+            format_number(measure.value),
+            measure.unit,
+            f"{measure.published[0]:g} to {measure.published[1]:g}",
+            measure.source,
+        )
+        for measure in study.body
     ]
     return table(("what", "made", "unit", "published", "source"), rows, numbers=(1,)) + note_paragraph(
         "Of any style and face that has them; the seed is that of the study."
@@ -241,18 +254,18 @@ def _method(study: GestureStudy) -> str:
 
 def _style(style: StyleStudy) -> list[str]:
     by_feature: dict[str, list[TraitComparison]] = {}
-    for one in style.trait_comparisons:
-        by_feature.setdefault(one.trait.feature, []).append(one)
+    for compared in style.trait_comparisons:
+        by_feature.setdefault(compared.trait.feature, []).append(compared)
     return [
         f"<h2>{escape(style.name)}</h2>",
         _origin(style),
         _distances(style),
         "<h3>Distributions</h3>",
         note_paragraph("Values outside a plot count in its first or last bin."),
-        _panels(distribution_panel(style, one) for ones in by_feature.values() for one in ones),
+        _panels(distribution_panel(style, item) for ones in by_feature.values() for item in ones),
         "<h3>Spectra, sound, seeds</h3>",
         _motion_table(style),
-        _panels(spectrum_panel(style, one) for one in style.motion_comparisons),
+        _panels(spectrum_panel(style, moving) for moving in style.motion_comparisons),
         *_long_run(style),
     ]
 
@@ -279,20 +292,23 @@ def _distances(style: StyleStudy) -> str:
     real, *_ = series_names(style)
     rows = [
         (
-            one.trait.name,
-            one.trait.unit,
-            str(len(one.real)),
+            compared.trait.name,
+            compared.trait.unit,
+            str(len(compared.real)),
             *(
                 format_number(float(np.mean(values)) if len(values) else np.nan)
-                for values in (one.real, one.field, one.noise, one.published)
+                for values in (compared.real, compared.field, compared.noise, compared.published)
             ),
-            *(format_number(apart, 3) for apart in (one.halves, one.to_field, one.to_noise, one.to_published)),
-            format_number(ratio(one.to_field, one.halves)),
-            format_number(ratio(one.to_field, one.to_noise)),
-            format_number(ratio(one.to_published, one.halves)),
-            target_result(style, one),
+            *(
+                format_number(apart, 3)
+                for apart in (compared.halves, compared.to_field, compared.to_noise, compared.to_published)
+            ),
+            format_number(ratio(compared.to_field, compared.halves)),
+            format_number(ratio(compared.to_field, compared.to_noise)),
+            format_number(ratio(compared.to_published, compared.halves)),
+            target_result(style, compared),
         )
-        for one in style.trait_comparisons
+        for compared in style.trait_comparisons
     ]
     head = ("trait", "unit", "n", f"mean {real}", "field", "noise", "ju2008")
     distances = ("W halves", "W field", "W noise", "W ju2008")
@@ -315,13 +331,13 @@ def _motion_table(style: StyleStudy) -> str:
     real, *_ = series_names(style)
     rows = [
         (
-            one.feature,
-            *(format_number(r) for r in _pad_columns(one.with_intensity, 4)),
-            _correlation_result(style, one),
-            *(format_number(share) for share in _pad_columns(one.fast_power, 3)),
-            *(format_number(share) for share in one.diversity),
+            moving.feature,
+            *(format_number(r) for r in _pad_columns(moving.with_intensity, 4)),
+            _correlation_result(style, moving),
+            *(format_number(share) for share in _pad_columns(moving.fast_power, 3)),
+            *(format_number(share) for share in moving.diversity),
         )
-        for one in style.motion_comparisons
+        for moving in style.motion_comparisons
     ]
     above = f"power above {FAST_HZ:g} Hz / {real}"
     correlations = (f"r of speed with intensity: {real}", "field", "noise", "ju2008", "target")
@@ -336,10 +352,10 @@ def _pad_columns(values: tuple[float, ...], n: int) -> tuple[float, ...]:
     return (*values, *[float("nan")] * (n - len(values)))
 
 
-def _correlation_result(style: StyleStudy, one: FeatureComparison) -> str:
-    if one.feature != "head" or style.source is not None:
+def _correlation_result(style: StyleStudy, moving: FeatureComparison) -> str:
+    if moving.feature != "head" or style.source is not None:
         return ""
-    return _met(one.follows_sound)
+    return _met(moving.follows_sound)
 
 
 def _long_run(style: StyleStudy) -> list[str]:

@@ -1,14 +1,6 @@
-"""Write the study of a palette as HTML, JSON, CSV or PNG.
+"""The study of a palette as a page, a line for each trait, all figures and the main plots, and their files."""
 
-Export of a gesture study: one line for each trait as CSV, all figures as JSON.
-"""
-
-import csv
-import json
-from collections.abc import Callable, Mapping
-from io import StringIO
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -23,10 +15,10 @@ from corpus_tools.studies.gestures.analysis import (
     study_gestures,
 )
 from corpus_tools.studies.gestures.clips import VISITED_AFTER
-from corpus_tools.studies.gestures.page import gestures_page, panels_png, summary_panels, target_result
-from corpus_tools.studies.pages import report_writer
+from corpus_tools.studies.gestures.page import gestures_page, panels_plot, summary_panels, target_result
+from corpus_tools.studies.plots import Plot
+from corpus_tools.studies.report import Report, Rows, as_csv, as_html, as_json, as_png
 from tts2face.models.palette_file import load_palette
-from tts2face.storage.files import write_atomically
 from tts2face.types import Progress
 
 KINDS = ("real", "field", "noise", "ju2008")  # the last one of measured styles only
@@ -34,22 +26,25 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 HEAD = ("style", "source", "trait", "unit", "n", "w_halves", "w_field", "w_noise", "w_ju2008", "target")
 
 
-def gestures_csv(study: GestureStudy) -> str:
+def gesture_rows(study: GestureStudy) -> Rows:
     """Distances of the traits of every style."""
-    file = StringIO()
-    rows = csv.writer(file, lineterminator="\n")
-    rows.writerow(HEAD)
+    yield HEAD
     for style in study.styles:
-        for one in style.trait_comparisons:
-            distances = [_cell(value) for value in (one.halves, one.to_field, one.to_noise, one.to_published)]
-            trait = one.trait
-            rows.writerow(
-                [style.name, style.source, trait.name, trait.unit, len(one.real), *distances, target_result(style, one)]
-            )
-    return file.getvalue()
+        for compared in style.trait_comparisons:
+            distances = (compared.halves, compared.to_field, compared.to_noise, compared.to_published)
+            trait = compared.trait
+            yield [
+                style.name,
+                style.source,
+                trait.name,
+                trait.unit,
+                len(compared.real),
+                *map(_cell, distances),
+                target_result(style, compared),
+            ]
 
 
-def gestures_json(study: GestureStudy) -> str:
+def gesture_figures(study: GestureStudy) -> dict[str, Any]:
     """All figures, and quantiles of the values."""
     options = study.options
     content: dict[str, Any] = {
@@ -61,21 +56,26 @@ def gestures_json(study: GestureStudy) -> str:
         "quantiles": list(QUANTILES),
         "styles": [_style(style) for style in study.styles],
         "body": [
-            {"name": one.name, "value": _round_number(one.value), "unit": one.unit, "published": list(one.published)}
-            for one in study.body
+            {
+                "name": measure.name,
+                "value": _round_number(measure.value),
+                "unit": measure.unit,
+                "published": list(measure.published),
+            }
+            for measure in study.body
         ],
     }
     if study.gaze is not None:
         content["gaze"] = [
             {
-                "state": one.state,
-                "trait": one.trait,
-                "people": _round_number(one.people),
-                "made": _round_number(one.made),
+                "state": comparison.state,
+                "trait": comparison.trait,
+                "people": _round_number(comparison.people),
+                "made": _round_number(comparison.made),
             }
-            for one in study.gaze.comparisons
+            for comparison in study.gaze.comparisons
         ]
-    return json.dumps(content, ensure_ascii=False, indent=1) + "\n"
+    return content
 
 
 def _style(style: StyleStudy) -> dict[str, Any]:
@@ -87,8 +87,8 @@ def _style(style: StyleStudy) -> dict[str, Any]:
         "recordings_learnt": style.n_training,
         "recordings_held_out": style.n_held_out if style.is_held_out else 0,
         "blinks_per_minute": _by_kind(style.blinks_per_minute),
-        "traits": [_trait_figures(style, one) for one in style.trait_comparisons],
-        "features": [_motion_figures(one) for one in style.motion_comparisons],
+        "traits": [_trait_figures(style, compared) for compared in style.trait_comparisons],
+        "features": [_motion_figures(moving) for moving in style.motion_comparisons],
         "visited": {
             feature: {
                 f"{minutes} min": _round_number(share) for minutes, share in zip(VISITED_AFTER, shares, strict=True)
@@ -98,44 +98,44 @@ def _style(style: StyleStudy) -> dict[str, Any]:
         "repetition": {
             feature: {
                 kind: _round_number(value)
-                for kind, value in zip(("real", "speech", "silence"), one.highest, strict=True)
+                for kind, value in zip(("real", "speech", "silence"), item.highest, strict=True)
             }
-            for feature, one in style.long_run.repetition.items()
+            for feature, item in style.long_run.repetition.items()
         },
     }
 
 
-def _trait_figures(style: StyleStudy, one: TraitComparison) -> dict[str, Any]:
-    kinds = {"real": one.real, "field": one.field, "noise": one.noise}
-    if len(one.published):
-        kinds["ju2008"] = one.published
+def _trait_figures(style: StyleStudy, compared: TraitComparison) -> dict[str, Any]:
+    kinds = {"real": compared.real, "field": compared.field, "noise": compared.noise}
+    if len(compared.published):
+        kinds["ju2008"] = compared.published
     return {
-        "name": one.trait.name,
-        "unit": one.trait.unit,
-        "feature": one.trait.feature,
-        "n": len(one.real),
-        "halves": _round_number(one.halves),
-        "field": _round_number(one.to_field),
-        "noise": _round_number(one.to_noise),
-        "ju2008": _round_number(one.to_published),
-        "target": target_result(style, one) or None,
+        "name": compared.trait.name,
+        "unit": compared.trait.unit,
+        "feature": compared.trait.feature,
+        "n": len(compared.real),
+        "halves": _round_number(compared.halves),
+        "field": _round_number(compared.to_field),
+        "noise": _round_number(compared.to_noise),
+        "ju2008": _round_number(compared.to_published),
+        "target": target_result(style, compared) or None,
         "means": {kind: _round_number(float(values.mean())) if len(values) else None for kind, values in kinds.items()},
         "quantiles": {kind: _quantiles(values) for kind, values in kinds.items()},
     }
 
 
-def _motion_figures(one: FeatureComparison) -> dict[str, Any]:
+def _motion_figures(moving: FeatureComparison) -> dict[str, Any]:
     return {
-        "name": one.feature,
-        "r_with_intensity": _by_kind(one.with_intensity),
-        "fast_power": {kind: _round_number(share) for kind, share in zip(KINDS[1:], one.fast_power, strict=False)},
+        "name": moving.feature,
+        "r_with_intensity": _by_kind(moving.with_intensity),
+        "fast_power": {kind: _round_number(share) for kind, share in zip(KINDS[1:], moving.fast_power, strict=False)},
         "diversity": {
-            kind: _round_number(share) for kind, share in zip(("field", "noise"), one.diversity, strict=True)
+            kind: _round_number(share) for kind, share in zip(("field", "noise"), moving.diversity, strict=True)
         },
-        "hz": one.spectra[0].hz.round(4).tolist(),
+        "hz": moving.spectra[0].hz.round(4).tolist(),
         "power": {
             kind: [_round_number(float(value)) for value in spectrum.power]
-            for kind, spectrum in zip(KINDS, one.spectra, strict=False)
+            for kind, spectrum in zip(KINDS, moving.spectra, strict=False)
         },
     }
 
@@ -170,22 +170,19 @@ def write_gestures(
     BackendError
         matplotlib is not installed, or the file cannot be written.
     """
-    writer = report_writer(out, WRITERS)
-    found = study_gestures(palette, load_palette(palette), options, on_progress)
-    write_atomically(out, writer(found))
-    return found
+    return REPORT.write(out, lambda: study_gestures(palette, load_palette(palette), options, on_progress))
 
 
-def _summary_png(found: GestureStudy) -> bytes:
+def _summary_plot(found: GestureStudy) -> Plot:
     first = found.styles[0]
-    return panels_png(f"Gestures of {first.name}: recordings, fields, noise, published fields", summary_panels(first))
+    return panels_plot(f"Gestures of {first.name}: recordings, fields, noise, published fields", summary_panels(first))
 
 
-WRITERS: Mapping[str, Callable[[GestureStudy], bytes]] = MappingProxyType(
+REPORT: Report[GestureStudy] = Report(
     {
-        ".html": lambda found: gestures_page(found).encode(),
-        ".csv": lambda found: gestures_csv(found).encode(),
-        ".json": lambda found: gestures_json(found).encode(),
-        ".png": _summary_png,
+        ".html": as_html(gestures_page),
+        ".csv": as_csv(gesture_rows),
+        ".json": as_json(gesture_figures),
+        ".png": as_png(_summary_plot),
     }
 )

@@ -82,7 +82,7 @@ class RetargetingStudy:
     @property
     def differences(self) -> FloatArray:
         """Differences (P, S), face minus person, of the judged phones."""
-        judged = [one.face - one.person for one in self.phones if one.is_judged]
+        judged = [phone.face - phone.person for phone in self.phones if phone.is_judged]
         return np.array(judged, np.float64).reshape(len(judged), len(SCORES))
 
     @property
@@ -119,15 +119,6 @@ def study_retargeting(
         Name of the face.
     stages
         Called with the name of each stage at its start.
-
-    Raises
-    ------
-    InputError
-        There is no recording, or none could be used.
-    DataError
-        The face cannot be moved by speech, or the tracker does not find it in its pictures.
-    BackendError
-        A package or the landmark models are missing.
     """
     options = run_options or RunOptions()
     kept = check_any_kept(observe(recordings, run_options=options, on_progress=stages(READING_STAGE)))
@@ -136,7 +127,7 @@ def study_retargeting(
     return RetargetingStudy(
         name,
         len(mimicked),
-        sum(len(one.person) for one in mimicked),
+        sum(len(recording.person) for recording in mimicked),
         phone_scores(mimicked),
         mouth_motion(mimicked),
     )
@@ -150,7 +141,7 @@ def mimic_recordings(
     renderer = mesh_renderer(face, Picture(size=f"{SIZE_PX}x{SIZE_PX}"))
     rest = scatter_landmarks(face, landmark_positions(face))
     motion = scatter_landmarks(face, landmark_motion(face, np.arange(len(face.shape_names))))
-    of = sum(len(one.landmarks) for one in observations)
+    of = sum(len(each_observation.landmarks) for each_observation in observations)
     done = 0
     for observation in observations:
         fps = observation.fps
@@ -181,12 +172,12 @@ def mimic_recordings(
 def phone_scores(mimicked: Sequence[MimickedRecording]) -> tuple[PhoneScores, ...]:
     """Mean scores at the middle of each phone's tokens, the most frequent phone first."""
     tokens: dict[str, list[tuple[FloatArray, FloatArray]]] = {}
-    for one in mimicked:
-        phones, edges = one.observation.phones.phones, one.observation.phones.edges
-        middles = np.rint((edges[:-1] + edges[1:]) / 2 * one.observation.fps).astype(int)
-        for phone, at in zip(phones, np.minimum(middles, len(one.person) - 1), strict=True):
+    for recording in mimicked:
+        phones, edges = recording.observation.phones.phones, recording.observation.phones.edges
+        middles = np.rint((edges[:-1] + edges[1:]) / 2 * recording.observation.fps).astype(int)
+        for phone, at in zip(phones, np.minimum(middles, len(recording.person) - 1), strict=True):
             if phone != SILENCE:
-                tokens.setdefault(phone, []).append((one.person[at], one.face[at]))
+                tokens.setdefault(phone, []).append((recording.person[at], recording.face[at]))
     rows = (PhoneScores(phone, len(found), *np.mean(found, axis=0)) for phone, found in tokens.items())
     return tuple(sorted(rows, key=lambda row: (-row.n_tokens, row.phone)))
 
@@ -194,13 +185,13 @@ def phone_scores(mimicked: Sequence[MimickedRecording]) -> tuple[PhoneScores, ..
 def mouth_motion(mimicked: Sequence[MimickedRecording]) -> MouthMotion:
     """How the mouth of the face follows the person's."""
     rows, closed = [], []
-    for one in mimicked:
-        own = one.observation.landmarks
-        here = speech_frames(one.observation.phones, len(own), one.observation.fps)
-        opening, shown = lip_opening(own)[here], lip_opening(one.landmarks)[here]
-        width = correlation(lip_width(own)[here], lip_width(one.landmarks)[here])
+    for recording in mimicked:
+        own = recording.observation.landmarks
+        here = speech_frames(recording.observation.phones, len(own), recording.observation.fps)
+        opening, shown = lip_opening(own)[here], lip_opening(recording.landmarks)[here]
+        width = correlation(lip_width(own)[here], lip_width(recording.landmarks)[here])
         rows.append((correlation(opening, shown), width, range_ratio(opening, shown)))
-        closed += bilabial_gaps(one)
+        closed += bilabial_gaps(recording)
     means = np.mean(rows, axis=0)
     share = float(np.mean(np.array(closed) < CLOSED_MM)) if closed else float("nan")
     return MouthMotion(float(means[0]), float(means[1]), float(means[2]), share, len(closed))

@@ -9,16 +9,9 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.studies.similarity.statistics import (
-    Agreement,
-    Consistency,
-    Reliability,
-    articulatory_distances,
-    mantel,
-    mode_consistency,
-    movement_consistency,
-    split_half,
-)
+from corpus_tools.studies.similarity.consistency import Consistency, mode_consistency, movement_consistency
+from corpus_tools.studies.similarity.mantel import Agreement, articulatory_distances, mantel
+from corpus_tools.studies.similarity.reliability import Reliability, split_half
 from corpus_tools.studies.similarity.tables import (
     LEAST_PHONES,
     SimilarityTable,
@@ -39,6 +32,12 @@ from lexicon.values.fields import check_fields
 from tts2face.lips.similarity import PhoneSimilarity
 from tts2face.models.talker import Talker
 from tts2face.types import Progress
+
+USUAL_CLASSES = (4, 6, 8, 10, 12)
+STREAMS = MappingProxyType(
+    {"utterances": 0, "words": 1, "articulation": 2, "comparison": 3, "same phones": 4}
+)  # each statistic has its own random stream
+N_NEIGHBOURS = 3  # as in T07 Table 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,13 +66,7 @@ class TableComparison:
 def compare_tables(
     one: SimilarityTable, two: SimilarityTable, other: str, stream: np.random.Generator
 ) -> TableComparison:
-    """Compare two talkers' tables; `other` is the second one's name.
-
-    Raises
-    ------
-    InputError
-        They have fewer than `LEAST_PHONES` phones in common.
-    """
+    """Compare two talkers' tables; `other` is the second one's name."""
     common = tuple(phone for phone in one.phones if phone in two.phones)
     if len(common) < LEAST_PHONES:
         raise InputError(
@@ -89,13 +82,6 @@ def compare_tables(
 def _select_phones(table: SimilarityTable, phones: tuple[str, ...]) -> NDArray[np.float64]:
     at = [table.phones.index(phone) for phone in phones]
     return table.matrix[np.ix_(at, at)]
-
-
-USUAL_CLASSES = (4, 6, 8, 10, 12)
-STREAMS = MappingProxyType(
-    {"utterances": 0, "words": 1, "articulation": 2, "comparison": 3, "same phones": 4}
-)  # each statistic has its own random stream
-N_NEIGHBOURS = 3  # as in T07 Table 1
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.studies.plots import FIRST, INK, RULE, SECOND, SOFT, Tip, draw_png, draw_svg
+from corpus_tools.studies.plots import FIRST, INK, RULE, SECOND, SOFT, Plot, Tip, draw_svg
 from corpus_tools.studies.similarity.analysis import Analysis, TableComparison
-from corpus_tools.studies.similarity.statistics import upper_triangle
+from corpus_tools.studies.similarity.mantel import upper_triangle
 from corpus_tools.studies.similarity.tables import cluster_tree, phone_label
 from lexicon.phones import look_up_phone
 
@@ -93,14 +93,9 @@ def difference_figure(analysis: Analysis, compared: TableComparison, labels: str
     )
 
 
-def table_svg(table: TableFigure) -> str:
-    """The heat map for a page, with the value of each cell as tooltip."""
-    return draw_svg(lambda figure: draw_table(figure, table), *_table_size(table), table.title)
-
-
-def table_png(table: TableFigure) -> bytes:
-    """The heat map as PNG bytes."""
-    return draw_png(lambda figure: draw_table(figure, table), *_table_size(table))
+def table_plot(table: TableFigure) -> Plot:
+    """The heat map, with the value of each cell as tooltip in a page."""
+    return Plot(lambda figure: draw_table(figure, table), *_table_size(table), table.title)
 
 
 def _table_size(table: TableFigure) -> tuple[int, int]:
@@ -203,14 +198,13 @@ def articulation_svg(analysis: Analysis, labels: str) -> str:
 def shares_svg(names: Sequence[str], shares: Floats) -> str:
     """Shares from 0 to 1 as named bars, each with its number."""
 
-    def draw(figure: "Figure") -> tuple[()]:
+    def draw(figure: "Figure") -> None:
         axes = figure.subplots()
         axes.barh(names, np.ones(len(names)), color=RULE, alpha=0.5)
         axes.bar_label(axes.barh(names, shares, color=FIRST), [f"{share:.2f}" for share in shares], padding=3)
         axes.set(xlim=(0, 1), xlabel="share of the variance")
         axes.invert_yaxis()
         axes.grid(visible=False)
-        return ()
 
     return draw_svg(draw, SIZE[0], 50 + 22 * len(names), "share of each movement that the phones do not explain")
 
@@ -218,7 +212,7 @@ def shares_svg(names: Sequence[str], shares: Floats) -> str:
 def freedom_svg(rows: Sequence[str], columns: Sequence[str], values: Floats) -> str:
     """(R, K) spread within phones over that of all speech as coloured cells with their numbers."""
 
-    def draw(figure: "Figure") -> tuple[()]:
+    def draw(figure: "Figure") -> None:
         axes = figure.subplots()
         low, high = FREE_RANGE
         axes.imshow(values, FREEDOM, vmin=low, vmax=high, interpolation="none", aspect="auto")
@@ -230,7 +224,6 @@ def freedom_svg(rows: Sequence[str], columns: Sequence[str], values: Floats) -> 
         axes.tick_params(length=0, labeltop=True, labelbottom=False)
         axes.grid(visible=False)
         axes.spines[:].set_visible(False)
-        return ()
 
     return draw_svg(
         draw, LABEL + 64 * len(columns) + 60, 90 + CELL * len(rows), "spread within phones over that of all speech"

@@ -14,9 +14,10 @@ from corpus_tools.studies.similarity.figures import (
     shares_svg,
     silhouettes_svg,
     similarity_figure,
-    table_svg,
+    table_plot,
 )
-from corpus_tools.studies.similarity.statistics import N_PERMUTATIONS, Reliability
+from corpus_tools.studies.similarity.mantel import N_PERMUTATIONS
+from corpus_tools.studies.similarity.reliability import Reliability
 from corpus_tools.studies.similarity.tables import LEAST_TOKENS, VisemeClasses, phone_label
 
 N_DIFFERENT = 10
@@ -28,7 +29,7 @@ def similarity_page(analysis: Analysis, labels: str) -> str:
         _summary(analysis),
         "<h2>Phone by phone</h2>",
         note_paragraph("Without silence. Hover over a cell for its value."),
-        scroll_box(table_svg(similarity_figure(analysis, labels))),
+        scroll_box(table_plot(similarity_figure(analysis, labels)).svg()),
         "<h2>Most similar phones</h2>",
         note_paragraph(
             "Table 1 of Theobald et al. 2007. Agreement: correlation of a phone's similarities between random halves."
@@ -209,7 +210,7 @@ def _comparison(analysis: Analysis, labels: str) -> list[str]:
             f"Similarity on {analysis.name} minus that on {compared.other}: orange where it is higher on "
             f"{analysis.name}."
         ),
-        scroll_box(table_svg(difference_figure(analysis, compared, labels))),
+        scroll_box(table_plot(difference_figure(analysis, compared, labels)).svg()),
         "<h2>Phones and pairs with the largest differences</h2>",
         table(("phone", "mean difference"), phones, numbers=(1,)),
         note_paragraph("Pairs with signed differences:"),

@@ -18,6 +18,7 @@ from tts2face.models.talker import Talker
 LEAST_PHONES = 4  # needed for two classes of two
 LEAST_TOKENS = 10  # of a phone, in each half: means of fewer depend as much on their contexts as on the phone
 NO_WORD = -1
+PHONE_LABELS = ("both", "ipa", "arpabet")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,13 +56,7 @@ class SimilarityTable:
 
 
 def collect_spoken_tokens(talker: Talker, name: str) -> SpokenTokens:
-    """Tokens of a talker.
-
-    Raises
-    ------
-    InputError
-        Fewer than `LEAST_PHONES` phones have the tokens for two halves, or there is one utterance only.
-    """
+    """Tokens of a talker."""
     tokens = collect_tokens(talker)
     n_speech = talker.model.n_speech
     spread = np.maximum(talker.model.spread[:n_speech], 1e-6).astype(np.float32)
@@ -97,11 +92,6 @@ def similarity_table(tokens: SpokenTokens, chosen: NDArray[np.bool_] | None = No
     """Similarity of the sounding phones, in the phone table's order, from all tokens or the `chosen` (N,) ones.
 
     The figures are those that synthesis uses: silence is measured with the phones and then removed.
-
-    Raises
-    ------
-    InputError
-        A label of the talker is not in the phone table.
     """
     selected = np.ones(len(tokens.phone), bool) if chosen is None else chosen
     found = phone_similarity(tokens.samples[selected], tokens.phone[selected], tokens.inventory, tokens.spread)
@@ -116,9 +106,6 @@ def similarity_table(tokens: SpokenTokens, chosen: NDArray[np.bool_] | None = No
         found.matrix[np.ix_(order, order)],
         found.matrix[order, silence],
     )
-
-
-PHONE_LABELS = ("both", "ipa", "arpabet")
 
 
 def check_labels(labels: str) -> None:
@@ -183,13 +170,7 @@ def cluster_tree(distance: NDArray[np.floating]) -> Tree:
 
 
 def cut_into_classes(tree: Tree, n_classes: int) -> NDArray[np.int64]:
-    """(P,) class of each phone when the tree is cut into exactly `n_classes`, numbered in the dendrogram's order.
-
-    Raises
-    ------
-    InputError
-        `n_classes` is below 2 or above the number of phones.
-    """
+    """(P,) class of each phone when the tree is cut into exactly `n_classes`, numbered in the dendrogram's order."""
     from scipy.cluster.hierarchy import cut_tree
 
     check_classes(n_classes, len(tree.order))
@@ -209,13 +190,6 @@ def silhouettes(distance: NDArray[np.floating], labels: NDArray[np.integer]) -> 
 
     a is the mean distance from the others of its own class, b from the members of the nearest other class; 0 for an
     item alone in its class (Rousseeuw 1987).
-
-    Raises
-    ------
-    InputError
-        There is one class only, or the arrays do not fit each other.
-    BackendError
-        scikit-learn is not installed.
     """
     n_classes = len(np.unique(labels))
     if distance.shape != (len(labels), len(labels)) or n_classes < 2:

@@ -1,24 +1,19 @@
-"""Write the analysis of a talker as HTML, JSON, CSV or PNG.
+"""The analysis of a talker as a page, a matrix, all figures and a heat map, and their files."""
 
-Export of an analysis: the matrix as CSV, all figures as JSON.
-"""
-
-import csv
-import json
-from collections.abc import Callable, Mapping, Sequence
-from io import StringIO
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.studies.pages import report_writer
+from corpus_tools.studies.plots import Plot
+from corpus_tools.studies.report import Report, Rows, as_csv, as_html, as_json, as_png, csv_text
 from corpus_tools.studies.similarity.analysis import Analysis, NamedTalker, SimilarityOptions, TableComparison, analyse
-from corpus_tools.studies.similarity.figures import difference_figure, similarity_figure, table_png
+from corpus_tools.studies.similarity.consistency import Consistency
+from corpus_tools.studies.similarity.figures import difference_figure, similarity_figure, table_plot
+from corpus_tools.studies.similarity.mantel import Agreement
 from corpus_tools.studies.similarity.page import similarity_page
-from corpus_tools.studies.similarity.statistics import Agreement, Consistency, Reliability
+from corpus_tools.studies.similarity.reliability import Reliability
 from corpus_tools.studies.similarity.tables import (
     LEAST_TOKENS,
     SimilarityTable,
@@ -28,36 +23,32 @@ from corpus_tools.studies.similarity.tables import (
 )
 from lexicon.phones import look_up_phone
 from tts2face.models.talker_file import load_talker
-from tts2face.storage.files import write_atomically
 from tts2face.types import Progress
 
 
 def table_csv(table: SimilarityTable, labels: str) -> str:
     """One line for each phone: its label, its tokens, its similarity to each phone."""
-    counts = [[str(count)] for count in table.counts]
-    return _csv_text([phone_label(phone, labels) for phone in table.phones], ["tokens"], counts, table.matrix)
+    return csv_text(_table_rows(table, labels))
 
 
-def difference_csv(compared: TableComparison, labels: str) -> str:
-    """One line for each phone: its label, its similarity to each phone on the first talker minus that on the other."""
+def _table_rows(table: SimilarityTable, labels: str) -> Rows:
+    names = [phone_label(phone, labels) for phone in table.phones]
+    yield ["phone", "tokens", *names]
+    for name, count, row in zip(names, table.counts, table.matrix, strict=True):
+        yield [name, str(count), *(f"{value:.4f}" for value in row)]
+
+
+def _difference_rows(compared: TableComparison, labels: str) -> Rows:
+    """Similarity to each phone on the first talker minus that on the other, one line for each phone."""
     names = [phone_label(phone, labels) for phone in compared.phones]
-    return _csv_text(names, [], [[] for _ in names], compared.difference)
+    yield ["phone", *names]
+    for name, row in zip(names, compared.difference, strict=True):
+        yield [name, *(f"{value:.4f}" for value in row)]
 
 
-def _csv_text(
-    names: Sequence[str], more: Sequence[str], cells: Sequence[Sequence[str]], values: NDArray[np.floating]
-) -> str:
-    file = StringIO()
-    rows = csv.writer(file, lineterminator="\n")
-    rows.writerow(["phone", *more, *names])
-    for name, own, row in zip(names, cells, values, strict=True):
-        rows.writerow([name, *own, *(f"{value:.4f}" for value in row)])
-    return file.getvalue()
-
-
-def analysis_json(analysis: Analysis) -> str:
+def analysis_figures(analysis: Analysis) -> dict[str, Any]:
     """All figures; similarities in the order of ``phones``."""
-    content = {
+    return {
         "talker": analysis.name,
         "utterances": analysis.n_utterances,
         "seed": analysis.options.seed,
@@ -93,7 +84,6 @@ def analysis_json(analysis: Analysis) -> str:
         "modes": _consistency(analysis, analysis.modes),
         "comparison": None if analysis.comparison is None else _comparison(analysis.comparison),
     }
-    return json.dumps(content, ensure_ascii=False, indent=1, allow_nan=False) + "\n"
 
 
 def _round_values(values: NDArray[np.floating]) -> Any:
@@ -181,31 +171,33 @@ def write_similarity(
     BackendError
         matplotlib or scikit-learn is not installed, or the file cannot be written.
     """
-    writer = report_writer(out, WRITERS)
-    check_labels(labels)
-    against = None if other is None else NamedTalker(other, load_talker(other))
-    found = analyse(NamedTalker(talker, load_talker(talker)), options, against, on_progress)
-    write_atomically(out, writer(found, labels))
-    return found
+
+    def measure() -> Analysis:
+        check_labels(labels)
+        against = None if other is None else NamedTalker(other, load_talker(other))
+        return analyse(NamedTalker(talker, load_talker(talker)), options, against, on_progress)
+
+    return similarity_report(labels).write(out, measure)
 
 
-def _csv(found: Analysis, labels: str) -> bytes:
-    if found.comparison is not None:
-        return difference_csv(found.comparison, labels).encode()
-    return table_csv(found.table, labels).encode()
+def similarity_report(labels: str) -> Report[Analysis]:
+    """The files of an analysis with phones labelled in ``ipa``, ``arpabet`` or ``both``.
 
+    With another talker the table and the picture are the difference of the two.
+    """
 
-def _png(found: Analysis, labels: str) -> bytes:
-    if found.comparison is not None:
-        return table_png(difference_figure(found, found.comparison, labels))
-    return table_png(similarity_figure(found, labels))
+    def rows(found: Analysis) -> Rows:
+        return _difference_rows(other, labels) if (other := found.comparison) else _table_rows(found.table, labels)
 
+    def heat_map(found: Analysis) -> Plot:
+        other = found.comparison
+        return table_plot(difference_figure(found, other, labels) if other else similarity_figure(found, labels))
 
-WRITERS: Mapping[str, Callable[[Analysis, str], bytes]] = MappingProxyType(
-    {
-        ".html": lambda found, labels: similarity_page(found, labels).encode(),
-        ".csv": _csv,
-        ".json": lambda found, labels: analysis_json(found).encode(),
-        ".png": _png,
-    }
-)
+    return Report(
+        {
+            ".html": as_html(lambda found: similarity_page(found, labels)),
+            ".csv": as_csv(rows),
+            ".json": as_json(analysis_figures),
+            ".png": as_png(heat_map),
+        }
+    )

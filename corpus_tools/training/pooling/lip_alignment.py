@@ -85,10 +85,10 @@ def fit_part_model(
 ) -> PartModel:
     """Model of recordings with known phone times, and of alignments of another speaker."""
     number = {label: at for at, label in enumerate(inventory)}
-    parts = [[_part_samples(one, number) for one in group] for group in (known, aligned)]
+    parts = [[_part_samples(item, number) for item in group] for group in (known, aligned)]
     samples = [tuple(np.concatenate(column) for column in zip(*group, strict=True)) for group in parts if group]
     shown, position, targets = (np.concatenate(column) for column in zip(*samples, strict=True))
-    speaker = np.repeat(np.arange(len(samples)), [len(one[0]) for one in samples])
+    speaker = np.repeat(np.arange(len(samples)), [len(sample[0]) for sample in samples])
     importance = np.ones((len(samples), targets.shape[1]), np.float32)
     joined = WindowSamples(shown, position, targets, speaker)
     weights = train_network(joined, table, importance, options=TRAINING, seed=0)
@@ -105,19 +105,19 @@ def fit_part_model(
 
 
 def _part_samples(
-    one: LipSpeech, number: dict[str, int]
+    speech: LipSpeech, number: dict[str, int]
 ) -> tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]]:
     """Phones around each part of each phone (N, 7), the part (N, 3), and the features in its middle (N, F)."""
-    labels = np.array([number[label] for label in one.phones.phones])
-    edges = one.phones.edges
+    labels = np.array([number[label] for label in speech.phones.phones])
+    edges = speech.phones.edges
     middles = edges[:-1, None] + np.diff(edges)[:, None] * (np.arange(N_PARTS) + 0.5) / N_PARTS
     at = middles.reshape(-1) * RATE_HZ
-    kept = (at < len(one.features) - 1) & ~np.repeat(
+    kept = (at < len(speech.features) - 1) & ~np.repeat(
         (labels == number[SILENCE]) & (np.diff(edges) > 0.6), N_PARTS
     )  # silences longer than .6 s are rest
     low = at[kept].astype(int)
     part = (at[kept] - low)[:, None]
-    seen = (1 - part) * one.features[low] + part * one.features[low + 1]
+    seen = (1 - part) * speech.features[low] + part * speech.features[low + 1]
     around = _contexts(labels, number[SILENCE])
     position = np.tile(np.eye(N_PARTS, dtype=np.float32), (len(labels), 1))
     return np.repeat(around, N_PARTS, axis=0)[kept], position[kept], seen.astype(np.float32)
@@ -138,13 +138,7 @@ def align_phones(
     *,
     speaker: int,
 ) -> tuple[Floats, float]:
-    """End of each phone in seconds, near its expected one, and the cost of the alignment per frame.
-
-    Raises
-    ------
-    DataError
-        The phones do not fit into the recording.
-    """
+    """End of each phone in seconds, near its expected one, and the cost of the alignment per frame."""
     means = _part_means(labels, is_optional, model, speaker)
     n_frames = len(features)
     silent = np.array([label == SILENCE for label in labels])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.dense.skin_colour import EyeColours, estimate_cast, remove_cast, sample_eyes, srgb_colour
+from corpus_tools.dense.light_colour import EyeColours, estimate_cast, remove_cast, sample_eyes, srgb_colour
 from tts2face.models.face import Face
 from tts2face.models.landmarks import CHIN, FACE_OVAL, N_MESH_LANDMARKS
 from tts2face.numeric.arrays import decode_srgb, encode_light

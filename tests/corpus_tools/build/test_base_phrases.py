@@ -18,15 +18,15 @@ from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA
 from corpus_tools.training.network_training import TrainingOptions
 from corpus_tools.training.phone_network import add_phone_network
 from corpus_tools.training.pooling import speech
-from corpus_tools.training.pooling.speech import (
+from corpus_tools.training.pooling.base_speech import (
     DURATION_SPREAD,
     EDGE_SILENCE_S,
     N_PHRASES,
     TEMPI,
-    PooledSpeech,
     base_speech,
     english_phrases,
 )
+from corpus_tools.training.pooling.speech import PooledSpeech
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import InputError
 from lexicon.phones import ARPABET
@@ -158,7 +158,7 @@ def test_the_build_of_a_long_talker_states_the_base_of_its_networks(
     own = without_hidden(recordings[40:])
     monkeypatch.setattr("corpus_tools.training.phone_network.TRAINING", FEW_PASSES)
     monkeypatch.setattr("corpus_tools.build_talker.observe", lambda *_, **__: Observations(tuple(own), (), ()))
-    monkeypatch.setattr("corpus_tools.training.choose_adaptation.MIN_OWN_MINUTES", 0.2)
+    monkeypatch.setattr("corpus_tools.training.short_talker.MIN_OWN_MINUTES", 0.2)
     monkeypatch.setattr("corpus_tools.build_talker.add_score_map", lambda talker, _: talker)
     command = ["corpus", "build", str(tmp_path / "recordings"), "--model", str(face_model), "--out"]
     assert run([*command, str(tmp_path / "me.talker"), "--base", str(tmp_path / "base.talker")]) == 0

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from cli.main import run
+from corpus_tools.recordings.light import face_light, measure_light
 from corpus_tools.recordings.limits import REFUSAL, WARNING, Finding, limit_findings
 from corpus_tools.recordings.observe import RecordingChecker, check_recording, recordings_to_check
-from corpus_tools.recordings.video import face_light, measure_light
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
 from tests.corpus_tools.films import write_video

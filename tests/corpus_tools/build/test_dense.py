@@ -8,17 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from corpus_tools.dense.adapt_head import RIGID_MOUTH_PARTS, adapt_head
 from corpus_tools.dense.build_face import build_face
-from corpus_tools.dense.mesh_fit import (
-    OPEN_JAW_WEIGHT,
-    RIGID_MOUTH_PARTS,
-    adapt_head,
-    align_to_head,
-    face_landmarks,
-    part_vertices,
-)
+from corpus_tools.dense.mesh_fit import OPEN_JAW_WEIGHT, align_to_head, face_landmarks, part_vertices
+from corpus_tools.dense.skin_canvas import build_canvas, polygon_depth
 from corpus_tools.dense.skin_colour import build_picture_fitter, welded_normals
-from corpus_tools.dense.texels import build_canvas, find_videos, polygon_depth
+from corpus_tools.dense.tracked_pictures import find_videos
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, InputError
 from tests.face.posing import posed_vertices

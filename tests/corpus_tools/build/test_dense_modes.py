@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from corpus_tools.dense.mesh_fit import EYE_PARTS, face_landmarks, face_width, part_vertices
+from corpus_tools.dense.adapt_head import EYE_PARTS
+from corpus_tools.dense.mesh_fit import face_landmarks, face_width, part_vertices
 from corpus_tools.dense.modes import (
     LIMIT,
     MEAN,
@@ -21,7 +22,7 @@ from corpus_tools.dense.modes import (
     spread_shapes,
 )
 from corpus_tools.dense.skin_colour import PictureFitter, build_picture_fitter
-from corpus_tools.dense.texels import TrackedPictures
+from corpus_tools.dense.tracked_pictures import TrackedPictures
 from lexicon.errors import InputError
 from tests.face.posing import posed_vertices
 from tests.rendered_takes import ONLY_RENDERED

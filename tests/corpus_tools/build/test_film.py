@@ -14,7 +14,8 @@ from corpus_tools.shipped.drawn.hair import OtherHair
 from corpus_tools.shipped.film.compare import View, differences, draw_view
 from corpus_tools.shipped.film.fit_light import fit_light
 from corpus_tools.shipped.film.look import LAMPS, Look
-from corpus_tools.shipped.film.poses import EXPRESSIONS, LitPose, PoseLight, expression_pose, farthest
+from corpus_tools.shipped.film.pose_light import PoseLight
+from corpus_tools.shipped.film.poses import EXPRESSIONS, LitPose, expression_pose, farthest
 from tests.interchange.characters.makehuman import makehuman
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.face_loading import load_face
@@ -86,7 +87,7 @@ def test_light_is_baked_into_texels_and_vertices(scene: Any) -> None:
 
 
 def test_a_character_is_drawn_in_its_baked_light(scene: Any, tmp_path: Path) -> None:
-    from corpus_tools.shipped.film.bake import Effort, bake_poses
+    from corpus_tools.shipped.film.bake_poses import Effort, bake_poses
 
     face, still = scene.face, np.zeros(6, np.float32)
     shown = {"rest": {}, **{name: EXPRESSIONS[name] for name in ("a", "smile", "blink")}}

@@ -11,7 +11,7 @@ import pytest
 from cli.main import run
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.studies.evaluation.curve import CurvePoint, LearningCurve, compare_points
-from corpus_tools.studies.evaluation.curve_page import WRITERS
+from corpus_tools.studies.evaluation.curve_page import REPORT
 from corpus_tools.studies.evaluation.curve_tables import curve_rows, curve_tables, monotony
 from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA, evaluate
 from corpus_tools.studies.evaluation.learning_curve import (
@@ -114,7 +114,7 @@ def test_the_base_alone_does_not_depend_on_the_material(curve: LearningCurve) ->
 def test_with_enough_material_the_talker_is_that_of_own_material_alone(
     base: Base, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("corpus_tools.training.choose_adaptation.MIN_OWN_MINUTES", 8.0 / 60.0)
+    monkeypatch.setattr("corpus_tools.training.short_talker.MIN_OWN_MINUTES", 8.0 / 60.0)
     monkeypatch.setattr("corpus_tools.studies.evaluation.learning_curve.N_CHOICES", 1)
     found = measure_learning_curve(TRAIN, TEST, base, amounts_s=[5.0])
     small, everything = found.points
@@ -182,17 +182,17 @@ def test_tables_hold_every_amount_and_method(curve: LearningCurve) -> None:
 
 @pytest.mark.needs("matplotlib")
 def test_files_hold_the_curve(curve: LearningCurve) -> None:
-    stored = json.loads(WRITERS[".json"](curve))
+    stored = json.loads(REPORT.formats[".json"](curve))
     assert [point["seconds"] for point in stored["points"]] == [point.seconds for point in curve.points]
-    assert WRITERS[".csv"](curve).startswith(b"table,seconds,method,minus,figure,value,low,high,deviation\n")
-    svg, page = WRITERS[".svg"](curve).decode(), WRITERS[".html"](curve).decode()
+    assert REPORT.formats[".csv"](curve).startswith(b"table,seconds,method,minus,figure,value,low,high,deviation\n")
+    svg, page = REPORT.formats[".svg"](curve).decode(), REPORT.formats[".html"](curve).decode()
     assert svg.startswith("<svg ")
     assert 'xmlns="http://www.w3.org/2000/svg"' in svg
     assert "var(" not in svg
     for method in curve.methods:
         assert (method in svg) == (method != MEAN_FACE)
         assert method in page
-    assert WRITERS[".png"](curve).startswith(b"\x89PNG")
+    assert REPORT.formats[".png"](curve).startswith(b"\x89PNG")
 
 
 def test_the_command_measures_tracks_of_a_person(

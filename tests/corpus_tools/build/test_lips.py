@@ -8,13 +8,8 @@ import pytest
 
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA
-from corpus_tools.training.network_training import (
-    TrainingOptions,
-    WindowSamples,
-    feature_table,
-    network_outputs,
-    train_network,
-)
+from corpus_tools.training.network_training import TrainingOptions, WindowSamples, network_outputs, train_network
+from corpus_tools.training.phone_codes import feature_table
 from corpus_tools.training.phone_network import add_phone_network, expand_to_phones
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.phones import ARTICULATORY_WEIGHTS, PHONES

@@ -9,18 +9,12 @@ import pytest
 from cli.main import run
 from corpus_tools.pool_talker import pool_talker
 from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA
-from corpus_tools.training.network_training import TrainingOptions, feature_table
+from corpus_tools.training.network_training import TrainingOptions
+from corpus_tools.training.phone_codes import feature_table
 from corpus_tools.training.phone_network import FEATURE_NOISE, add_phone_network, follow_features
 from corpus_tools.training.pooling.lip_alignment import LipSpeech, align_phones, alignment_features, fit_part_model
-from corpus_tools.training.pooling.lip_tracks import (
-    FEATURES,
-    LipTrack,
-    SpokenPhone,
-    landmark_features,
-    parameter_features,
-    read_lip_tracks,
-    track_features,
-)
+from corpus_tools.training.pooling.lip_features import FEATURES, landmark_features, parameter_features, track_features
+from corpus_tools.training.pooling.lip_tracks import LipTrack, SpokenPhone, read_lip_tracks
 from corpus_tools.training.pooling.speech import align_lip_tracks, spoken_sequence
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError

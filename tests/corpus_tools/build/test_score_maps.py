@@ -8,12 +8,12 @@ import pytest
 
 from corpus_tools.training.calibrate_face import (
     calibrate_face,
-    calibrate_face_file,
     correct_score_map,
     mirrored_name,
     symmetrise_score_map,
     vary_poses,
 )
+from corpus_tools.training.calibrate_file import calibrate_face_file
 from corpus_tools.training.score_map import MAX_LOGIT, add_score_map, clipped_logits, fit_score_map, read_mouth_scores
 from lexicon.errors import DataError
 from tts2face.models.face_file import read_face

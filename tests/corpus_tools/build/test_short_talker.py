@@ -18,10 +18,8 @@ from corpus_tools.training.choose_adaptation import (
     USUAL,
     HeldOutScore,
     choose_adaptation,
-    learn_short_talker,
-    needs_base,
-    recording_advice,
 )
+from corpus_tools.training.short_talker import learn_short_talker, needs_base, recording_advice
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.lips.exemplar import build_exemplar_model, speech_trajectory
 from tts2face.lips.lip_gaps import facing_gaps

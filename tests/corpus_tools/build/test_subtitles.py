@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from corpus_tools.recordings.folder import Recording, find_recordings, read_cues
+from corpus_tools.recordings.folder import Recording, find_recordings
 from corpus_tools.recordings.observe import group_by_video, observe
+from corpus_tools.recordings.subtitle_cues import read_cues
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError
 from tests.corpus_tools.films import join_clips

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from corpus_tools.shipped.training import voices_audio_map
 from corpus_tools.shipped.training.damage import damage
 from corpus_tools.shipped.training.spoken_material import KnownSpeech, resampled
-from corpus_tools.training import voices_audio_map
 from lexicon.sequence import PhoneSequence
 from tts2face.models.talker import Talker
 from tts2face.models.talker_file import load_talker

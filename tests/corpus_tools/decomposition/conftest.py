@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from corpus_tools.decomposition.markers import MarkerSet, read_marker_set
+from corpus_tools.decomposition.marker_sets import MarkerSet, read_marker_set
 from tests.corpus_tools.decomposition.made_markers import FPS, Made, made_take
 from tts2face.face.deformation import moved_landmarks
 from tts2face.models.face import Face

@@ -8,7 +8,7 @@ from pathlib import Path
 import c3d
 import numpy as np
 
-from corpus_tools.decomposition.markers import MarkerSet
+from corpus_tools.decomposition.marker_sets import MarkerSet
 from tts2face.face.deformation import head_transform
 from tts2face.models.face import Face
 

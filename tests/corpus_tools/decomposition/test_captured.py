@@ -13,7 +13,8 @@ from corpus_tools.decomposition.capture import (
     resample,
     resample_to_gesture_rate,
 )
-from corpus_tools.decomposition.recordings import read_livelink_recording, read_sound_span
+from corpus_tools.decomposition.capture_files import read_livelink_recording
+from corpus_tools.decomposition.recordings import read_sound_span
 from lexicon.errors import DataError, InputError
 from tests.face.posing import posed_vertices
 from tests.rendered_takes import write_sound

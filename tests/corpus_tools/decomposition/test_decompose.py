@@ -8,18 +8,18 @@ import pytest
 from corpus_tools.decomposition.basis import ExpressionBasis, transfer_basis
 from corpus_tools.decomposition.blend_weights import build_least_squares_estimator
 from corpus_tools.decomposition.capture import FaceRecording
+from corpus_tools.decomposition.capture_files import eye_motion
 from corpus_tools.decomposition.decompose import (
     IRIS_LANDMARKS,
     IRIS_SHIFT_PER_RAD,
     Decomposition,
-    add_style,
     decompose,
-    feature_landmarks,
     gaze_angles,
-    read_derived_styles,
     weight_displacements,
 )
-from corpus_tools.decomposition.recordings import eye_motion
+from corpus_tools.decomposition.derived_styles import read_derived_styles
+from corpus_tools.decomposition.learnt_style import add_style
+from corpus_tools.decomposition.regions import feature_landmarks
 from lexicon.errors import DataError, InputError
 from tts2face.face.deformation import axis_ratios, moved_landmarks, rest_landmarks
 from tts2face.face.expressions import expression_landmarks

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from corpus_tools.build_palette import StyleSource, build_style
-from corpus_tools.decomposition.basis import Still, find_stills
-from corpus_tools.decomposition.markers import MarkerSet
-from corpus_tools.decomposition.recordings import MarkerOptions
+from corpus_tools.decomposition.capture_files import MarkerOptions
+from corpus_tools.decomposition.marker_sets import MarkerSet
+from corpus_tools.decomposition.stills import Still, find_stills
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
 from tests.corpus_tools.decomposition.made_markers import Made, made_take, write_c3d, write_table

@@ -6,16 +6,10 @@ import numpy as np
 import pytest
 
 from corpus_tools.decomposition.capture import FaceRecording
-from corpus_tools.decomposition.marker_face import MAX_MARKER_GAP_S, fill_marker_gaps
 from corpus_tools.decomposition.marker_files import read_c3d, read_markers
-from corpus_tools.decomposition.markers import (
-    DEFAULT_MARKER_TABLE,
-    MarkerSet,
-    read_marker_face,
-    read_marker_recording,
-    read_marker_set,
-    read_marker_still,
-)
+from corpus_tools.decomposition.marker_gaps import MAX_MARKER_GAP_S, fill_marker_gaps
+from corpus_tools.decomposition.marker_sets import DEFAULT_MARKER_TABLE, MarkerSet, read_marker_set
+from corpus_tools.decomposition.markers import read_marker_face, read_marker_recording, read_marker_still
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.decomposition.made_markers import FPS, SIZE, Made, write_c3d, write_table
 from tts2face.models.face import Face

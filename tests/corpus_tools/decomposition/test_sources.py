@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from corpus_tools.decomposition.recordings import MarkerOptions, read_capture_file
+from corpus_tools.decomposition.capture_files import MarkerOptions, read_capture_file
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.decomposition.made_markers import Made, write_table
 from tts2face.models.face import Face

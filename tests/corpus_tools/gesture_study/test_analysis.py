@@ -12,7 +12,8 @@ from corpus_tools.studies.gestures.clips import (
     replace_style,
     select_recordings,
 )
-from corpus_tools.studies.gestures.measures import split_recordings, style_traits, wasserstein
+from corpus_tools.studies.gestures.measures import split_recordings, wasserstein
+from corpus_tools.studies.gestures.traits import style_traits
 from lexicon.errors import InputError
 from tests.corpus_tools.gesture_study.made_palette import BLINK, N_FRAMES, made_palette, made_style
 from tts2face.gestures.stream import GestureFields, GestureStream, style_median

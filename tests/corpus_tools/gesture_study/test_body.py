@@ -2,7 +2,7 @@
 
 import pytest
 
-from corpus_tools.studies.gestures.measures import measure_body
+from corpus_tools.studies.gestures.body import measure_body
 
 
 @pytest.mark.parametrize("seed", [0, 11])

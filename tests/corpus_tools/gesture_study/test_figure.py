@@ -22,7 +22,7 @@ from corpus_tools.studies.gestures.page import (
     gaze_panels,
     gestures_page,
     panel_svg,
-    panels_png,
+    panels_plot,
     spectrum_panel,
     summary_panels,
 )
@@ -125,7 +125,7 @@ def test_repetition_is_over_seconds_of_lag(calm):
 @pytest.mark.needs("matplotlib")
 def test_the_picture_shows_each_panel_in_its_place(calm):
     panels = summary_panels(calm)
-    with Image.open(BytesIO(panels_png("title", panels))) as image:
+    with Image.open(BytesIO(panels_plot("title", panels).png())) as image:
         rows = -(-len(panels) // COLUMNS)
         assert image.size == (COLUMNS * WIDTH * PNG_SCALE, (rows * HEIGHT + HEAD) * PNG_SCALE)
         pixels = np.asarray(image.convert("RGB"))

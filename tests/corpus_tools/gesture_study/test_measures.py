@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
+from corpus_tools.studies.gestures.blinks import blink_onsets, find_blinks
 from corpus_tools.studies.gestures.measures import (
     autocorrelation,
-    blink_onsets,
     coverage,
     diversity,
-    find_blinks,
     frame_midpoints,
     random_halves,
     ratio,

@@ -19,7 +19,8 @@ from corpus_tools.studies.retargeting.analysis import (
     mouth_motion,
     phone_scores,
 )
-from corpus_tools.studies.retargeting.page import figure_png, retargeting_page, study_csv, study_json
+from corpus_tools.studies.retargeting.page import retargeting_page
+from corpus_tools.studies.retargeting.write import REPORT
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.corpus_tools.conftest import made_observation
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
@@ -102,20 +103,20 @@ def test_a_page_without_frequent_phones_has_no_plot() -> None:
 @pytest.mark.needs("matplotlib")
 def test_tables_hold_every_phone_and_score() -> None:
     study = made_study()
-    rows = list(csv.DictReader(io.StringIO(study_csv(study))))
+    rows = list(csv.DictReader(io.StringIO(REPORT.formats[".csv"](study).decode())))
     assert len(rows) == 3 * len(SCORES)
     assert rows[len(SCORES) + 1] == {
         "phone": "b", "arpabet": "B", "tokens": "5", "score": "mouthPucker", "person": "0.1000", "face": "0.0300",
         "difference": "-0.0700",
     }  # fmt: skip
-    content = json.loads(study_json(study))
+    content = json.loads(REPORT.formats[".json"](study))
     assert (content["judged"], content["missed"], content["recordings"]) == (14, 1, 2)
     assert content["phones"][1]["face"]["mouthPucker"] == 0.03
     silent = replace(study, motion=MouthMotion(0.9, 0.9, 1.0, float("nan"), 0))
-    assert json.loads(study_json(silent))["motion"]["closed"] is None
+    assert json.loads(REPORT.formats[".json"](silent))["motion"]["closed"] is None
     assert "none spoken" in retargeting_page(silent)
 
 
 @pytest.mark.needs("matplotlib")
 def test_the_plot_is_a_picture() -> None:
-    assert figure_png(made_study()).startswith(b"\x89PNG")
+    assert REPORT.formats[".png"](made_study()).startswith(b"\x89PNG")

@@ -6,17 +6,11 @@ import numpy as np
 import pytest
 
 from corpus_tools.studies.similarity.analysis import NamedTalker, SimilarityOptions, analyse, compare_tables
+from corpus_tools.studies.similarity.consistency import MOVEMENTS, mode_names, movement_consistency, movement_weights
 from corpus_tools.studies.similarity.page import similarity_page
-from corpus_tools.studies.similarity.statistics import (
-    MOVEMENTS,
-    mode_names,
-    movement_consistency,
-    movement_weights,
-    spearman_brown,
-    split_half,
-)
+from corpus_tools.studies.similarity.reliability import spearman_brown, split_half
 from corpus_tools.studies.similarity.tables import NO_WORD, SimilarityTable, collect_spoken_tokens, similarity_table
-from corpus_tools.studies.similarity.write import analysis_json
+from corpus_tools.studies.similarity.write import similarity_report
 from lexicon.errors import InputError
 from tests.corpus_tools.similarity.steady_talker import BLOCKS, POSES, made_model, made_talker
 from tests.packages import needs
@@ -103,7 +97,7 @@ def test_a_talker_without_words_has_no_halves_of_words(talker):
     assert found.by_words is None
     assert found.by_utterances_same_phones is None
     assert "too few phones with tokens in both halves" in similarity_page(found, "both")
-    assert '"words": null' in analysis_json(found)
+    assert '"words": null' in similarity_report("both").formats[".json"](found).decode()
 
 
 @pytest.mark.needs("sklearn")

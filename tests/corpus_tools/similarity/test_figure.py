@@ -19,8 +19,7 @@ from corpus_tools.studies.similarity.figures import (
     shares_svg,
     silhouettes_svg,
     similarity_figure,
-    table_png,
-    table_svg,
+    table_plot,
     tree_joins,
 )
 from corpus_tools.studies.similarity.tables import cluster_tree, distances, phone_label
@@ -69,7 +68,7 @@ def test_the_figure_is_the_table_in_another_order(found):
 
 def test_every_field_of_the_heat_map_tells_its_number(found):
     figure = similarity_figure(found, "both")
-    titles = re.findall(r"<title>([^<]*) – ([^<]*): ([\d.]+)</title>", table_svg(figure))
+    titles = re.findall(r"<title>([^<]*) – ([^<]*): ([\d.]+)</title>", table_plot(figure).svg())
     assert len(titles) == len(figure.names) ** 2
     shown = {(a, b): float(value) for a, b, value in titles}
     for i, a in enumerate(figure.names):
@@ -133,7 +132,7 @@ def test_the_picture_shows_the_colours_of_the_table(found):
     import matplotlib as mpl
 
     table = similarity_figure(found, "arpabet")
-    image = Image.open(BytesIO(table_png(table))).convert("RGB")
+    image = Image.open(BytesIO(table_plot(table).png())).convert("RGB")
     with open_figure(lambda figure: draw_table(figure, table), *image.size) as (_, tips):
         middles = [tip.axes.transData.transform((tip.x + 0.5, tip.y + 0.5)) for tip in tips]
     expected = mpl.colormaps[LIKENESS](table.values.ravel(), bytes=True)[:, :3]

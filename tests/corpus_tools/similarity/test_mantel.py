@@ -5,12 +5,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from corpus_tools.studies.similarity.statistics import (
-    articulatory_distances,
-    mantel,
-    shuffled_correlations,
-    upper_triangle,
-)
+from corpus_tools.studies.similarity.mantel import articulatory_distances, mantel, shuffled_correlations, upper_triangle
 from lexicon.errors import InputError
 from lexicon.phones import phone_distance
 

@@ -5,16 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.decomposition.basis import (
-    PictureReader,
-    Still,
-    basis_from_stills,
-    build_marker_reader,
-    find_stills,
-    parse_stills,
-    transfer_basis,
-)
-from corpus_tools.decomposition.markers import MarkerSet, read_marker_face
+from corpus_tools.decomposition.basis import basis_from_stills, transfer_basis
+from corpus_tools.decomposition.marker_sets import MarkerSet
+from corpus_tools.decomposition.markers import read_marker_face
+from corpus_tools.decomposition.stills import PictureReader, Still, build_marker_reader, find_stills, parse_stills
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.decomposition.made_markers import SIZE, made_take, write_table
 from tts2face.face.deformation import moved_landmarks, rest_landmarks

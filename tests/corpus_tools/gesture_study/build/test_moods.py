@@ -14,12 +14,9 @@ from corpus_tools.studies.gestures.moods import (
     MoodOptions,
     MoodStudy,
     confusion_matrix,
-    mood_rows,
-    moods_csv,
-    moods_json,
-    moods_png,
     study_moods,
 )
+from corpus_tools.studies.gestures.write_moods import REPORT, mood_rows
 from lexicon.errors import BackendError, InputError
 from tests.kept import kept
 from tts2face.session.session import Session
@@ -77,12 +74,12 @@ def test_neutral_is_not_sullen(study: MoodStudy) -> None:
 
 
 def test_every_file_holds_every_mood(study: MoodStudy) -> None:
-    rows = list(csv.DictReader(moods_csv(study).splitlines()))
+    rows = list(csv.DictReader(REPORT.formats[".csv"](study).decode().splitlines()))
     assert [row["mood"] for row in rows] == list(SIX)
-    content = json.loads(moods_json(study))
+    content = json.loads(REPORT.formats[".json"](study))
     assert content["moods"] == mood_rows(study)
     assert np.trace(content["confusion"]) == sum(row["recognised"] for row in content["moods"])
-    with Image.open(BytesIO(moods_png(study))) as sheet:
+    with Image.open(BytesIO(REPORT.formats[".png"](study))) as sheet:
         assert sheet.size == (6 * 256, 6 * 256)  # of six frames of each of the last clips of each mood
 
 
@@ -108,7 +105,7 @@ def test_one_mood_cannot_be_told_apart() -> None:
 def test_the_command_writes_a_contact_sheet(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], study: MoodStudy, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("corpus_tools.studies.gestures.moods.study_moods", lambda *_, **__: study)  # takes 30 s
+    monkeypatch.setattr("corpus_tools.studies.gestures.write_moods.study_moods", lambda *_, **__: study)  # takes 30 s
     out = tmp_path / "moods.png"
     assert run(["report", "moods", "--out", str(out), "--seeds", "4"]) == 0
     with Image.open(out) as sheet:

@@ -1,0 +1,188 @@
+"""Colour of the light in videos, estimated from skin and eyes, and colours without it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.dense.skin_canvas import polygon_depth
+from corpus_tools.dense.skin_colour import Floats, sample_picture
+from tts2face.models.landmarks import LID_RINGS
+from tts2face.numeric.arrays import (
+    LUMINANCE,
+    decode_srgb,
+    encode_light,
+    encode_srgb,
+    smoothstep,
+)
+
+DARKEST = 0.004  # linear light, added before logarithms: noise of dark pixels has no colour
+# log R/G and B/G in neutral light. Skin: between light and dark skin of a colour chart (.57 -.31; .71 -.37), and
+# rendered people of all tones (.53 to .89, -.32 to -.66): tones differ in luminance far more than in these. White of
+# the eye: median of rendered people. What is within the spread of either is no cast.
+SKIN_CHROMA, SKIN_SPREAD = np.array([0.67, -0.45]), np.array([0.18, 0.10])
+SCLERA_CHROMA, SCLERA_SPREAD = np.array([0.18, -0.11]), np.array([0.10, 0.05])
+SKIN_ALONE = 0.5  # share of the skin's cast that is corrected where no white of the eye is seen
+SKIN_LANDMARKS = (50, 280, 205, 425, 151, 9, 108, 337)  # cheeks and forehead
+IRISES = ((468, (469, 470, 471, 472)), (473, (474, 475, 476, 477)))  # centre and rim, as in LID_RINGS
+MIN_IRIS_PX = 3.5  # radius; below it iris, lashes and white are mixed
+IRIS_RING, IRIS_TOP = (0.4, 0.8), 0.35  # of the radius: between pupil and limbus, below the lashes' shadow
+OFF_IRIS, OFF_LIDS = 1.35, 0.18  # of the radius: what is white of the eye, and how far lids reach into it
+IRIS_MIX_PX = 0.5  # over the radius: share of the surroundings' light; rendered eyes have .05 to .1 at 5 px
+MIN_OWN_LIGHT = 0.5  # of what is seen
+BRIGHT_WHITE, PLAIN_IRIS = 0.6, (0.2, 0.8)  # quantiles of luminance: white without shadow, iris without catchlights
+MIN_PIXELS = 6
+# Skin of cheeks and forehead in the renderer's studio light is gain * texture ** power in linear light, by channel:
+# least squares of logarithms over the head's eight identities, residuals .1. The tone curve compresses red.
+STUDIO_GAIN, STUDIO_POWER = np.array([1.02, 1.36, 1.51]), np.array([0.70, 0.96, 1.04])
+GLOSSY = (1.1, 1.25)  # of the skin's luminance, between which gloss begins to be removed
+FEW_PLAIN = 0.02  # share of places without gloss, around a place, that counts as much as the usual skin
+SKIN_SHARE = (0.2, 0.7)  # of the skin's luminance: hair and shadow up to the first, skin from the second
+EYE_GRID = (41, 25)  # samples across and down an eye
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EyeColours:
+    """Colours (3,), `log_colour`, of skin, white of the eye and iris; those that are not seen are NaN; radius in px."""
+
+    skin: Floats
+    sclera: Floats
+    iris: Floats
+    radius_px: float
+
+
+def log_colour(srgb: NDArray[np.floating]) -> Floats:
+    """(..., 3) logarithms of luminance, R/G and B/G in linear light, of colours (..., 3), sRGB 0..255."""
+    light = decode_srgb(np.clip(srgb, 0.0, 255.0) / 255.0) + DARKEST
+    green = light[..., 1]
+    found: Floats = np.log(np.stack([light @ LUMINANCE, light[..., 0] / green, light[..., 2] / green], axis=-1))
+    return found
+
+
+def linear_light(colour: Floats) -> Floats:
+    """Linear light (..., 3) of `log_colour` values."""
+    ratio = np.exp(np.stack([colour[..., 1], np.zeros(colour.shape[:-1]), colour[..., 2]], axis=-1))
+    light: Floats = ratio * (np.exp(colour[..., 0]) / (ratio @ LUMINANCE))[..., None] - DARKEST
+    return light
+
+
+def srgb_colour(colour: Floats) -> NDArray[np.uint8]:
+    """8-bit sRGB (..., 3) of `log_colour` values."""
+    return encode_srgb(linear_light(colour))
+
+
+def sample_eyes(picture: NDArray[np.uint8], points: NDArray[np.floating]) -> EyeColours:
+    """Colours of skin, sclera and iris in a picture (H, W, 3) with landmarks (478, 3) in pixels."""
+    places = points[:, :2].astype(np.float64)
+    skin = np.median(log_colour(sample_picture(picture, places[list(SKIN_LANDMARKS)])[0]), axis=0)
+    whites, irises, radii = [], [], []
+    for (centre, rim), lids in zip(IRISES, LID_RINGS, strict=True):
+        middle, opening = places[centre], places[list(lids)]
+        radius = float(np.linalg.norm(places[list(rim)] - middle, axis=1).mean())
+        low, high = opening.min(axis=0), opening.max(axis=0)
+        across, down = (np.linspace(low[axis], high[axis], EYE_GRID[axis]) for axis in (0, 1))
+        grid = np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 2)
+        colours = log_colour(sample_picture(picture, grid)[0])
+        off = np.linalg.norm(grid - middle, axis=1) / radius
+        is_open = polygon_depth(grid, opening, radius) > OFF_LIDS * radius
+        ring = (off > IRIS_RING[0]) & (off < IRIS_RING[1]) & (grid[:, 1] > middle[1] - IRIS_TOP * radius)
+        whites.append(_median_between(colours[is_open & (off > OFF_IRIS)], (BRIGHT_WHITE, 1.0)))
+        irises.append(_median_between(colours[is_open & ring], PLAIN_IRIS))
+        radii.append(radius)
+    return EyeColours(skin, _mean_known(whites), _mean_known(irises), float(np.mean(radii)))
+
+
+def _median_between(colours: Floats, quantiles: tuple[float, float]) -> Floats:
+    if len(colours) < MIN_PIXELS:
+        return np.full(3, np.nan)
+    low, high = np.quantile(colours[:, 0], quantiles)
+    middle: Floats = np.median(colours[(colours[:, 0] >= low) & (colours[:, 0] <= high)], axis=0)
+    return middle
+
+
+def _mean_known(colours: list[Floats]) -> Floats:
+    known = [colour for colour in colours if np.isfinite(colour).all()]
+    return np.asarray(np.mean(known, axis=0) if known else np.full(3, np.nan), np.float64)
+
+
+def median_eyes(seen: list[EyeColours]) -> EyeColours:
+    """The medians of many frames."""
+    skin, sclera, iris = (
+        _median_known([getattr(observed, name) for observed in seen]) for name in ("skin", "sclera", "iris")
+    )
+    return EyeColours(skin, sclera, iris, float(np.median([observed.radius_px for observed in seen])))
+
+
+def clear_iris(eyes: EyeColours) -> Floats:
+    """Colour (3,), `log_colour`, of the iris without the light of skin and white that a small picture mixes into it."""
+    share = IRIS_MIX_PX / eyes.radius_px
+    around = linear_light(eyes.skin)
+    if np.isfinite(eyes.sclera).all():
+        around = (around + linear_light(eyes.sclera)) / 2
+    seen = linear_light(eyes.iris)
+    own = np.maximum((seen - share * around) / (1.0 - share), MIN_OWN_LIGHT * seen)
+    return log_colour(255.0 * encode_light(own))
+
+
+def _median_known(colours: list[Floats]) -> Floats:
+    known = [colour for colour in colours if np.isfinite(colour).all()]
+    return np.asarray(np.median(known, axis=0) if known else np.full(3, np.nan), np.float64)
+
+
+def estimate_cast(eyes: EyeColours) -> Floats:
+    """(2,) cast of the light: the logarithms by which it raises R/G and B/G.
+
+    Skin and white of the eye each tell it, and each may err: a skin is ruddy or olive, a white is mixed with lids and
+    reddened. Where they do not agree in direction, there is none; where they do, it is their mean in B/G and the
+    smaller one in R/G.
+    """
+    of_skin = _beyond(eyes.skin[1:] - SKIN_CHROMA, SKIN_SPREAD)
+    if not np.isfinite(eyes.sclera).all():
+        return SKIN_ALONE * of_skin
+    of_white = _beyond(eyes.sclera[1:] - SCLERA_CHROMA, SCLERA_SPREAD)
+    smaller = np.sign(of_skin) * np.minimum(np.abs(of_skin), np.abs(of_white))
+    agreed = np.array([smaller[0], (of_skin[1] + of_white[1]) / 2])
+    return np.where(of_skin * of_white > 0, agreed, 0.0)
+
+
+def _beyond(off: Floats, spread: Floats) -> Floats:
+    return np.sign(off) * np.maximum(np.abs(off) - spread, 0.0)
+
+
+def remove_cast(srgb: Floats, cast: Floats, skin: Floats) -> Floats:
+    """Colours (..., 3), sRGB 0..255, as in neutral light; the luminance of a `skin`, `log_colour`, stays the same."""
+    gains = np.exp([-cast[0], 0.0, -cast[1]])
+    before = np.exp([skin[1], 0.0, skin[2]])
+    gains *= (before @ LUMINANCE) / ((before * gains) @ LUMINANCE)
+    return 255.0 * encode_light(decode_srgb(np.clip(srgb, 0.0, 255.0) / 255.0) * gains)
+
+
+def skin_texture(srgb: Floats, blurred: Callable[[Floats], Floats]) -> Floats:
+    """Colours (N, 3) of a texture, sRGB 0..255, of a face whose skin looks so in the renderer's studio light.
+
+    `blurred` gives means (N, D) of values (N, D) around each place: under gloss lies what lies around it. Hair,
+    brows and shadows, which are darker than skin, keep their hue.
+    """
+    light = decode_srgb(np.clip(srgb, 0.0, 255.0) / 255.0)
+    usual = np.median(light, axis=0)
+    plain = 1.0 - smoothstep(light @ LUMINANCE / (usual @ LUMINANCE), *GLOSSY)[:, None]
+    sums = blurred(np.column_stack([plain, plain * light]))
+    around = (sums[:, 1:] + FEW_PLAIN * usual) / (sums[:, :1] + FEW_PLAIN)
+    light = without_gloss(light, around)
+    gains = (usual / STUDIO_GAIN) ** (1.0 / STUDIO_POWER) / usual
+    grey = (gains * usual) @ LUMINANCE / (usual @ LUMINANCE)
+    is_skin = smoothstep(light @ LUMINANCE / (usual @ LUMINANCE), *SKIN_SHARE)
+    return 255.0 * encode_light(light * grey * (gains / grey) ** is_skin[:, None])
+
+
+def without_gloss(light: Floats, usual: Floats) -> Floats:
+    """Linear light (N, 3) of skin without what is white in places lighter than the usual (3,) or (N, 3) skin.
+
+    Shafer 1985, the dichromatic reflection model: light is a multiple of the skin's colour and a share of the lamp's,
+    which is white here. Wrinkles and shadows, which are darker, stay.
+    """
+    skin = np.maximum((light[:, 0] - light[:, 2]) / np.maximum(usual[..., 0] - usual[..., 2], DARKEST), GLOSSY[0])
+    share = smoothstep(light @ LUMINANCE / (usual @ LUMINANCE), *GLOSSY)[:, None]
+    found: Floats = light + share * (np.minimum(light, skin[:, None] * usual) - light)
+    return found

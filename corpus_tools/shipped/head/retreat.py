@@ -1,0 +1,78 @@
+"""Lower teeth and gums that retreat where an open jaw or a smile would carry them through the chin."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from corpus_tools.shipped.head.lips import Floats, ring_arcs
+from corpus_tools.shipped.head.skin import HeadSkin
+from corpus_tools.shipped.head.subdivision import triangulate
+
+COVER_MM = (
+    2.4  # of skin ahead of teeth and gums below the lip, for all people, whose shapes are those of the default one
+)
+CROWN_MM = 3.0  # half the size of a crown: it retreats as a whole
+BELOW_LIP_MM = 1.0  # what is higher than this below the edge of the lower lip is seen in the open mouth
+LARGEST_MM = 8.0
+OPENINGS = (0.5, 0.7, 0.85, 1.0)  # weights of jawOpen with which a smile is corrected
+SMILES = ("mouthSmileLeft", "mouthSmileRight")
+BACKWARDS = np.array([0.0, 0.0, -1.0])
+
+
+def add_retreat(
+    points: Floats, shapes: Mapping[str, Floats], skin: HeadSkin, lips: NDArray[np.int64]
+) -> dict[str, Floats]:
+    """Shapes of the lower arch with vertices (N, 3) that stays behind the skin with an open jaw and with a smile.
+
+    Parameters
+    ----------
+    shapes
+        Motion (N, 3) of the arch with the jaw.
+    lips
+        The ring of vertices where the lips meet.
+    """
+    moved = dict(shapes)
+    lower = ring_arcs(skin, lips)[1]
+
+    def lacking(opening: float, smiling: float) -> Floats:
+        """(N,) mm by which vertices must retreat in a pose."""
+        posed = skin.vertices + opening * skin.shapes["jawOpen"] + smiling * sum(skin.shapes[name] for name in SMILES)
+        place = points + opening * moved["jawOpen"]
+        line = posed[lower][np.argsort(posed[lower, 0])]
+        is_below = place[:, 1] < np.interp(place[:, 0], line[:, 0], line[:, 1]) - BELOW_LIP_MM
+        depth = place[:, 2] - front_depth(place[:, :2], posed, triangulate(skin.quads)) + COVER_MM
+        return np.where(is_below & (points[:, 2] > 0), np.clip(depth, 0.0, LARGEST_MM), 0.0)
+
+    beside = cKDTree(points[:, [0, 2]]).query_ball_point(points[:, [0, 2]], CROWN_MM)
+
+    def whole(depth: Floats) -> Floats:
+        """(N,) largest retreat of the vertices above, below and beside each one."""
+        return np.array([depth[near].max() for near in beside])
+
+    moved["jawOpen"] = moved["jawOpen"] + np.outer(whole(lacking(1.0, 0.0)), BACKWARDS)
+    most = whole(np.max([lacking(opening, 1.0) for opening in OPENINGS], axis=0))
+    for name in SMILES:
+        is_own = points[:, 0] > 0 if name.endswith("Left") else points[:, 0] <= 0
+        moved[name] = np.outer(most * is_own, BACKWARDS)
+    return moved
+
+
+def front_depth(places: Floats, vertices: Floats, triangles: NDArray[np.int64]) -> Floats:
+    """(N,) z of the foremost point of a surface at places (N, 2) of x and y; infinite where there is none."""
+    corners = vertices[triangles]
+    low, high = places.min(axis=0), places.max(axis=0)
+    flat = corners[:, :, :2]
+    near = ((flat.max(axis=1) > low) & (flat.min(axis=1) < high)).all(axis=1)
+    a, b, c = corners[near].transpose(1, 0, 2)
+    area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
+    area = np.where(np.abs(area) < 1e-9, np.inf, area)
+    front = np.full(len(places), np.inf)
+    for number, (x, y) in enumerate(places):
+        one = ((x - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (y - a[:, 1])) / area
+        two = ((b[:, 0] - a[:, 0]) * (y - a[:, 1]) - (x - a[:, 0]) * (b[:, 1] - a[:, 1])) / area
+        inside = (one >= 0) & (two >= 0) & (one + two <= 1)
+        if inside.any():
+            front[number] = (a[:, 2] + one * (b - a)[:, 2] + two * (c - a)[:, 2])[inside].max()
+    return front

@@ -1,0 +1,89 @@
+"""Blinks: onsets, durations and speeds, interpolated linearly between frames."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.studies.gestures.measures import Doubles
+
+SHUT = 0.5  # closure from which lids count as shut (as in tts2face.gestures.noise)
+OPEN = 0.2  # closure below which lids count as open; trackers measure about 0.1 for narrowed eyes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Blinks:
+    """Blinks of some recordings.
+
+    Parameters
+    ----------
+    n, seconds
+        Number of blinks and duration of the recordings.
+    intervals : (I,)
+        Seconds from onset to onset within a recording; an onset is an upward crossing of `SHUT`.
+    closing, opening : (B,)
+        Seconds from `OPEN` to the instant of the greatest closure, and from there to `OPEN`.
+    closing_speeds, opening_speeds : (B,)
+        Highest speed of each, shares per second.
+
+    Blinks that begin or end outside their recording contribute only their onsets.
+    """
+
+    n: int
+    seconds: float
+    intervals: Doubles
+    closing: Doubles
+    opening: Doubles
+    closing_speeds: Doubles
+    opening_speeds: Doubles
+
+    @property
+    def durations(self) -> Doubles:
+        """(B,) seconds from open to open."""
+        return self.closing + self.opening
+
+    @property
+    def per_minute(self) -> float:
+        """Blinks per minute."""
+        return 60 * self.n / self.seconds
+
+
+def find_blinks(shut: NDArray[np.floating], lengths: NDArray[np.int32], fps: float) -> Blinks:
+    """Blinks in concatenated recordings of `lengths` (R,) frames, from lid closures (T, 2) or (T,) in 0..1."""
+    lids = np.asarray(shut, np.float64).reshape(len(shut), -1).mean(axis=1)
+    n, intervals, found = 0, [np.zeros(0)], [np.zeros((0, 4))]
+    for part in np.split(lids, np.cumsum(lengths)[:-1]):
+        onsets = blink_onsets(part) / fps
+        n += len(onsets)
+        intervals.append(np.diff(onsets))
+        found.append(_blink_phases(part, fps))
+    closing, opening, closing_speeds, opening_speeds = np.concatenate(found).T
+    seconds = float(np.sum(lengths)) / fps
+    return Blinks(n, seconds, np.concatenate(intervals), closing, opening, closing_speeds, opening_speeds)
+
+
+def blink_onsets(lids: Doubles) -> Doubles:
+    """(B,) fractional frames at which lid closures (T,) cross `SHUT` upwards."""
+    shut = lids > SHUT
+    last = np.flatnonzero(~shut[:-1] & shut[1:])
+    return np.asarray(last + (SHUT - lids[last]) / (lids[last + 1] - lids[last]))
+
+
+def _blink_phases(lids: Doubles, fps: float) -> Doubles:
+    """(B, 4) closing time, opening time, closing speed and opening speed of the blinks within a recording."""
+    rows = []
+    closed = lids > OPEN
+    begins = np.flatnonzero(~closed[:-1] & closed[1:])
+    for begin in begins:
+        after = np.flatnonzero(~closed[begin + 1 :])
+        if not len(after):
+            break
+        end = begin + 1 + int(after[0])  # the first open frame
+        top = begin + int(np.argmax(lids[begin : end + 1]))
+        if lids[top] <= SHUT:
+            continue
+        first = begin + (OPEN - lids[begin]) / (lids[begin + 1] - lids[begin])
+        last = end - (OPEN - lids[end]) / (lids[end - 1] - lids[end])
+        speeds = np.diff(lids[begin : end + 1]) * fps
+        rows.append(((top - first) / fps, (last - top) / fps, speeds.max(), -speeds.min()))
+    return np.array(rows, np.float64).reshape(-1, 4)
