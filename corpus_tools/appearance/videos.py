@@ -64,8 +64,11 @@ def build_appearance_recording(
         The video can no longer be read.
     """
     tracked = tracker.track(observation.video)
-    fps, begin = observation.fps, observation.quality.cut  # the rate that all recordings have, maybe not the video's
+    fps, first_frame = (
+        observation.fps,
+        observation.quality.cut,
+    )  # the rate that all recordings have, maybe not the video's
     points, first = resample_to_grid(tracked.tracking.points, tracked.times, fps)
-    start = round(begin * fps) - first
+    start = round(first_frame * fps) - first
     here, _ = fill_gaps(points[start : start + len(observation.landmarks)], fps)
-    return AppearanceRecording(observation.video, begin, fps, here[:, :, :2].copy(), observation.landmarks, shape)
+    return AppearanceRecording(observation.video, first_frame, fps, here[:, :, :2].copy(), observation.landmarks, shape)

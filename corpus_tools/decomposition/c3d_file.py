@@ -101,8 +101,8 @@ def _count_frames(words: NDArray[Any], parameters: Parameters, n_held: int) -> i
     first, last = int(words[3]), int(words[4])
     stated = [float(parameters[name][0]) for name in ("POINT:LONG_FRAMES", "POINT:FRAMES") if name in parameters]
     if parameters.keys() >= set(TRIAL_FIELDS):  # two words each, the lower one first
-        begin, end = (int(parameters[name].astype(np.uint16) @ (1, 2**16)) for name in TRIAL_FIELDS)
-        stated.append(end - begin + 1)
+        start, end = (int(parameters[name].astype(np.uint16) @ (1, 2**16)) for name in TRIAL_FIELDS)
+        stated.append(end - start + 1)
     n_frames = last - first + 1
     for count in stated:
         if count >= n_frames and (last == LARGEST_COUNT or (count - n_frames) % 2**16 == 0):

@@ -111,9 +111,9 @@ def _interpolate_frames(values: Floats, fps: float, target_fps: float, n_frames:
     curve = make_interp_spline(np.arange(len(values)) / fps, values, k=min(3, len(values) - 1))
     if target_fps >= fps:
         return np.asarray(curve(np.minimum(instants, end)))
-    begin, stop = np.clip(instants - 0.5 / target_fps, 0, end), np.clip(instants + 0.5 / target_fps, 0, end)
+    start, stop = np.clip(instants - 0.5 / target_fps, 0, end), np.clip(instants + 0.5 / target_fps, 0, end)
     area = curve.antiderivative()
-    return np.asarray((area(stop) - area(begin)) / (stop - begin)[:, None])
+    return np.asarray((area(stop) - area(start)) / (stop - start)[:, None])
 
 
 def read_capture_sound(capture: Path) -> Waveform | None:

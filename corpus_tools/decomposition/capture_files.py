@@ -94,7 +94,7 @@ def _missing_features(capture: FaceCapture) -> frozenset[str]:
         name for name, values in zip(capture.weights.channels, capture.weights.values.T, strict=True) if np.ptp(values)
     ]
     missing = {
-        feature for feature, begins in FEATURE_CHANNELS.items() if not any(name.startswith(begins) for name in moving)
+        feature for feature, starts in FEATURE_CHANNELS.items() if not any(name.startswith(starts) for name in moving)
     }
     if not capture.head.values.any():
         missing.add("head")

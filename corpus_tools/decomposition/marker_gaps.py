@@ -45,10 +45,10 @@ def check_gap(what: str, is_missing: NDArray[np.bool_], fps: float) -> None:
     """Check that gaps, True in (T,), are short enough to be filled; errors as `fill_marker_gaps`."""
     if is_missing.all():
         raise DataError(f"the {what} is never visible; {MARKER_SET_ADVICE}, or capture it again")
-    begin, end = max(true_runs(is_missing).tolist(), key=lambda gap: gap[1] - gap[0], default=(0, 0))
-    if (end - begin) / fps > MAX_MARKER_GAP_S:
+    start, end = max(true_runs(is_missing).tolist(), key=lambda gap: gap[1] - gap[0], default=(0, 0))
+    if (end - start) / fps > MAX_MARKER_GAP_S:
         raise DataError(
-            f"the {what} is hidden for {(end - begin) / fps:.2f} s from {begin / fps:.2f} s on, and gaps up to "
+            f"the {what} is hidden for {(end - start) / fps:.2f} s from {start / fps:.2f} s on, and gaps up to "
             f"{MAX_MARKER_GAP_S:g} s can be filled; fill it in the capture software, or {MARKER_SET_ADVICE}"
         )
 

@@ -43,13 +43,13 @@ def read_video_recording(video: Path, tracker: CachedTracker) -> FaceRecording:
         picture_measures(tracked.n_faces, tracked.changes, tracked.times) | {"turn_deg": head_turn_deg(angles)}
     )
     place = posed.translations - np.median(posed.translations, axis=0)
-    begin = (first + start) / tracked.fps
+    first_frame = (first + start) / tracked.fps
     return FaceRecording(
         name=video.stem,
         fps=tracked.fps,
         landmarks=posed.landmarks,
         head=np.column_stack([angles, place]).astype(np.float32),
-        sound=read_sound_span(video, begin, len(filled) / tracked.fps),
+        sound=read_sound_span(video, first_frame, len(filled) / tracked.fps),
         notes=(f"{n_filled} frames without a face were interpolated",) if n_filled else (),
     )
 

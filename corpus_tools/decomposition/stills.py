@@ -108,7 +108,7 @@ class PictureReader:
 
 
 def build_marker_reader(rest: MarkerFace) -> Callable[[Still], Floats]:
-    """What reads static marker captures of a person, in the person's own size."""
+    """Reader of static marker captures of a person, in the person's own size."""
     return lambda still: read_marker_still(still.path, rest)
 
 

@@ -90,7 +90,7 @@ def build_avatar(  # noqa: PLR0913 - one parameter an option
 def _read(
     photos: Sequence[str | Path], head: Face, model: Path | None, on_warning: Callable[[str], None]
 ) -> tuple[list[TrackedPictures], list[Floats]]:
-    """What the pictures show, and the landmarks (478, 3) of each without its expression, mm."""
+    """The look that the pictures show, and the landmarks (478, 3) of each without its expression, mm."""
     reader = PhotoReader(model, on_warning)
     seen, neutral = [], []
     for photo in photos:

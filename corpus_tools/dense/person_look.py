@@ -1,4 +1,4 @@
-"""What a person's head gets from videos besides shape and skin: light, hair, eyes, brows and shirt."""
+"""Look of a person's head from videos, besides shape and skin: light, hair, eyes, brows and shirt."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -92,7 +92,7 @@ class PersonLook:
 
 @dataclass(frozen=True, slots=True)
 class LookChoices:
-    """What is chosen of a look: a name of `EYE_COLOURS` or #rrggbb, and whether fine lines of the skin stay."""
+    """Choices of a look: a name of `EYE_COLOURS` or #rrggbb, and whether fine lines of the skin stay."""
 
     eye_color: str | None = None
     keeps_lines: bool = True

@@ -140,7 +140,7 @@ def similarities(ones: Sequence[Floats], others: Sequence[Floats]) -> NDArray[np
         At most 1.
     """
     right = _Table.of(others)
-    blocks = [_Table.of(ones[begin : begin + BLOCK]) for begin in range(0, len(ones), BLOCK)]
+    blocks = [_Table.of(ones[start : start + BLOCK]) for start in range(0, len(ones), BLOCK)]
     return np.concatenate([_block_similarities(left, right) for left in blocks])
 
 
@@ -218,8 +218,8 @@ def _sound(observation: Observation) -> Waveform | None:
     if observation.video.suffix == TRACK_SUFFIX or not observation.video.is_file():
         return None
     whole = _read_sound(observation.video)
-    begin = round((observation.quality.cut + observation.quality.lag) * SOUND_RATE)
-    samples = whole.samples[max(begin, 0) :][: round(len(observation.landmarks) / observation.fps * SOUND_RATE)]
+    start = round((observation.quality.cut + observation.quality.lag) * SOUND_RATE)
+    samples = whole.samples[max(start, 0) :][: round(len(observation.landmarks) / observation.fps * SOUND_RATE)]
     return Waveform(samples, SOUND_RATE) if len(samples) >= WINDOW_SAMPLES + STEP_SAMPLES else None
 
 

@@ -81,10 +81,10 @@ def map_word_times(speech: Speech, phones: PhoneSequence, words: Sequence[WordSp
 
 def _word_edges(phones: PhoneSequence, words: Sequence[WordSpan]) -> NDArray[np.float64]:
     """(2 W,) strictly increasing seconds at which words begin and end."""
-    begins = np.array([phones.edges[word.first] for word in words])
+    starts = np.array([phones.edges[word.first] for word in words])
     ends = np.array([phones.edges[word.last] for word in words])
-    ends[:-1] = np.minimum(ends[:-1], begins[1:] - MIN_WORD_GAP_S)
-    return np.stack([begins, ends], axis=1).ravel()
+    ends[:-1] = np.minimum(ends[:-1], starts[1:] - MIN_WORD_GAP_S)
+    return np.stack([starts, ends], axis=1).ravel()
 
 
 def compare_own_durations(

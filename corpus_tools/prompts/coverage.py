@@ -22,7 +22,7 @@ PHONE_SHARE = 0.5  # weight of all phones together in units of that of all triph
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """What one sentence contains: its phones, and a triphone for each of them."""
+    """Content of one sentence: its phones, and a triphone for each of them."""
 
     phones: tuple[str, ...]
     triphones: tuple[Triphone, ...]
@@ -30,7 +30,7 @@ class Units:
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
-    """What sentences cover.
+    """Phones and triphones that sentences cover.
 
     Parameters
     ----------

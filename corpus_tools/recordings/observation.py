@@ -133,15 +133,17 @@ def observe_recording(
     tracked = tracker.track(recording.video)
     filled, first, n_filled = _span_landmarks(tracked, recording.span, timing)
     fps = timing.fps or tracked.fps
-    begin = first / fps
-    start = begin + timing.lag - (recording.span[0] if recording.span else 0.0)  # in seconds of the sound
+    first_frame = first / fps
+    start = first_frame + timing.lag - (recording.span[0] if recording.span else 0.0)  # in seconds of the sound
     phones, spans = trim_to_picture(sound, start, start + len(filled) / fps)
     posed = remove_pose(filled, fps)
-    here = (tracked.times > begin - TIME_TOLERANCE_S) & (tracked.times < begin + len(filled) / fps - TIME_TOLERANCE_S)
+    here = (tracked.times > first_frame - TIME_TOLERANCE_S) & (
+        tracked.times < first_frame + len(filled) / fps - TIME_TOLERANCE_S
+    )
     measures |= picture_measures(tracked.n_faces[here], tracked.changes[here], tracked.times[here])
     measures["turn_deg"] = head_turn_deg(head_angles(posed.rotations))
     measures |= landmark_measures(filled, posed.landmarks)
-    measures |= light_measures(tracker.light(recording.video), begin, begin + len(filled) / fps)
+    measures |= light_measures(tracker.light(recording.video), first_frame, first_frame + len(filled) / fps)
     judge(measures)
     return Observation(
         name=recording.name,
@@ -155,7 +157,7 @@ def observe_recording(
             fit=sound.fit,
             score=_lowest_score(tracked, here),
             n_filled=n_filled,
-            cut=begin,
+            cut=first_frame,
             lag=timing.lag,
             **measures,
         ),
@@ -170,14 +172,14 @@ def _span_landmarks(
 ) -> tuple[NDArray[np.float32], int, int]:
     """Landmarks of the frames of a span of the sound, the index of the first, and the number of interpolated ones."""
     fps = timing.fps or tracked.fps
-    begin, end = (0.0, np.inf) if span is None else (span[0] - timing.lag, span[1] - timing.lag)
-    near = (tracked.times > begin - N_NEIGHBOUR_FRAMES / fps) & (tracked.times < end + N_NEIGHBOUR_FRAMES / fps)
+    first_frame, end = (0.0, np.inf) if span is None else (span[0] - timing.lag, span[1] - timing.lag)
+    near = (tracked.times > first_frame - N_NEIGHBOUR_FRAMES / fps) & (tracked.times < end + N_NEIGHBOUR_FRAMES / fps)
     if near.sum() < MIN_FRAMES:
         where = "" if span is None else f" from {span[0]:.2f} s to {span[1]:.2f} s"
         raise DataError(f"the video has no frames{where}; check its length and the times")
     points, first = resample_to_grid(tracked.tracking.points[near], tracked.times[near], fps)
     instants = (first + np.arange(len(points))) / fps
-    inside = (instants > begin - TIME_TOLERANCE_S) & (instants < end + TIME_TOLERANCE_S)
+    inside = (instants > first_frame - TIME_TOLERANCE_S) & (instants < end + TIME_TOLERANCE_S)
     points, first = points[inside], first + int(inside.argmax())
     filled, start, n_filled = trim_and_fill(points, fps)
     return filled, first + start, n_filled

@@ -141,7 +141,7 @@ def _read_cached_alignment(cached: Path, sound: Waveform, *, is_recognised: bool
 
     def build(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> AlignedSpeech:
         words = tuple(WordSpan(text, first, last, sure) for text, first, last, sure in header["words"])
-        mismatches = tuple(TextMismatch(begin, end, tuple(missing)) for begin, end, missing in header["mismatches"])
+        mismatches = tuple(TextMismatch(start, end, tuple(missing)) for start, end, missing in header["mismatches"])
         phones = PhoneSequence(header["phones"], arrays["edges"])
         return AlignedSpeech(phones, words, float(header["fit"]), mismatches, sound, is_recognised)
 

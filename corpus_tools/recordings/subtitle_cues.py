@@ -34,9 +34,9 @@ def read_cues(path: Path) -> tuple[SpokenCue, ...]:
     if not spoken:
         raise DataError(f"{path} contains no subtitles; export them again")
     cues = []
-    for number, (begin, end, text) in enumerate(spoken):
+    for number, (start, end, text) in enumerate(spoken):
         before = spoken[number - 1][1] if number else 0.0
         behind = spoken[number + 1][0] if number + 1 < len(spoken) else end + 2 * CUE_MARGIN_S
-        earliest, latest = min((before + begin) / 2, begin), max((end + behind) / 2, end)
-        cues.append(SpokenCue(max(begin - CUE_MARGIN_S, earliest, 0.0), min(end + CUE_MARGIN_S, latest), text))
+        earliest, latest = min((before + start) / 2, start), max((end + behind) / 2, end)
+        cues.append(SpokenCue(max(start - CUE_MARGIN_S, earliest, 0.0), min(end + CUE_MARGIN_S, latest), text))
     return tuple(cues)

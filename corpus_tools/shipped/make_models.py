@@ -51,13 +51,13 @@ class Making:
     report: Callable[[str], None]
 
     def stage(self, name: str) -> Progress:
-        """Callback of a stage, of which only the start is told."""
+        """Callback of a stage, of which only the start is reported."""
         self.report(name)
         return lambda done, of: None
 
 
 def make_phones(making: Making) -> None:
-    """What finds the phones in the sound of the voice ``heart``, and in recordings: half an hour."""
+    """The networks that find the phones in the sound of the voice ``heart``, and in recordings: half an hour."""
     from corpus_tools.shipped.training.phone_classifier import train_recording_classifier, train_voice_classifier
     from tts2face.models.phone_classifier import write_phone_classifier
 

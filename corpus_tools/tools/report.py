@@ -20,7 +20,7 @@ SEED = 0
 
 @dataclass(frozen=True, slots=True)
 class ReportOrder:
-    """What is to be reported.
+    """Order of a report.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ from tts2face.serving.work.resource_check import TALKER, RefusedFileError, check
 
 @dataclass(frozen=True, slots=True)
 class BuildOrder:
-    """What is to be built.
+    """Order of a build.
 
     Parameters
     ----------

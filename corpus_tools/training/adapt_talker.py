@@ -172,8 +172,8 @@ def _own_frames(
     phones = observation.phones
     times = np.arange(len(observation.landmarks)) / observation.fps
     sounding = [at for at, label in enumerate(phones.phones) if label != SILENCE]
-    begin, end = phones.edges[sounding[0]], phones.edges[sounding[-1] + 1]
-    near = (times >= begin - SPEECH_MARGIN_S) & (times <= end + SPEECH_MARGIN_S)
+    start, end = phones.edges[sounding[0]], phones.edges[sounding[-1] + 1]
+    near = (times >= start - SPEECH_MARGIN_S) & (times <= end + SPEECH_MARGIN_S)
     own = model.parameters(observation.landmarks[near])[:, : model.n_speech].astype(np.float64)
     return frame_terms(phones, times[near], inventory, lips[near]), own
 

@@ -81,7 +81,7 @@ class ChosenAdaptation:
 
     @property
     def message(self) -> str:
-        """What to expect of the talker, for the user."""
+        """Quality to expect of the talker, for the user."""
         if self.score is None:
             return "one recording cannot be held out: the base's articulation is kept; record two sentences or more"
         base = self.alternatives["base alone"]

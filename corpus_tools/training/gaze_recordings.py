@@ -71,8 +71,8 @@ class Fixations:
                 places.append(place)
         ends = self.start + self.duration
         last = np.append(first[1:], len(self.start)) - 1
-        begin = self.start[first]
-        return Fixations(begin, ends[last] - begin, np.array(places), self.segment[first], self.passage[first])
+        start = self.start[first]
+        return Fixations(start, ends[last] - start, np.array(places), self.segment[first], self.passage[first])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -220,7 +220,7 @@ def _train_epoch(order, data, codes, weights, moments, rule):  # type: ignore[no
     layers = (np.zeros(n_first, np.float32), np.zeros_like(weights[4]), np.zeros_like(weights[6]))
     errors = (np.zeros(n_first, np.float32), np.zeros_like(weights[4]))
     gradients = (row_gradients, place, biases, inner, inner_biases, outer, outer_biases)
-    for begin in range(0, len(order) - BATCH + 1, BATCH):
+    for start in range(0, len(order) - BATCH + 1, BATCH):
         _code_phones(table, weights[0], phone_rows)
         for part in (row_gradients, code_gradients):
             part[:] = 0.0
@@ -229,7 +229,7 @@ def _train_epoch(order, data, codes, weights, moments, rule):  # type: ignore[no
         inner_biases[:] = 0.0
         outer_biases[:] = 0.0
         transposed = (np.ascontiguousarray(weights[3].T), np.ascontiguousarray(weights[5].T))
-        for n in order[begin : begin + BATCH]:
+        for n in order[start : start + BATCH]:
             _forward(shown[n], position[n], speaker[n], phone_rows, weights, layers)
             for d in range(len(layers[2])):
                 layers[2][d] = (layers[2][d] - targets[n, d]) * importance[speaker[n], d] / np.float32(BATCH)

@@ -100,7 +100,7 @@ def _known_recordings(known: Talker, base: str, observations: Sequence[Observati
 
 
 def recording_advice(observations: Sequence[Observation]) -> tuple[str, ...]:
-    """What to record next: English phones that are rare in the recordings, and phones in few contexts."""
+    """Advice for the next recordings: English phones that are rare in the recordings, and phones in few contexts."""
     counts: Counter[str] = Counter()
     contexts: dict[str, set[tuple[str, str]]] = {}
     for observation in observations:

@@ -1,4 +1,4 @@
-"""What a drawn character is: its shape, colours, eyes, brows, lashes, hair and clothes, as tables of numbers."""
+"""A drawn character: its shape, colours, eyes, brows, lashes, hair and clothes, as tables of numbers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -47,7 +47,7 @@ def wind_outward(points: Floats, triangles: Ints, about: Floats | float = 0.0) -
 
 
 class Front:
-    """What lies in front, seen along z, of lines that must not sink into a surface (N, 3)."""
+    """Points that lie in front, seen along z, of lines that must not sink into a surface (N, 3)."""
 
     def __init__(self, surface: Floats) -> None:
         self._depth, self._places = surface[:, 2], cKDTree(surface[:, :2])

@@ -29,7 +29,7 @@ NECK_PX = 55  # of 512 below the lower lip, where the face ends
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What is compared: a pose, seen by a camera of `tts2face.picture.options.Picture`."""
+    """One comparison: a pose, seen by a camera of `tts2face.picture.options.Picture`."""
 
     pose: LitPose
     camera: str

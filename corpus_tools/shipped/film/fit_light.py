@@ -140,7 +140,7 @@ def _light_in_texels(
     number: int,
     light: BakedLight | None = None,
 ) -> dict[str, Any]:
-    """What depends on the haircut, but for the light of vertices, by the names of `HairLight`.
+    """All that depends on the haircut, but for the light of vertices, by the names of `HairLight`.
 
     The first of `poses` has those in which triangles are seen, the second the light; `uncovered` is the share (s, s)
     and light (s, s, 3) of what other poses uncover, `number` that of the modes of turns. With `light`, that of the face

@@ -38,7 +38,7 @@ TONE_ROUNDS, COLOUR_ROUNDS = 3, 6  # of neighbours over which changes are alike;
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Missing:
-    """What a drawn picture lacks in n pixels of one surface each.
+    """Light that a drawn picture lacks in n pixels of one surface each.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ def fit_to_pictures(face: Face, poses: Sequence[LitPose], pictures: Mapping[str,
 def _missing(
     face: Face, poses: Sequence[LitPose], pictures: Mapping[str, Pixels]
 ) -> tuple[LitScene, list[Missing], list[Missing]]:
-    """What is missing in each pose, of the skin's and the mouth's vertices that are drawn."""
+    """Light that is missing in each pose, of the skin's and the mouth's vertices that are drawn."""
     renderer = mesh_renderer(face, Picture(size=f"{SIDE_PX}x{SIDE_PX}", background="transparent"))
     scene = renderer.scene
     if not isinstance(scene, LitScene):
@@ -137,7 +137,7 @@ def _shares(scene: LitScene, pose: LitPose, wanted: NDArray[np.bool_]) -> tuple[
 
 
 def _among(missing: Missing, own: NDArray[np.bool_]) -> Missing:
-    """What is missing in the pixels of some vertices (N,) of a part."""
+    """Light that is missing in the pixels of some vertices (N,) of a part."""
     shares = missing.shares[:, own]
     seen = np.asarray(shares.sum(axis=1)).ravel() > 0
     return Missing(shares[seen], missing.light[seen], missing.terms[:, own])

@@ -1,4 +1,4 @@
-"""What a character is made of and lit by: one table of choices, in the path tracer's terms.
+"""Materials and light of a character: one table of choices, in the path tracer's terms.
 
 Lengths of lamps and the wall are in decimetres, about the middle between the eyes; x is the person's left, y up, z
 towards the viewer. Colours are linear light, or sRGB where a field says so.

@@ -37,7 +37,7 @@ def part_materials(look: Look, skin: Texture, eye: Texture) -> dict[str, Any]:
 
 
 def white() -> Any:
-    """What eyeballs are baked in: their light alone."""
+    """Material in which eyeballs are baked: their light alone."""
     shader = Shader("white")
     surface = shader.principled(Base_Color=rgba((WHITE,) * 3), Roughness=0.4, Specular_IOR_Level=0.0)
     surface.inputs["Subsurface Weight"].default_value = 0.2

@@ -32,7 +32,7 @@ REGIONS = ("face", "mouth", "eyes", "hair", "clothes")
 
 
 def views(face: Face) -> dict[str, View]:
-    """What is compared, by name: rest, poses that were not fitted, and cameras round the pose at rest."""
+    """Comparisons by name: rest, poses that were not fitted, and cameras round the pose at rest."""
     rest = LitPose("rest", np.zeros(len(face.shape_names), np.float32), np.zeros(6, np.float32))
     found = {"rest": View(rest, "front")}
     found |= {pose.name: View(pose, "front") for pose in held_out_poses(face)}

@@ -43,7 +43,7 @@ def shape_names(cage: Cage) -> list[str]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Data:
-    """What the faces are made from: MakeHuman's mesh, and the folder of its assets."""
+    """Sources of the faces: MakeHuman's mesh, and the folder of its assets."""
 
     source: SourceMesh
     assets: Path

@@ -104,12 +104,12 @@ def assemble_face(
 
 
 def _parts(built: HeadPieces, firsts: NDArray[np.integer]) -> tuple[NDArray[np.int32], list[FacePart]]:
-    triangles, parts, begin = [], [], 0
+    triangles, parts, start = [], [], 0
     for first, piece in zip(firsts, built.pieces, strict=False):
         for span in piece.spans:
             triangles.append(span.triangles + first)
-            parts.append(FacePart(span.name, begin, len(span.triangles), **span.material))
-            begin += len(span.triangles)
+            parts.append(FacePart(span.name, start, len(span.triangles), **span.material))
+            start += len(span.triangles)
     return np.concatenate(triangles).astype(np.int32), parts
 
 

@@ -1,4 +1,4 @@
-"""What a user gets: lips from the sound of test utterances, with their words and without, in place of given phones.
+"""Lips as a user gets them: from the sound of test utterances, with their words and without, in place of given phones.
 
 The sounds of a person lie in one folder, for each track ``NAME.npz`` a sound ``NAME.flac`` on its clock. Edges that
 were set by hand (``NAME.phones.tsv`` with start, end and ipa) replace those of the track as the truth.

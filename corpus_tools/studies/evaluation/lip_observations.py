@@ -72,8 +72,8 @@ def lip_observations(pooled: Sequence[PooledSpeech], talker: Talker) -> tuple[Ob
         raised = track.features.copy()
         raised[:, OPENING] += max(gap, 0.0)
         landmarks = model.shapes(separate_lips(feature_map.parameters(raised), model))
-        for number, (begin, end) in enumerate(_parts(track.phones, track.fps, len(landmarks)), start=1):
-            found.append(_part(track, landmarks, number, begin, end))
+        for number, (start, end) in enumerate(_parts(track.phones, track.fps, len(landmarks)), start=1):
+            found.append(_part(track, landmarks, number, start, end))
     return tuple(found)
 
 
@@ -89,24 +89,24 @@ def _touching_opening(feature_map: FeatureMap, talker: Talker) -> float:
 
 def _parts(phones: PhoneSequence, fps: float, n_frames: int) -> Iterator[tuple[int, int]]:
     """First frame and end of each part, cut in the middle of pauses; all parts hold speech."""
-    begin = 0
+    first_frame = 0
     for label, start, end in zip(phones.phones, phones.edges, phones.edges[1:], strict=False):
         middle = round((start + end) / 2 * fps)
-        if label == SILENCE and end - start >= MIN_PAUSE_S and (middle - begin) / fps >= MIN_PART_S:
-            yield begin, middle
-            begin = middle
+        if label == SILENCE and end - start >= MIN_PAUSE_S and (middle - first_frame) / fps >= MIN_PART_S:
+            yield first_frame, middle
+            first_frame = middle
     last = min(n_frames, int(phones.edges[-1] * fps))
-    if (last - begin) / fps >= MIN_PART_S:
-        yield begin, last
+    if (last - first_frame) / fps >= MIN_PART_S:
+        yield first_frame, last
 
 
-def _part(track: PooledSpeech, landmarks: NDArray[np.float32], number: int, begin: int, end: int) -> Observation:
-    start, stop, edges = begin / track.fps, end / track.fps, track.phones.edges
+def _part(track: PooledSpeech, landmarks: NDArray[np.float32], number: int, first_frame: int, end: int) -> Observation:
+    start, stop, edges = first_frame / track.fps, end / track.fps, track.phones.edges
     inside = [at for at in range(len(track.phones)) if edges[at + 1] > start and edges[at] < stop]
     times = np.concatenate([[start], edges[[at + 1 for at in inside[:-1]]], [stop]]) - start
     phones = PhoneSequence([track.phones.phones[at] for at in inside], times)
-    head = np.zeros((end - begin, 6), np.float32)
+    head = np.zeros((end - first_frame, 6), np.float32)
     name = f"{track.name}-{number:03d}"
     return Observation(
-        name, track.fps, landmarks[begin:end], head, phones, (), head[:, 0], TRACKED, Path(f"{track.name}.npz")
+        name, track.fps, landmarks[first_frame:end], head, phones, (), head[:, 0], TRACKED, Path(f"{track.name}.npz")
     )

@@ -42,8 +42,8 @@ def observe_livelink(path: Path, run_options: RunOptions) -> tuple[Observation, 
     aligner = CachedAligner(run_options.folder())
     found = []
     for number, span in enumerate(cut_at_pauses(aligner.sound(sound), MAX_UTTERANCE_S), start=1):
-        begin, end = (round(second * motion.fps) for second in span)
-        landmarks = moved_landmarks(face, motion.part(begin, end))
+        start, end = (round(second * motion.fps) for second in span)
+        landmarks = moved_landmarks(face, motion.part(start, end))
         found.append(_build_observation(f"{path.stem}-{number:02d}", (aligner, sound), span, landmarks, motion.fps))
     return tuple(found)
 

@@ -158,9 +158,9 @@ def label_phones(axes: "Axes", phones: PhoneSequence, end: float) -> None:
     """Draw a line at each phone edge up to `end` seconds and write the phones above the axes."""
     place = axes.get_xaxis_transform()
     axes.vlines(phones.edges[phones.edges <= end], 0, 1, RULE, linewidth=1, transform=place, zorder=0)
-    for phone, begin, stop in zip(phones.phones, phones.edges, phones.edges[1:], strict=False):
-        if phone != SILENCE and begin < end:
-            axes.text(float(begin + min(stop, end)) / 2, 1.02, phone, ha="center", va="bottom", transform=place)
+    for phone, start, stop in zip(phones.phones, phones.edges, phones.edges[1:], strict=False):
+        if phone != SILENCE and start < end:
+            axes.text(float(start + min(stop, end)) / 2, 1.02, phone, ha="center", va="bottom", transform=place)
 
 
 def cost_histogram(samples: Mapping[str, Sequence[float]]) -> str:

@@ -73,17 +73,17 @@ def _blink_phases(lids: Doubles, fps: float) -> Doubles:
     """(B, 4) closing time, opening time, closing speed and opening speed of the blinks within a recording."""
     rows = []
     closed = lids > OPEN
-    begins = np.flatnonzero(~closed[:-1] & closed[1:])
-    for begin in begins:
-        after = np.flatnonzero(~closed[begin + 1 :])
+    starts = np.flatnonzero(~closed[:-1] & closed[1:])
+    for start in starts:
+        after = np.flatnonzero(~closed[start + 1 :])
         if not len(after):
             break
-        end = begin + 1 + int(after[0])  # the first open frame
-        top = begin + int(np.argmax(lids[begin : end + 1]))
+        end = start + 1 + int(after[0])  # the first open frame
+        top = start + int(np.argmax(lids[start : end + 1]))
         if lids[top] <= SHUT:
             continue
-        first = begin + (OPEN - lids[begin]) / (lids[begin + 1] - lids[begin])
+        first = start + (OPEN - lids[start]) / (lids[start + 1] - lids[start])
         last = end - (OPEN - lids[end]) / (lids[end - 1] - lids[end])
-        speeds = np.diff(lids[begin : end + 1]) * fps
+        speeds = np.diff(lids[start : end + 1]) * fps
         rows.append(((top - first) / fps, (last - top) / fps, speeds.max(), -speeds.min()))
     return np.array(rows, np.float64).reshape(-1, 4)

@@ -67,5 +67,5 @@ def _channels(phones: PhoneSequence, seed: int) -> Doubles:
 def _breaths(level: Doubles) -> float:
     """Breaths a minute: beginnings of a rise."""
     rises = np.diff(level) > RISING
-    begins = int((rises[1:] & ~rises[:-1]).sum())
-    return begins * 60 * GESTURE_FPS / len(level)
+    starts = int((rises[1:] & ~rises[:-1]).sum())
+    return starts * 60 * GESTURE_FPS / len(level)

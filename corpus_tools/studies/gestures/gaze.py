@@ -56,7 +56,7 @@ def survival(lengths: Lengths) -> Distribution:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GazeMeasures:
-    """What is compared of a person in a state; a distribution is None where there are fewer than `FEWEST` values."""
+    """Measures of a person in a state; a distribution is None where there are fewer than `FEWEST` values."""
 
     face: Distribution | None
     away: Distribution | None

@@ -190,7 +190,7 @@ def _gaze(study: GazeStudy) -> list[str]:
 
 
 def gaze_panels(study: GazeStudy) -> list[Panel]:
-    """What lasts longer, or is larger, than a length or a jump: a line for each person and made person."""
+    """Shares of what lasts longer, or is larger, than a length or a jump: a line for each person and made person."""
     kinds = (("looks at the face, s", "face"), ("looks away, s", "away"), ("jumps, degrees", "jumps"))
     return [_survival_panel(study, state, name, trait) for state in study.people for name, trait in kinds]
 

@@ -221,22 +221,22 @@ def _search_edges(costs, low, high, rules, ends):  # type: ignore[no-untyped-def
     n = len(low)
     best = np.full(high[-1] + 1, 1e18)
     best[low[0] : high[0] + 1] = 0.0
-    begins = np.full((n, (high - low).max() + 1), -1, np.int32)
+    starts = np.full((n, (high - low).max() + 1), -1, np.int32)
     for i in range(n):
         reached = np.full(len(best), 1e18)
         for end in range(low[i], high[i] + 1):
             if is_optional[i]:
-                reached[end], begins[i, end - low[i]] = best[end], end
+                reached[end], starts[i, end - low[i]] = best[end], end
             rule = (low[i], silent[i], log_durations[i], longest[i])
             cost, start = _cheapest_start(costs[i], best, end, rule)
             if cost < reached[end]:
-                reached[end], begins[i, end - low[i]] = cost, start
+                reached[end], starts[i, end - low[i]] = cost, start
         best = reached
     ends[n] = low[n - 1] + np.argmin(best[low[n - 1] : high[n - 1] + 1])
     least = best[ends[n]]
     if least < UNREACHED:
         for i in range(n - 1, -1, -1):
-            ends[i] = begins[i, ends[i + 1] - low[i]]
+            ends[i] = starts[i, ends[i + 1] - low[i]]
     return least
 
 
@@ -258,9 +258,9 @@ def _cheapest_start(costs, best, end, rule):  # type: ignore[no-untyped-def]
 def _phone_cost(costs, start, length, silent, log_duration):  # type: ignore[no-untyped-def]
     total = 0.0
     for part in range(N_PARTS):
-        begin, end = start + (length * part) // N_PARTS, start + (length * (part + 1)) // N_PARTS
-        if end > begin:
-            total += costs[part, end] - costs[part, begin]
+        first_frame, end = start + (length * part) // N_PARTS, start + (length * (part + 1)) // N_PARTS
+        if end > first_frame:
+            total += costs[part, end] - costs[part, first_frame]
     total *= FRAME_WEIGHT
     if silent:
         return total + SILENCE_COST + LONG_SILENCE_COST * max(length - LONG_SILENCE, 0)
