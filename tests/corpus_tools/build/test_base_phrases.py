@@ -17,7 +17,6 @@ from corpus_tools.recordings.observe import Observations
 from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA
 from corpus_tools.training.network_training import TrainingOptions
 from corpus_tools.training.phone_network import add_phone_network
-from corpus_tools.training.pooling import speech
 from corpus_tools.training.pooling.base_speech import (
     DURATION_SPREAD,
     EDGE_SILENCE_S,
@@ -44,9 +43,9 @@ OTHER_MACHINE = """
 import sys
 from pathlib import Path
 from corpus_tools.training import phone_network
-from corpus_tools.training.pooling import speech
+from corpus_tools.training.pooling import base_speech as phrases
 from tests.corpus_tools.build.test_base_phrases import FEW_PASSES, network_bytes
-speech.N_PHRASES, phone_network.MIN_FRAMES, phone_network.TRAINING = 40, 100, FEW_PASSES
+phrases.N_PHRASES, phone_network.MIN_FRAMES, phone_network.TRAINING = 40, 100, FEW_PASSES
 print(network_bytes(Path(sys.argv[1])))
 """
 
@@ -56,7 +55,7 @@ def few_recordings(monkeypatch: pytest.MonkeyPatch) -> None:
     """Networks from a minute, with more passes over few frames, and fewer phrases."""
     monkeypatch.setattr("corpus_tools.training.phone_network.MIN_FRAMES", 100)
     monkeypatch.setattr("corpus_tools.training.phone_network.TRAINING", PASSES)
-    monkeypatch.setattr(speech, "N_PHRASES", 40)
+    monkeypatch.setattr("corpus_tools.training.pooling.base_speech.N_PHRASES", 40)
 
 
 @pytest.fixture(scope="module")
