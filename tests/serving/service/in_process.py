@@ -25,19 +25,20 @@ from tts2face.processes.program import Program
 from tts2face.serving.service import decoders
 from tts2face.serving.service.application import Mount, create_app
 from tts2face.serving.service.messages import SYNTHESISE, Work
+from tts2face.serving.service.pool import PoolProcess
 from tts2face.serving.service.preparation import Preparation
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.service.synthesis import Synthesis
 from tts2face.serving.service.tasks import TASKS
-from tts2face.serving.service.warm_process import InputQueue, WarmProcess
+from tts2face.serving.service.warm_process import InputItem
 from tts2face.session.session_cache import SessionCache
 
 START_S = 60.0
 SECONDS = 1.0  # of speech of an answer of a table
 
 
-class LocalProcess(WarmProcess):
+class LocalProcess(PoolProcess):
     """A process of the pool that is this one.
 
     Parameters
@@ -55,7 +56,7 @@ class LocalProcess(WarmProcess):
         """Nothing is to be started."""
 
     async def stream(
-        self, call: Mapping[str, Any], inputs: InputQueue | None, on_paused: Callable[[bool], None]
+        self, call: Mapping[str, Any], inputs: AsyncIterator[InputItem] | None, on_paused: Callable[[bool], None]
     ) -> AsyncIterator[Message]:
         """Messages of a work as they are made; it is never paused."""
         answers = Answers(asyncio.get_running_loop())
@@ -75,9 +76,9 @@ class LocalProcess(WarmProcess):
             await asyncio.shield(asked)
 
 
-async def _pass_on(call: Call, inputs: InputQueue) -> None:
-    while True:
-        call.control(Message(MORE, *(await inputs.get())))
+async def _pass_on(call: Call, inputs: AsyncIterator[InputItem]) -> None:
+    async for item in inputs:
+        call.control(Message(MORE, *item))
 
 
 class Answers(io.BytesIO):
@@ -128,7 +129,7 @@ class TableProcess(LocalProcess):
 
 @contextmanager
 def service_client(
-    settings: ServiceSettings, process: WarmProcess, mounts: Sequence[Mount] = ()
+    settings: ServiceSettings, process: PoolProcess, mounts: Sequence[Mount] = ()
 ) -> Iterator[TestClient]:
     """Client of a service with its database, and with the workers that `settings` asks for."""
     app = create_app(settings, mounts)

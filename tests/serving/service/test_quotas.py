@@ -13,10 +13,11 @@ import pytest
 from cli.main import run
 from lexicon.errors import DataError, InputError
 from tts2face.processes.message import EVENT, Message
+from tts2face.serving.service.access import RateLimits
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, add_key, find_key, read_keys, remove_key
-from tts2face.serving.service.messages import Work
-from tts2face.serving.service.places import (
+from tts2face.serving.service.messages import BusyError, Work
+from tts2face.serving.service.pool import (
     LIVE_COST,
     MOST_BEGUN_BY_SHARE,
     MOVIE_COST,
@@ -24,9 +25,9 @@ from tts2face.serving.service.places import (
     SOUND_COST,
     Place,
     Places,
+    Pool,
+    PoolSettings,
 )
-from tts2face.serving.service.pool import BusyError, Pool, PoolSettings
-from tts2face.serving.service.rate_limits import RateLimits
 from tts2face.serving.service.results import Results
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState

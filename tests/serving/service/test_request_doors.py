@@ -9,9 +9,8 @@ from pydantic import BaseModel, ValidationError
 from tts2face.picture.options import Picture
 from tts2face.request import Request, option_fields
 from tts2face.serving.batch.cast import MODEL_NAMES, NOT_IN_CAST, REQUEST_NAMES
-from tts2face.serving.service.clip_options import NOT_IN_CLIPS, ClipRequest
+from tts2face.serving.service.clip_options import LIMITS, NOT_IN_CLIPS, RECORDS, ClipRequest
 from tts2face.serving.service.job_kinds.subtitles import BATCH_FIELDS, NOT_IN_SUBTITLES, SubtitlesRequest
-from tts2face.serving.service.request_fields import LIMITS, RECORDS
 from tts2face.serving.service.routes.headtts import HeadTtsRequest
 from tts2face.serving.service.routes.live import NOT_IN_LIVE_TEXT, TextOptions
 from tts2face.serving.service.routes.openai import SAME_NAMES, Speech

@@ -12,7 +12,7 @@ from tts2face.processes.message import ERROR, RESULT
 from tts2face.serving.service import synthesis, warm_process
 from tts2face.serving.service.application import Mount, create_app
 from tts2face.serving.service.messages import SYNTHESISE, Work
-from tts2face.serving.service.places import LINES_COST, MOVIE_COST, SOUND_COST, work_cost
+from tts2face.serving.service.pool import LINES_COST, MOVIE_COST, SOUND_COST, work_cost
 from tts2face.serving.service.preparation import Preparation
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.warm_process import WarmProcess

@@ -10,9 +10,9 @@ from tests.packages import reason
 
 pytest.importorskip("dbos", reason=reason("dbos"))
 
+from tts2face.serving.service.access import RateLimits
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
-from tts2face.serving.service.rate_limits import RateLimits
 from tts2face.serving.work import usage
 from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase
 from tts2face.serving.work.database import database_url

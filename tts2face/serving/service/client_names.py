@@ -18,11 +18,11 @@ from lexicon.languages import language_code
 from lexicon.marked_text import RATE_LIMITS
 from lexicon.spoken_words import reading_notes
 from lexicon.text_language import guess_language
+from tts2face.serving.service.clip_options import check_voice, resolve_models
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.kokoro_text import with_marks
 from tts2face.serving.service.library import CLIENT_MODELS
-from tts2face.serving.service.named_values import check_voice, resolve_models
 from tts2face.serving.service.state import ServiceState
 from tts2face.session import catalogue
 

@@ -8,9 +8,10 @@ from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
-from tts2face.serving.service.messages import DefectError
-from tts2face.serving.service.pool import BusyError
+from tts2face.serving.service.messages import BusyError, DefectError
 from tts2face.storage.user_folders import without_folders, without_paths
+
+DRAINING_RETRY_S = 5  # until another server, or this one again, may be asked
 
 
 class RefusedError(HTTPException):
@@ -57,6 +58,12 @@ def as_refused(error: Tts2faceError, folders: Iterable[Path] = ()) -> RefusedErr
     headers = {"Retry-After": str(BusyError.retry_after_s)} if status in {429, 503} else {}
     message = without_folders(" ".join(str(error).split()), folders)
     return RefusedError(status, code, without_paths(message) if status == 503 else message, headers)
+
+
+def draining(advice: str = "repeat the request") -> RefusedError:
+    """Refusal of a service that shuts down."""
+    headers = {"Retry-After": str(DRAINING_RETRY_S), "Connection": "close"}
+    return RefusedError(503, "draining", f"the service is shutting down; {advice}", headers)
 
 
 class ErrorDetail(BaseModel):

@@ -1,13 +1,15 @@
-"""A request and its answer: identity, headers, and what the log, the metrics and traces receive."""
+"""A request as its client sends it, and its answer: identity, headers, and what log, metrics and traces receive."""
 
 import asyncio
 import json
 import re
 import time
 import uuid
-from collections.abc import Awaitable, Callable, Coroutine, Iterator, MutableMapping
+from collections import deque
+from collections.abc import Awaitable, Callable, Coroutine, Iterator, Mapping, MutableMapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from contextvars import ContextVar, copy_context
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from starlette.requests import ClientDisconnect
@@ -15,7 +17,6 @@ from starlette.requests import ClientDisconnect
 from tts2face.serving.service.errors import RefusedError, error_body
 from tts2face.serving.service.logs import REQUEST_ID
 from tts2face.serving.service.page_addresses import is_page, page_headers
-from tts2face.serving.service.stages import STAGES, Stage, durations
 
 if TYPE_CHECKING:
     from tts2face.serving.service.keys import ApiKey
@@ -32,13 +33,24 @@ CLOSE_NORMAL = 1000  # of WebSockets
 CLOSE_REFUSED = 1008  # policy violation
 CLOSE_RESTART = 1012  # service restart
 HTTP_FORM = "websocket.http.response"  # extension of ASGI: a refused WebSocket gets an HTTP answer
-DRAINING_RETRY_S = 5  # until another server, or this one again, may be asked
 CLOSE_S = 1.0  # for which a client may take to read why its answer ends early
 ERROR_FIELD = "X-Tts2face-Error"  # trailer of an answer that ends before it is complete, with the JSON of the error
 FAIL = "end_incomplete"  # name in the state of a scope: ends an answer with trailers, `HttpConnection.fail`
 LEFT = 499  # status, in the log and the metrics only, of a request whose client left before its answer began
+READ_AHEAD_BYTES = 256 << 10  # of a client that wait for the application; then no more is read
+MAX_STAGES = 200  # of a request that are kept; a WebSocket may have any number
 Item = TypeVar("Item")
 CLIENT: ContextVar["Exchange | None"] = ContextVar("client", default=None)  # for whose request the present task works
+STAGES: ContextVar["list[Stage] | None"] = ContextVar("stages", default=None)
+
+
+@dataclass(slots=True)
+class Stage:
+    """A part of the time of a request, such as waiting for a process; its bounds in seconds of the monotonic clock."""
+
+    name: str
+    begin: float
+    end: float | None = None
 
 
 class Exchange:
@@ -253,10 +265,105 @@ class Exchange:
         return ", ".join(f"{name};dur={1000 * seconds:.1f}" for name, seconds in stages.items())
 
 
-def draining(advice: str = "repeat the request") -> RefusedError:
-    """Refusal of a service that shuts down."""
-    headers = {"Retry-After": str(DRAINING_RETRY_S), "Connection": "close"}
-    return RefusedError(503, "draining", f"the service is shutting down; {advice}", headers)
+class Incoming:
+    """Messages of a client, read ahead of the application, so that its leaving is noticed at once.
+
+    A body has limits of size and time; it is read from the first time that the application asks for it, so that a
+    client which waits for ``100 Continue`` sends nothing that is refused. Everything else is read from the start.
+    """
+
+    def __init__(self, request: Exchange, receive: Receive, max_bytes: float, max_s: float) -> None:
+        self._request, self._receive = request, receive
+        self._max_bytes = max_bytes
+        self._max_s, self._deadline = max_s, time.monotonic() + max_s
+        self._n_bytes, self._has_body = 0, False
+        self._messages: deque[MutableMapping[str, Any]] = deque()
+        self._n_waiting_bytes = 0  # of the messages
+        self._wrong: RefusedError | None = None
+        self._changed = asyncio.Event()  # a message has come, has been taken, or the end was reached
+        self._reading: asyncio.Task[None] | None = None
+
+    def check(self) -> None:
+        """Refuse a body whose stated length is too large; what has none is complete, however late it is asked for."""
+        headers = self._request.headers
+        length = headers.get(b"content-length", b"0")
+        if self._request.scope["type"] == "http":
+            self._has_body = length != b"0" or b"transfer-encoding" in headers
+            if not length.isdigit() or int(length) > self._max_bytes:
+                raise self._too_large()
+        if not self._has_body:
+            self._start()
+
+    async def receive(self) -> MutableMapping[str, Any]:
+        """Next message of the client; again and again the last one, which says that it has left."""
+        self._start()
+        while not self._messages:
+            if self._wrong is not None:
+                raise self._wrong
+            self._changed.clear()
+            await self._changed.wait()
+        message = self._messages[0]
+        if not _is_last(message):
+            self._messages.popleft()
+            self._n_waiting_bytes -= _n_bytes(message)
+            self._changed.set()
+        return message
+
+    def close(self) -> None:
+        """Read no more."""
+        if self._reading is not None:
+            self._reading.cancel()
+
+    def _start(self) -> None:
+        if self._reading is None:
+            self._reading = asyncio.create_task(self._read())
+
+    async def _read(self) -> None:
+        message: MutableMapping[str, Any] = {"type": ""}
+        while not _is_last(message):
+            try:
+                message = await self._next()
+            except RefusedError as wrong:
+                self._wrong = wrong
+            if self._wrong is None:
+                self._messages.append(message)
+                self._n_waiting_bytes += _n_bytes(message)
+            if _is_last(message):
+                self._request.leave()
+            self._changed.set()
+            if self._wrong is not None:
+                return
+            while self._n_waiting_bytes >= READ_AHEAD_BYTES:
+                self._changed.clear()
+                await self._changed.wait()
+
+    async def _next(self) -> MutableMapping[str, Any]:
+        if not self._has_body:
+            return await self._receive()
+        try:
+            message = await asyncio.wait_for(self._receive(), max(0.0, self._deadline - time.monotonic()))
+        except TimeoutError as late:
+            raise RefusedError(
+                408, "too_slow", f"the body did not arrive within {self._max_s:g} s; send it faster"
+            ) from late
+        if message["type"] == "http.request":
+            self._n_bytes += _n_bytes(message)
+            self._has_body = message.get("more_body", False)
+            if self._n_bytes > self._max_bytes:
+                raise self._too_large()
+        return message
+
+    def _too_large(self) -> RefusedError:
+        return RefusedError(413, "too_large", f"the body is larger than {self._max_bytes / 1e6:g} MB; send less")
+
+
+def _is_last(message: Mapping[str, Any]) -> bool:
+    return str(message["type"]).endswith(".disconnect")
+
+
+def _n_bytes(message: Mapping[str, Any]) -> int:
+    """Size of what a client has sent; of texts in characters."""
+    return len(message.get("body") or message.get("bytes") or message.get("text") or b"")
 
 
 def while_client_stays() -> AbstractContextManager[None]:
@@ -270,3 +377,23 @@ def in_background(work: Coroutine[Any, Any, Item]) -> "asyncio.Task[Item]":
     context = copy_context()
     context.run(CLIENT.set, None)
     return asyncio.get_running_loop().create_task(work, context=context)
+
+
+@contextmanager
+def stage(name: str) -> Iterator[None]:
+    """Record the time of a block as a stage of the present request; without a request, nothing is recorded."""
+    stages, new = STAGES.get(), Stage(name, time.monotonic())
+    if stages is not None and len(stages) < MAX_STAGES:
+        stages.append(new)
+    try:
+        yield
+    finally:
+        new.end = time.monotonic()
+
+
+def durations(stages: Sequence[Stage], now: float) -> dict[str, float]:
+    """Seconds of each name; a stage that has not ended counts up to `now`."""
+    found: dict[str, float] = {}
+    for spent in stages:
+        found[spent.name] = found.get(spent.name, 0.0) + (now if spent.end is None else spent.end) - spent.begin
+    return found

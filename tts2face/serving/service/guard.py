@@ -9,9 +9,8 @@ from starlette.requests import ClientDisconnect
 from starlette.websockets import WebSocketDisconnect
 
 from tts2face.serving.service.browser_key import cookie_key, wants_login
-from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.exchange import CLIENT, PROBES, Exchange, Receive, Scope, Send, draining
-from tts2face.serving.service.incoming import Incoming
+from tts2face.serving.service.errors import RefusedError, draining
+from tts2face.serving.service.exchange import CLIENT, PROBES, Exchange, Incoming, Receive, Scope, Send
 from tts2face.serving.service.keys import NOBODY, ApiKey
 from tts2face.serving.service.origins import answer_headers, check_origin, preflight_headers
 from tts2face.serving.service.page_addresses import LOGIN_PATH, RECORDINGS, REFERENCE, STYLES, TAKES, is_page, is_static

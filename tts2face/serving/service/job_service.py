@@ -13,12 +13,12 @@ from lexicon.errors import BackendError, Tts2faceError
 from tts2face.serving.batch.engine import lack_of_room
 from tts2face.serving.batch.prune import prune_unused
 from tts2face.serving.batch.store import open_store
+from tts2face.serving.service.access import RateLimits
 from tts2face.serving.service.errors import RefusedError, as_refused
 from tts2face.serving.service.job_views import message_of
 from tts2face.serving.service.library import Library
 from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.pool import NICENESS
-from tts2face.serving.service.rate_limits import RateLimits
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.webhooks import Webhooks
 from tts2face.serving.work.blobs import open_blobs

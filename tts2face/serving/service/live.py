@@ -13,9 +13,8 @@ from lexicon.errors import Tts2faceError
 from tts2face.gestures.listening import PartnerSound
 from tts2face.processes.message import Message
 from tts2face.serving.service.live_motion import Curves, idle_motion
-from tts2face.serving.service.long_words import check_words
 from tts2face.serving.service.messages import Event, Inputs, Line, Step, Wait, Work
-from tts2face.serving.service.scheduler import InterruptedTaskError
+from tts2face.serving.service.scheduler import InterruptedTaskError, check_words
 from tts2face.types import Chunk, Clip
 
 if TYPE_CHECKING:

@@ -10,10 +10,10 @@ from lexicon.errors import DataError
 from lexicon.growing_text import GrowingText
 from lexicon.values.checks import format_value
 from lexicon.values.json_text import parse_json
+from tts2face.serving.service.access import Bucket
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import MINUTE_S
-from tts2face.serving.service.rate_limits import Bucket
-from tts2face.serving.service.warm_process import InputQueue
+from tts2face.serving.service.pool import InputQueue
 
 MAX_MESSAGE_CHARACTERS = 32_768  # of JSON, whose reading is one step of the event loop, of at most 5 ms
 PART_CHARACTERS = 1000  # that are divided into sentences in one step of the event loop: some milliseconds

@@ -22,6 +22,12 @@ CANCEL = "cancel"  # input of live streams
 QUALITY = "quality"  # type of an event: the pictures have another one from here on
 
 
+class BusyError(BackendError):
+    """Too many requests wait; the request may be repeated later."""
+
+    retry_after_s = 2
+
+
 class DefectError(BackendError):
     """A defect of the synthesis; the log has its traceback."""
 

@@ -1,28 +1,96 @@
-"""The synthesis processes of a server, shared fairly by all keys."""
+"""The synthesis processes of a server, whose places all keys share fairly."""
 
 import asyncio
 import time
 import zlib
 from collections import OrderedDict, deque
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence, Set
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
 from lexicon.errors import BackendError
+from tts2face.picture.sound_stream import SOUND_KINDS
+from tts2face.picture.streamed_movie import MOVIE_KINDS
 from tts2face.processes.async_parent import started
 from tts2face.processes.message import Message
 from tts2face.processes.parent import ChildEndedError
 from tts2face.processes.threads import available_cores
-from tts2face.serving.service.messages import SYNTHESISE, Work
-from tts2face.serving.service.places import Place, has_less_than_share, work_cost
+from tts2face.serving.service.exchange import stage
+from tts2face.serving.service.messages import SYNTHESISE, BusyError, Work
 from tts2face.serving.service.preparation import Preparation, Step
-from tts2face.serving.service.stages import stage
-from tts2face.serving.service.warm_process import InputQueue, WarmProcess, synthesis_program, work_call
+from tts2face.serving.service.warm_process import InputItem, WarmProcess, synthesis_program, work_call
 
+InputQueue = asyncio.Queue[InputItem]
 NICENESS = 10  # of processes for which nobody waits, so that streams go first
 MAX_TRIES = 2  # of a request whose process ended before anything was sent
 STREAM_PRIORITY = 0
+# Shares of a core of a stream in real time, rounded up.
+MOVIE_COST = 1.0
+LINES_COST = 0.2
+SOUND_COST = 0.1
+LIVE_COST = 0.02  # of a live stream, which mostly waits for a sentence
+# Tasks of each cost that one process makes at a time. They bound its memory (a movie takes 37 MB, a live stream less
+# than 1 MB); computing is shared by turns.
+PLACES = {MOVIE_COST: 8, LINES_COST: 10, SOUND_COST: 20, LIVE_COST: 1000}
+MOST_BEGUN = 1.25  # times as many may have begun, with those that wait for their readers
+MOST_BEGUN_BY_SHARE = 1.5  # likewise, for keys that have less than their share of the places
+
+
+def work_cost(work: Work, *, is_live: bool = False) -> float:
+    """Share of a core that a task takes; `is_live`: it gets inputs while it is made."""
+    if is_live:
+        return LIVE_COST
+    if work.format in SOUND_KINDS:
+        return SOUND_COST
+    return MOVIE_COST if work.format in MOVIE_KINDS else LINES_COST
+
+
+@dataclass(slots=True, eq=False)
+class Place:
+    """Of a task in a process; while the task waits for its reader, another one can begin."""
+
+    cost: float
+    key: str
+    process: Any
+    is_paused: bool = False
+
+
+class Places:
+    """Places of the tasks that have begun in one process."""
+
+    def __init__(self) -> None:
+        self.begun: list[Place] = []
+
+    @property
+    def load(self) -> float:
+        """Share of a core that the tasks take."""
+        return sum(place.cost for place in self.begun)
+
+    def of(self, cost: float) -> list[Place]:
+        """Those of one cost."""
+        return [place for place in self.begun if place.cost == cost]
+
+    def take(self, cost: float, key: str, process: Any) -> Place:
+        """Place of a task that begins."""
+        self.begun.append(Place(cost, key, process))
+        return self.begun[-1]
+
+    def has_room(self, cost: float, *, has_less: bool) -> bool:
+        """Whether a task can begin; `has_less`: its key has less than its share of the places."""
+        begun = self.of(cost)
+        if has_less:
+            return len(begun) < MOST_BEGUN_BY_SHARE * PLACES[cost]
+        n_made = sum(not place.is_paused for place in begun)
+        return n_made < PLACES[cost] and len(begun) < MOST_BEGUN * PLACES[cost]
+
+
+class PoolProcess(WarmProcess):
+    """A process of a pool with the places of its tasks."""
+
+    def __init__(self, settings: Mapping[str, Any], preparation: Preparation, on_change: Callable[[], None]) -> None:
+        super().__init__(settings, preparation, on_change)
+        self.places = Places()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,12 +100,6 @@ class _Waiting:
     cost: float
     begin: float
     place: "asyncio.Future[Place]"
-
-
-class BusyError(BackendError):
-    """Too many requests wait; the request may be repeated later."""
-
-    retry_after_s = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +137,7 @@ class Pool:
         self.settings = settings
         count = settings.n_processes or available_cores()
         self.preparation = Preparation(settings.steps, count)
-        self.processes = [WarmProcess(settings.handlers, self.preparation, self._wake) for _ in range(count)]
+        self.processes = [PoolProcess(settings.handlers, self.preparation, self._wake) for _ in range(count)]
         self.is_prepared = asyncio.Event()  # all processes have been ready
         self._waiting: OrderedDict[str, deque[_Waiting]] = OrderedDict()
         self._runs: list[asyncio.Task[None]] = []
@@ -154,7 +216,8 @@ class Pool:
                 place = await self._take(cost, key, work.affinity)
             is_begun = False
             call = work_call(work, priority, key)
-            messages = place.process.stream(call, inputs, lambda is_paused, of=place: self._pause(of, is_paused))
+            given = None if inputs is None else _items(inputs)
+            messages = place.process.stream(call, given, lambda is_paused, of=place: self._pause(of, is_paused))
             try:
                 with stage("synthesis"):
                     async for message in messages:
@@ -256,3 +319,21 @@ class Pool:
                 queue.remove(next(waiting for waiting in queue if waiting.place is future))
             if not queue:
                 del self._waiting[key]
+
+
+def has_less_than_share(processes: Sequence[Places], cost: float, key: str, waiting: Set[str]) -> bool:
+    """Whether a key has begun fewer tasks of a cost than there are places for each key that has or awaits some.
+
+    Parameters
+    ----------
+    waiting
+        Keys that await some.
+    """
+    holders = [place.key for places in processes for place in places.of(cost)]
+    n_keys = len({key, *holders, *waiting})
+    return holders.count(key) < max(1, len(processes) * PLACES[cost] // n_keys)
+
+
+async def _items(inputs: InputQueue) -> AsyncIterator[InputItem]:
+    while True:
+        yield await inputs.get()

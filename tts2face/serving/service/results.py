@@ -1,27 +1,32 @@
-"""Results of synthesis processes: the messages of a `Work`, within the limits of its key, counted and cached."""
+"""Results of synthesis processes: the messages of a `Work`, counted and cached, and the answers over HTTP with them."""
 
+import json
 from collections.abc import AsyncIterator
-from contextlib import aclosing
+from contextlib import AsyncExitStack, aclosing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
+
+from fastapi import Request as HttpRequest
+from fastapi import WebSocket
+from fastapi.responses import StreamingResponse
 
 from lexicon.errors import Tts2faceError
 from tts2face.processes.message import RESULT, Message
-from tts2face.serving.service.access import KeyRing
+from tts2face.serving.service.access import Permissions
 from tts2face.serving.service.errors import RefusedError, as_refused
-from tts2face.serving.service.exchange import while_client_stays
+from tts2face.serving.service.exchange import ERROR_FIELD, while_client_stays
 from tts2face.serving.service.keys import LOCAL_KEY, ApiKey
 from tts2face.serving.service.logs import log_event
-from tts2face.serving.service.long_words import check_words
 from tts2face.serving.service.messages import QUALITY, SYNTHESISE, Work
 from tts2face.serving.service.metrics import Metrics, quality_labels
-from tts2face.serving.service.pool import STREAM_PRIORITY, Pool
+from tts2face.serving.service.pool import STREAM_PRIORITY, InputQueue, Pool
 from tts2face.serving.service.preparation import Step
-from tts2face.serving.service.rate_limits import RateLimits
 from tts2face.serving.service.result_cache import CACHED_KINDS, ResultCache
+from tts2face.serving.service.scheduler import check_words
 from tts2face.serving.service.settings import ServiceSettings
-from tts2face.serving.service.warm_process import InputQueue, work_call
+from tts2face.serving.service.warm_process import work_call
+from tts2face.session.encoded_stream import LINES
 
 WARM_TEXT = "Hi."
 
@@ -46,24 +51,6 @@ def new_work(settings: ServiceSettings, *, models: dict[str, Any] | None = None,
 def _common_owner(settings: ServiceSettings) -> str:
     """For whom processes keep finished sentences, whoever asks: the one user of a service without keys."""
     return LOCAL_KEY.name if settings.studio and settings.keys is None else ""
-
-
-@dataclass(frozen=True, slots=True)
-class Permissions:
-    """Which keys may have something spoken now: those that exist, have the scope speak, and have seconds left."""
-
-    keys: KeyRing
-    limits: RateLimits
-
-    def speaking_key(self, key: ApiKey) -> ApiKey:
-        """A key as it is now, if it may have something spoken."""
-        key = self.keys.with_scope(key, "speak")
-        self.limits.check_speech(key)
-        return key
-
-    def count(self, key: ApiKey) -> None:
-        """Count an utterance of an open WebSocket as a request of its key; errors as `speaking_key` and the limits."""
-        self.limits.count(self.speaking_key(key))
 
 
 class Results:
@@ -157,3 +144,102 @@ def _folders(work: Work) -> set[Path]:
 def _log_spoken(message: Message) -> None:
     if text := message.content["event"].get("text"):
         log_event("text", text=text)
+
+
+async def stream_work(
+    request: HttpRequest,
+    work: Work,
+    media_type: str,
+    *,
+    convert: "Converter | None" = None,
+    resources: AsyncExitStack | None = None,
+) -> StreamingResponse:
+    """Answer that sends a result while it is made.
+
+    It begins with the first bytes, so that errors before them have their own status. A client that leaves cancels it.
+
+    Parameters
+    ----------
+    convert
+        Converts messages to bytes, and an error to what ends them; None: the bytes of all data.
+    resources
+        Closed when the answer is complete or has failed.
+    """
+    stack = resources or AsyncExitStack()
+    messages = _results(request).messages(work, request.state.key)
+    convert = convert or DataBytes(media_type)
+    chunks = convert(messages)
+    try:
+        first = await anext(chunks)
+    except StopAsyncIteration:
+        first = b""
+    except BaseException:
+        await messages.aclose()  # type: ignore[attr-defined]
+        await stack.aclose()
+        raise
+
+    async def body() -> AsyncIterator[bytes]:
+        async with stack, aclosing(messages):  # type: ignore[type-var]
+            yield first
+            async for chunk in chunks:
+                yield chunk
+
+    request.state.exchange.ending = convert.failed
+    headers = {} if convert.failed({}) else {"Trailer": ERROR_FIELD}
+    return StreamingResponse(body(), media_type=media_type, headers=headers)
+
+
+class Converter(Protocol):
+    """Converts the messages of a result to the bytes of an answer."""
+
+    def __call__(self, messages: AsyncIterator[Message]) -> AsyncIterator[bytes]:
+        """The bytes, as they come."""
+        ...
+
+    def failed(self, content: dict[str, Any]) -> bytes:
+        """Bytes that follow those so far when the result ends with an error; empty: their form has no place for it."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class DataBytes:
+    """The bytes of the data of a result, as they are."""
+
+    media_type: str
+
+    async def __call__(self, messages: AsyncIterator[Message]) -> AsyncIterator[bytes]:
+        """The bytes."""
+        async for message in messages:
+            if message.payload:
+                yield message.payload
+
+    def failed(self, content: dict[str, Any]) -> bytes:
+        """A line, after lines of JSON."""
+        return json_line(content) if self.media_type == LINES else b""
+
+
+def error_event(content: dict[str, Any]) -> bytes:
+    """Server-sent event with an error, the last one of a stream."""
+    return b"event: error\ndata: " + json_line({"type": "error", **content}) + b"\n"
+
+
+def json_line(content: Any) -> bytes:
+    """Compact JSON on a line."""
+    return json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode() + b"\n"
+
+
+async def timed_speech(request: HttpRequest | WebSocket, work: Work) -> tuple[list[dict[str, Any]], bytes]:
+    """All events of a task of kind ``speech``, and its sound as 16-bit PCM."""
+    events: list[dict[str, Any]] = []
+    sound = bytearray()
+    async with aclosing(_results(request).messages(work, request.state.key)) as messages:  # type: ignore[type-var]
+        async for message in messages:
+            sound += message.payload
+            if "event" in message.content:
+                events.append(message.content["event"])
+    return events, bytes(sound)
+
+
+def _results(request: HttpRequest | WebSocket) -> Results:
+    results: Results = request.app.state.service.results
+    return results

@@ -3,6 +3,7 @@
 All work of the service is done in such turns, a sentence or a few pictures at a time, and keys share them.
 """
 
+import re
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -10,6 +11,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+from lexicon.errors import InputError
 from tts2face.processes.child import Call, StoppedError
 from tts2face.serving.service.messages import CANCEL, Event, Line, Step, Wait
 from tts2face.types import Chunk
@@ -18,6 +20,8 @@ Result = TypeVar("Result")
 
 AHEAD_S = 1.0  # by which a result is ahead of its listener before those of other keys that are not go first
 CREDIT_S = 1.0  # of computing that a key which has been idle is ahead of the others: a few sentences, or one movie
+MAX_WORD_CHARACTERS = 200  # 300 digits are 70 s of speech, made in one step of 7 s, during which all others wait
+_LONG_WORD = re.compile(rf"[!-~]{{{MAX_WORD_CHARACTERS + 1}}}|\d{{{MAX_WORD_CHARACTERS + 1}}}")
 _CURRENT = threading.local()
 
 
@@ -272,3 +276,11 @@ def give_turn() -> None:
     task: _Task | None = getattr(_CURRENT, "task", None)
     if task is not None:
         task.turns.take_again(task)
+
+
+def check_words(text: str) -> None:
+    """Refuse words that would take a turn of seconds; scripts without spaces are not concerned."""
+    if (found := _LONG_WORD.search(text)) is not None:
+        raise InputError(
+            f"the text has a word of more than {MAX_WORD_CHARACTERS} characters, {found[0][:20]}...; put spaces into it"
+        )

@@ -15,7 +15,7 @@ import uvicorn
 from tts2face.processes.collection import resume_collection
 from tts2face.serving.service.application import Mount, create_app
 from tts2face.serving.service.connections import connection_classes
-from tts2face.serving.service.exchange import draining
+from tts2face.serving.service.errors import draining
 from tts2face.serving.service.logs import configure_logs, log_event
 from tts2face.serving.service.page_addresses import PAGES
 from tts2face.serving.service.settings import ServiceSettings

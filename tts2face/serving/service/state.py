@@ -9,7 +9,7 @@ from fastapi import Request as HttpRequest
 from fastapi import WebSocket
 
 from lexicon.errors import Tts2faceError
-from tts2face.serving.service.access import KeyRing
+from tts2face.serving.service.access import KeyRing, Permissions, RateLimits
 from tts2face.serving.service.decoders import Decoders
 from tts2face.serving.service.downloads import Downloads
 from tts2face.serving.service.errors import STATUS
@@ -20,10 +20,9 @@ from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.messages import DefectError
 from tts2face.serving.service.metrics import Metrics
 from tts2face.serving.service.pool import Pool, PoolSettings
-from tts2face.serving.service.rate_limits import RateLimits
 from tts2face.serving.service.readiness import Readiness
 from tts2face.serving.service.result_cache import ResultCache
-from tts2face.serving.service.results import Permissions, Results, warm_steps
+from tts2face.serving.service.results import Results, warm_steps
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.tracing import tracing_from_environment
 

@@ -12,14 +12,13 @@ from tts2face.processes.message import Message
 from tts2face.processes.program import Program
 from tts2face.serving.service.logs import REQUEST_ID, log_event
 from tts2face.serving.service.messages import SERVE, SYNTHESISE, Work
-from tts2face.serving.service.places import Places
 from tts2face.serving.service.preparation import Preparation
 
 # A name, as the server does not import what its processes do: the session alone takes 1 s of processor time.
 PROGRAM = "tts2face.serving.service.synthesis:handlers"
 AT_ONCE = 4096  # more calls than the pool gives to one process
 FIRST_PAUSE_S, LAST_PAUSE_S = 0.5, 30.0  # before a process that was not ready is started again
-InputQueue = asyncio.Queue[tuple[Mapping[str, Any], bytes]]  # contents and payloads
+InputItem = tuple[Mapping[str, Any], bytes]  # content and payload
 
 
 def synthesis_program(settings: Mapping[str, Any], *, at_once: int = 1, niceness: int = 0) -> Program:
@@ -51,7 +50,6 @@ class WarmProcess:
         self.is_ready = False
         self._closed, self._pause_s = asyncio.Event(), FIRST_PAUSE_S
         self.on_cancelled: Callable[[float], None] = _ignore  # called with the seconds until a task was released
-        self.places = Places()
 
     @property
     def pid(self) -> int | None:
@@ -94,7 +92,7 @@ class WarmProcess:
                 self._on_change()
 
     async def stream(
-        self, call: Mapping[str, Any], inputs: InputQueue | None, on_paused: Callable[[bool], None]
+        self, call: Mapping[str, Any], inputs: AsyncIterator[InputItem] | None, on_paused: Callable[[bool], None]
     ) -> AsyncIterator[Message]:
         """Messages of a task up to its result, which is included; leaving the iteration cancels the task.
 
@@ -114,8 +112,7 @@ class WarmProcess:
         ChildEndedError
             The process ended before the task did.
         """
-        given = None if inputs is None else _items(inputs)
-        async with aclosing(self._child.stream(SYNTHESISE, call, inputs=given, on_paused=on_paused)) as messages:
+        async with aclosing(self._child.stream(SYNTHESISE, call, inputs=inputs, on_paused=on_paused)) as messages:
             async for message in messages:
                 yield message
 
@@ -126,11 +123,6 @@ class WarmProcess:
         """End the process at once."""
         self._closed.set()
         await self._child.close()
-
-
-async def _items(inputs: InputQueue) -> AsyncIterator[tuple[Mapping[str, Any], bytes]]:
-    while True:
-        yield await inputs.get()
 
 
 def _ignore(_: float) -> None:

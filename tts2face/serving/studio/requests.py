@@ -13,10 +13,10 @@ from typing import Any
 from lexicon.errors import DataError, InputError
 from tts2face.picture.options import parse_size
 from tts2face.processes.message import Message
+from tts2face.serving.service.clip_options import check_background, check_voice, resolve_models
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.messages import Work
-from tts2face.serving.service.named_values import check_background, check_voice, resolve_models
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.studio.palette_store import is_own_palette, own_palette
 from tts2face.serving.studio.project_store import ASSET, ASSETS

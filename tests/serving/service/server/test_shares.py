@@ -14,7 +14,7 @@ import websockets
 from tests.running import HostService, RunningService, eventually
 from tests.serving.service.raw import connect, request
 from tts2face.serving.service.keys import add_key
-from tts2face.serving.service.places import LINES_COST, LIVE_COST, PLACES
+from tts2face.serving.service.pool import LINES_COST, LIVE_COST, PLACES
 
 N_PLACES = 64  # as by default: the services of a run of the tests share one pool
 N_ASKED = 80  # movies

@@ -13,7 +13,7 @@ import websockets
 
 from tests.running import HostService, RunningService, eventually
 from tests.serving.service.raw import connect
-from tts2face.serving.service.places import LINES_COST, LIVE_COST, MOVIE_COST, PLACES, SOUND_COST
+from tts2face.serving.service.pool import LINES_COST, LIVE_COST, MOVIE_COST, PLACES, SOUND_COST
 
 LONG = "We were away a year ago, but Bob may move five big maps. " * 100
 CLIP = json.dumps({"text": LONG}).encode()

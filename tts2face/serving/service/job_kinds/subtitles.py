@@ -18,12 +18,17 @@ from tts2face.request import Request
 from tts2face.serving.batch.cast import MODEL_NAMES, cast_from_tables
 from tts2face.serving.batch.lines import read_lines
 from tts2face.serving.batch.options import BatchOptions
-from tts2face.serving.service.clip_options import NOT_IN_CLIPS, divide_options
+from tts2face.serving.service.clip_options import (
+    NOT_IN_CLIPS,
+    check_voice,
+    divide_options,
+    options_model,
+    resolve_dictionary,
+    resolve_models,
+)
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.job_kinds.clip import add_background
 from tts2face.serving.service.job_kinds.order import JobKind, JobOrder, refuse_second
-from tts2face.serving.service.named_values import check_voice, resolve_dictionary, resolve_models
-from tts2face.serving.service.request_fields import options_model
 from tts2face.serving.work.subtitles_job import LINES
 
 BATCH_FIELDS = tuple(
@@ -38,7 +43,7 @@ NOT_IN_SUBTITLES: Mapping[str, str] = NOT_IN_CLIPS | MappingProxyType({
 
 
 if TYPE_CHECKING:
-    from tts2face.serving.service.request_fields import StrictModel as SubtitleFields
+    from tts2face.serving.service.clip_options import StrictModel as SubtitleFields
 else:
     SubtitleFields = options_model("SubtitleFields", NOT_IN_SUBTITLES)
 

@@ -15,7 +15,7 @@ from tts2face.picture.streamed_movie import MOVIE_KINDS
 from tts2face.serving.service.client_names import Adjustments
 from tts2face.serving.service.clip_options import ClipRequest, divide_options
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.routes.streams import stream_work
+from tts2face.serving.service.results import stream_work
 from tts2face.serving.service.state import service_state
 from tts2face.serving.service.uploads import MAX_TEXT_BYTES, UploadFolder, upload_folder
 from tts2face.session.encoded_stream import media_types

@@ -16,11 +16,10 @@ from pydantic import BaseModel, ConfigDict, Field
 from tts2face.interchange.exports.labels import Label
 from tts2face.picture.sound_stream import wav_header
 from tts2face.serving.service.client_names import Adjustments, choose_voice, limited_rate
+from tts2face.serving.service.clip_options import described, resolve_dictionary
 from tts2face.serving.service.errors import ErrorBody, RefusedError
 from tts2face.serving.service.live_text import REFUSED_S, parse_message
-from tts2face.serving.service.named_values import resolve_dictionary
-from tts2face.serving.service.request_fields import described
-from tts2face.serving.service.routes.streams import timed_speech
+from tts2face.serving.service.results import timed_speech
 from tts2face.serving.service.state import service_state
 
 router = APIRouter(tags=["headtts"])

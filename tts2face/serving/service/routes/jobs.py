@@ -27,7 +27,7 @@ from tts2face.serving.service.job_kinds.schema import new_job_schema
 from tts2face.serving.service.job_kinds.table import JOB_KINDS
 from tts2face.serving.service.job_views import EXAMPLE_ID, JobDetail, JobPage, NewJobBody, job_detail, job_view
 from tts2face.serving.service.keys import ApiKey
-from tts2face.serving.service.routes.streams import error_event
+from tts2face.serving.service.results import error_event
 from tts2face.serving.service.state import service_state
 from tts2face.serving.service.uploads import MAX_TEXT_BYTES, upload_folder
 from tts2face.serving.service.webhooks import check_webhook

@@ -13,10 +13,10 @@ from pydantic import BaseModel, ConfigDict, Field
 from lexicon.languages import language_code
 from tts2face.processes.message import Message
 from tts2face.serving.service.client_names import KOKORO_LANGUAGES, Adjustments, choose_voice, combined_name
+from tts2face.serving.service.clip_options import described
 from tts2face.serving.service.kokoro_text import phones_text, with_marks
-from tts2face.serving.service.request_fields import described
+from tts2face.serving.service.results import json_line, stream_work, timed_speech
 from tts2face.serving.service.routes.openai import SoundFormat, SpokenText, TimedJson, speech_work, timed, with_download
-from tts2face.serving.service.routes.streams import json_line, stream_work, timed_speech
 from tts2face.serving.service.state import service_state
 from tts2face.session.encoded_stream import media_types
 

@@ -10,12 +10,19 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import Field, ValidationError
 
 from tts2face.processes.message import Message
+from tts2face.serving.service.clip_options import (
+    MODEL_FIELDS,
+    PICTURE_FIELDS,
+    StrictModel,
+    check_voice,
+    options_model,
+    resolve_dictionary,
+    resolve_models,
+)
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.live_text import REFUSED_S, SAMPLE_BYTES, SAMPLE_RATES, LiveText, Pace, parse_message
-from tts2face.serving.service.named_values import check_voice, resolve_dictionary, resolve_models
-from tts2face.serving.service.request_fields import MODEL_FIELDS, PICTURE_FIELDS, StrictModel, options_model
+from tts2face.serving.service.pool import InputQueue
 from tts2face.serving.service.state import ServiceState
-from tts2face.serving.service.warm_process import InputQueue
 
 router = APIRouter(tags=["live"])
 
@@ -37,7 +44,7 @@ NOT_IN_LIVE_TEXT: Mapping[str, str] = MappingProxyType(
     | dict.fromkeys(("hair", "hair_color", *PICTURE_FIELDS), "curves are sent, no pictures")
 )
 if TYPE_CHECKING:
-    from tts2face.serving.service.request_fields import StrictModel as TextFields
+    from tts2face.serving.service.clip_options import StrictModel as TextFields
 else:
     TextFields = options_model("TextFields", NOT_IN_LIVE_TEXT)
 

@@ -22,12 +22,11 @@ from tts2face.serving.service.client_names import (
     is_client_model,
     spoken_fields,
 )
-from tts2face.serving.service.clip_options import divide_options
+from tts2face.serving.service.clip_options import described, divide_options
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.library import CLIENT_MODELS, shipped_names
 from tts2face.serving.service.messages import Work
-from tts2face.serving.service.request_fields import described
-from tts2face.serving.service.routes.streams import error_event, json_line, stream_work
+from tts2face.serving.service.results import error_event, json_line, stream_work
 from tts2face.serving.service.state import service_state
 from tts2face.serving.work.resource_check import TALKER
 from tts2face.session import catalogue
