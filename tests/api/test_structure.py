@@ -24,7 +24,7 @@ PARSES = (
     "corpus_tools.shipped.head.assets", "lexicon.part_of_speech", "lexicon.values.json_text",
     "lexicon.values.toml_text",
     "tts2face.processes.message", "tts2face.serving.studio.preview_bundle", "tts2face.serving.work.resources",
-    "tts2face.serving.work.job_record", "tts2face.sound.espeak", "tts2face.sound.espeak_child",
+    "tts2face.serving.work.jobs", "tts2face.sound.espeak", "tts2face.sound.espeak_child",
     "tts2face.storage.tensors",
 )  # fmt: skip
 # Strings that name a module of a package above their own, or of a room of tts2face above theirs.

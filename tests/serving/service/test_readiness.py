@@ -19,7 +19,7 @@ from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.work.changes import JobChanges
 from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
-from tts2face.serving.work.job_record import NewJob
+from tts2face.serving.work.jobs import NewJob
 from tts2face.serving.work.run import CHECK_S, FULL, JobWatch
 
 MB = 1 << 20

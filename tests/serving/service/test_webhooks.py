@@ -31,7 +31,7 @@ from tts2face.serving.work.changes import Ending, JobChanges
 from tts2face.serving.work.client import JobClient
 from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
-from tts2face.serving.work.job_record import NewJob
+from tts2face.serving.work.jobs import NewJob
 
 
 def test_the_signature_is_that_of_standard_webhooks() -> None:

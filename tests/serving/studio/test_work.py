@@ -25,7 +25,7 @@ from tts2face.serving.studio.styles import Styles
 from tts2face.serving.studio.take_store import READY, TakeStore
 from tts2face.serving.studio.takes import Takes
 from tts2face.serving.studio.work import MAX_TRIES, BackgroundWork, WorkKind, WorkList
-from tts2face.serving.work.job_record import CANCELLED, DONE, FAILED, RUNNING, WAITING
+from tts2face.serving.work.jobs import CANCELLED, DONE, FAILED, RUNNING, WAITING
 from tts2face.session.project import Project
 from tts2face.session.project_file import project_json
 

@@ -13,8 +13,14 @@ from tests.packages import reason
 pytest.importorskip("obstore", reason=reason("obstore"))
 
 from tts2face.serving.batch.segment import Segment, input_hashes
-from tts2face.serving.work.blobs import BlobStore, MissingBlobError, open_blobs
-from tts2face.serving.work.placed_files import place_file, place_models, place_segment_files
+from tts2face.serving.work.blobs import (
+    BlobStore,
+    MissingBlobError,
+    open_blobs,
+    place_file,
+    place_models,
+    place_segment_files,
+)
 from tts2face.session.named_models import Models
 from tts2face.storage.shipped import find_file
 

@@ -21,10 +21,9 @@ from tts2face.serving.work.client import JobClient
 from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
 from tts2face.serving.work.engine import _enqueue_options, open_client
-from tts2face.serving.work.job_record import JobFile, NewJob
+from tts2face.serving.work.jobs import JobFile, NewJob, OtherBodyError, QueueFullError
 from tts2face.serving.work.queues import WORKFLOWS
 from tts2face.serving.work.run import JobRunner, job_blobs
-from tts2face.serving.work.table import OtherBodyError, QueueFullError
 
 
 @pytest.fixture

@@ -3,8 +3,9 @@
 import pytest
 
 from tts2face.serving.service.job_kinds.table import JOB_KINDS
-from tts2face.serving.work.kinds import KINDS, find_runner
+from tts2face.serving.work.kinds import KINDS
 from tts2face.serving.work.queues import PLACES
+from tts2face.serving.work.run import find_runner
 
 
 @pytest.mark.parametrize("kind", sorted({*KINDS, *JOB_KINDS}))

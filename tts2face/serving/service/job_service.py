@@ -25,11 +25,10 @@ from tts2face.serving.work.blobs import open_blobs
 from tts2face.serving.work.client import JobClient
 from tts2face.serving.work.connection import DatabaseAwayError, connection_errors
 from tts2face.serving.work.database import database_url, prepare_database, shown_url
-from tts2face.serving.work.job_record import STATES
+from tts2face.serving.work.jobs import STATES, OtherBodyError, QueueFullError
 from tts2face.serving.work.local_workers import LocalWorkers, local_workers
 from tts2face.serving.work.queue_control import prune_jobs, unfinished_segments
 from tts2face.serving.work.run import BLOBS
-from tts2face.serving.work.table import OtherBodyError, QueueFullError
 from tts2face.storage.files import translate_disk_errors
 
 Value = TypeVar("Value")

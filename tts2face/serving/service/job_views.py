@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from tts2face.serving.work.job_record import JobFile, JobRecord
+from tts2face.serving.work.jobs import JobFile, JobRecord
 
 HASH = "ab3f" * 16
 EXAMPLE_ID = "0f8fad5bd9cb469fa16570867728950e"

@@ -25,7 +25,7 @@ from tts2face import __version__
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.settings import SECRET_PREFIX, ServiceSettings
 from tts2face.serving.work.client import JobClient, WebhookDelivery
-from tts2face.serving.work.job_record import JobRecord
+from tts2face.serving.work.jobs import JobRecord
 
 CALL_S = 10.0  # of a whole call, however often its receiver sends a byte; services that receive webhooks answer in 5
 CONNECT_S = 4.0  # to one address of a host

@@ -28,7 +28,7 @@ from tts2face.serving.studio.recordings import (
     judge,
 )
 from tts2face.serving.studio.work import BackgroundWork, WorkKind, WorkList
-from tts2face.serving.work.job_record import FAILED
+from tts2face.serving.work.jobs import FAILED
 
 TOOL = "recordings"
 TOOL_LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=100_000, file_bytes=1 << 30, n_files=256)

@@ -18,7 +18,7 @@ from tts2face.serving.studio.project_store import RENDERS
 from tts2face.serving.studio.requests import key_of, project_work
 from tts2face.serving.studio.work import ID, BackgroundWork, WorkKind, WorkList
 from tts2face.serving.studio.workspace import Workspace
-from tts2face.serving.work.job_record import DONE
+from tts2face.serving.work.jobs import DONE
 from tts2face.session.project_file import parse_project, project_json
 from tts2face.storage.files import translate_disk_errors
 

@@ -20,7 +20,7 @@ from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.studio.requests import key_of
 from tts2face.serving.studio.work import ID, BackgroundWork, WorkKind, WorkList
-from tts2face.serving.work.job_record import DONE
+from tts2face.serving.work.jobs import DONE
 from tts2face.serving.work.resource_check import PALETTE, TALKER
 from tts2face.serving.work.tools import run_tool
 from tts2face.storage.files import translate_disk_errors, write_atomically

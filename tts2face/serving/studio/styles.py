@@ -25,7 +25,7 @@ from tts2face.serving.studio.recordings import REFUSED, judge
 from tts2face.serving.studio.requests import data_of, key_of
 from tts2face.serving.studio.studio_host import StudioHost
 from tts2face.serving.studio.work import BackgroundWork, WorkKind
-from tts2face.serving.work.job_record import FAILED
+from tts2face.serving.work.jobs import FAILED
 from tts2face.session import project as style_names
 from tts2face.session.project import Project
 from tts2face.storage.files import translate_disk_errors, write_atomically

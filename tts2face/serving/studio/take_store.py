@@ -13,7 +13,7 @@ from typing import Any
 from lexicon.errors import DataError, InputError
 from lexicon.values.json_text import read_json
 from tts2face.serving.studio.owned_folders import OwnedFolders
-from tts2face.serving.work.job_record import FAILED
+from tts2face.serving.work.jobs import FAILED
 from tts2face.storage.files import write_atomically
 
 ENTRY = "take.json"

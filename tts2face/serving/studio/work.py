@@ -22,7 +22,7 @@ from lexicon.values.json_text import LARGEST_JSON_BYTES, parse_json
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.exchange import in_background
 from tts2face.serving.service.logs import log_event
-from tts2face.serving.work.job_record import CANCELLED, DONE, FAILED, OPEN_STATES, RUNNING, WAITING
+from tts2face.serving.work.jobs import CANCELLED, DONE, FAILED, OPEN_STATES, RUNNING, WAITING
 from tts2face.storage.files import translate_disk_errors, write_atomically
 
 MAX_TRIES = 3  # of a piece of work by servers that ended meanwhile

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tts2face.serving.work.connection import JobDatabase
-from tts2face.serving.work.job_record import JobFile, JobRecord
-from tts2face.serving.work.table import INPUT, IS_OPEN, OUTPUT, JobTable, insert_files, remove_unused
+from tts2face.serving.work.jobs import INPUT, IS_OPEN, OUTPUT, JobFile, JobRecord, JobTable, insert_files, remove_unused
 
 
 @dataclass(frozen=True, slots=True)

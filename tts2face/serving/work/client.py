@@ -9,10 +9,9 @@ from tts2face.serving.work.blobs import BlobStore
 from tts2face.serving.work.changes import Ending, JobChanges
 from tts2face.serving.work.connection import JobDatabase, Transaction
 from tts2face.serving.work.engine import ACTIVE, JOBS_PER_QUERY
-from tts2face.serving.work.job_record import CANCELLED, JobRecord, NewJob
+from tts2face.serving.work.jobs import CANCELLED, JobRecord, JobTable, NewJob
 from tts2face.serving.work.kinds import KINDS
 from tts2face.serving.work.queues import APPLICATION, APPLICATION_VERSION, JOB_WORKFLOW, QUEUE
-from tts2face.serving.work.table import JobTable
 from tts2face.serving.work.usage import UsageTable
 
 CONNECT_S = 2  # to PostgreSQL; then the request is refused

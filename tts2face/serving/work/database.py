@@ -11,7 +11,7 @@ from tts2face.serving.work.connection import (
     JobDatabase,
     database_reason,
 )
-from tts2face.serving.work.table import JobTable
+from tts2face.serving.work.jobs import JobTable
 from tts2face.serving.work.usage import UsageTable
 from tts2face.serving.work.workers import Workers
 

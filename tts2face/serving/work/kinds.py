@@ -10,12 +10,10 @@ The next kind:
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from lexicon.errors import DataError
 from tts2face.serving.batch.engine import Engine
 from tts2face.serving.batch.store import Store
 from tts2face.serving.work.blobs import BlobStore
@@ -104,15 +102,6 @@ class Products:
 
     files: tuple[Product, ...]
     error: str | None = None
-
-
-def find_runner(kind: str) -> Callable[[JobTask], Products]:
-    """Function that executes the jobs of a kind."""
-    if kind not in KINDS:
-        raise DataError(f"this worker cannot execute jobs of kind {kind!r}; install the version of the service")
-    module, name = KINDS[kind].run.split(":")
-    runner: Callable[[JobTask], Products] = getattr(import_module(module), name)
-    return runner
 
 
 def media_type(name: str) -> str:

@@ -9,7 +9,7 @@ from lexicon.errors import InputError
 from tts2face.serving.batch.segment import segment_from_json
 from tts2face.serving.work.database import database_url, prepare_database
 from tts2face.serving.work.engine import ACTIVE, JOBS_PER_QUERY, enqueue, failure_reason, open_client
-from tts2face.serving.work.job_record import CANCELLED, FAILED, State
+from tts2face.serving.work.jobs import CANCELLED, FAILED, State
 from tts2face.serving.work.queues import JOB_WORKFLOW, WORKFLOW
 from tts2face.serving.work.workers import Workers
 

@@ -5,21 +5,21 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from importlib import import_module
 from pathlib import Path
 from tempfile import gettempdir
 from typing import Any
 
-from lexicon.errors import Tts2faceError
+from lexicon.errors import DataError, Tts2faceError
 from tts2face.serving.batch.engine import MIN_FREE_BYTES, Rendered, free_bytes
 from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import Store, wait_for_store
-from tts2face.serving.work.blobs import BlobStore, open_blobs
+from tts2face.serving.work.blobs import BlobStore, open_blobs, place_file, place_models
 from tts2face.serving.work.changes import Ending, JobChanges
 from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase, connection_errors
 from tts2face.serving.work.engine import ACTIVE, JOBS_PER_QUERY, DatabaseEngine, failure_reason, open_client
-from tts2face.serving.work.job_record import DONE, FAILED, JobFile, JobRecord
-from tts2face.serving.work.kinds import JobCancelledError, JobTask, Product, find_runner
-from tts2face.serving.work.placed_files import place_file, place_models
+from tts2face.serving.work.jobs import DONE, FAILED, JobFile, JobRecord
+from tts2face.serving.work.kinds import KINDS, JobCancelledError, JobTask, Product, Products
 from tts2face.storage.bucket import StoreAwayError
 from tts2face.storage.temporary import Temporary
 from tts2face.storage.user_folders import without_folders
@@ -39,6 +39,15 @@ SEGMENTS_PER_STEP = 20
 def job_blobs(store: str) -> Callable[[], tuple[BlobStore, ...]]:
     """Stores of the files of jobs and of uploaded models; opened when they are first needed."""
     return lru_cache(maxsize=1)(lambda: (open_blobs(store, BLOBS), open_blobs(store, RESOURCES)))
+
+
+def find_runner(kind: str) -> Callable[[JobTask], Products]:
+    """Function that executes the jobs of a kind."""
+    if kind not in KINDS:
+        raise DataError(f"this worker cannot execute jobs of kind {kind!r}; install the version of the service")
+    module, name = KINDS[kind].run.split(":")
+    runner: Callable[[JobTask], Products] = getattr(import_module(module), name)
+    return runner
 
 
 class JobRunner:

@@ -15,8 +15,7 @@ from tts2face.serving.batch.render_process import RenderProcess
 from tts2face.serving.batch.segment import Segment, segment_from_json
 from tts2face.serving.batch.segment_result import SegmentResult
 from tts2face.serving.batch.store import Store, wait_for_store
-from tts2face.serving.work.blobs import BlobStore
-from tts2face.serving.work.placed_files import place_segment_files
+from tts2face.serving.work.blobs import BlobStore, place_segment_files
 from tts2face.storage.temporary import Temporary
 
 

@@ -17,7 +17,7 @@ from tests.running import RunningService, eventually
 from tests.serving.studio.server.test_styles_http import owned, wait_for_take  # noqa: F401 - a fixture
 from tts2face.serving.studio.preview_bundle import read_bundle
 from tts2face.serving.studio.take_store import READY
-from tts2face.serving.work.job_record import FAILED
+from tts2face.serving.work.jobs import FAILED
 from tts2face.session.performance import Performance, perform
 from tts2face.session.session import Session
 from tts2face.video.media import read_frames

@@ -5,11 +5,10 @@ A new kind of jobs:
 1. a module of this package with the model of its options, a function for each part of its form that checks the file
    and notes its path in the order, and a function that checks the whole and returns the JSON of the job;
 2. a row of `JOB_KINDS` in ``table.py``; routes, quotas and the OpenAPI description follow;
-3. a row of `RUNNERS` in ``serving/work/kinds.py`` with the function that executes it.
+3. a row of `KINDS` in ``serving/work/kinds.py`` with the function that executes it.
 """
 
 from collections.abc import Awaitable, Callable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,15 +16,10 @@ from typing import Any
 from pydantic import BaseModel
 from starlette.datastructures import UploadFile
 
-from lexicon.errors import InputError
-from lexicon.sentence_length import marked_silence_s
-from lexicon.text_marks import parse_marks
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.service.uploads import UploadFolder
-
-CHARACTERS_PER_S, CUE_S = 15.0, 3.0  # of speech; what a job takes of its key's day before it is made
 
 
 @dataclass(slots=True)
@@ -78,13 +72,3 @@ def refuse_second(part: str, number: int) -> None:
     """Refuse a part that may be sent once and was sent again."""
     if number > 1:
         raise RefusedError(422, "invalid_request", f"{part} was sent twice; send one")
-
-
-def expected_speech_s(order: JobOrder) -> float:
-    """Seconds of speech that a job is expected to make."""
-    options = order.options
-    text = getattr(options, "text", "")
-    silent_s = sum(getattr(options, name, None) or 0.0 for name in ("idle", "listen"))
-    with suppress(InputError):  # of a text with wrong marks, which makes nothing
-        silent_s += marked_silence_s(parse_marks(text))
-    return len(text) / CHARACTERS_PER_S + silent_s + CUE_S * order.upload.n_cues

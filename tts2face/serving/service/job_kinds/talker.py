@@ -12,7 +12,7 @@ from tts2face.models.consent import states_consent
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.job_kinds.order import JobKind, JobOrder
 from tts2face.serving.work.client import JobClient
-from tts2face.serving.work.job_record import OPEN_STATES
+from tts2face.serving.work.jobs import OPEN_STATES
 from tts2face.serving.work.resource_check import TALKER
 
 MAX_OPEN, MAX_COUNTED = 4, 1000  # talkers in work of a key; its newest jobs that are counted

@@ -5,7 +5,7 @@ import json
 import re
 import uuid
 from collections.abc import AsyncIterator, Mapping
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, suppress
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,11 +18,14 @@ from fastapi.responses import JSONResponse, Response, StreamingResponse
 from pydantic import BaseModel, ValidationError
 from starlette.datastructures import FormData, UploadFile
 
+from lexicon.errors import InputError
+from lexicon.sentence_length import marked_silence_s
+from lexicon.text_marks import parse_marks
 from tts2face.serving.batch.content_address import content_address
 from tts2face.serving.service.access import require_scope
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.guard import VIDEO_PATH
-from tts2face.serving.service.job_kinds.order import JobKind, JobOrder, Upload, expected_speech_s
+from tts2face.serving.service.job_kinds.order import JobKind, JobOrder, Upload
 from tts2face.serving.service.job_kinds.schema import new_job_schema
 from tts2face.serving.service.job_kinds.table import JOB_KINDS
 from tts2face.serving.service.job_views import EXAMPLE_ID, JobDetail, JobPage, NewJobBody, job_detail, job_view
@@ -32,13 +35,14 @@ from tts2face.serving.service.state import service_state
 from tts2face.serving.service.uploads import MAX_TEXT_BYTES, upload_folder
 from tts2face.serving.service.webhooks import check_webhook
 from tts2face.serving.work.client import JobClient
-from tts2face.serving.work.job_record import JobEvent, JobFile, JobRecord, NewJob, State
+from tts2face.serving.work.jobs import JobEvent, JobFile, JobRecord, NewJob, State
 from tts2face.serving.work.kinds import media_type
 from tts2face.serving.work.resource_check import TALKER
 
 router = APIRouter(prefix="/v1", tags=["jobs"])
 
 JOB_ID = re.compile(r"[0-9a-f]{32}")
+CHARACTERS_PER_S, CUE_S = 15.0, 3.0  # of speech; what a job takes of its key's day before it is made
 POLL_S, HEARTBEAT_S = 0.5, 15.0  # of the stream of events
 MAX_PARTS = 2  # besides files
 NOT_FOUND: dict[int | str, dict[str, Any]] = {404: {"description": "The key has no such job."}}
@@ -109,7 +113,7 @@ async def _queue(request: HttpRequest, idempotency_key: str | None, kinds: Mappi
         content = await kind.prepare(order)
         record, is_new = await service.call(lambda client: _submit(client, order, asked, content, idempotency_key))
         if is_new:
-            state.limits.add_speech(key, expected_speech_s(order))
+            state.limits.add_speech(key, _expected_speech_s(order))
     return JSONResponse(job_detail(record).model_dump(), 202 if is_new else 200, {"Location": f"/v1/jobs/{record.id}"})
 
 
@@ -246,6 +250,16 @@ def _submit(
                 client.blobs.put(path)
 
     return client.submit(new, order.state.settings.job_waiting, put_missing)
+
+
+def _expected_speech_s(order: JobOrder) -> float:
+    """Seconds of speech that a job is expected to make."""
+    options = order.options
+    text = getattr(options, "text", "")
+    silent_s = sum(getattr(options, name, None) or 0.0 for name in ("idle", "listen"))
+    with suppress(InputError):  # of a text with wrong marks, which makes nothing
+        silent_s += marked_silence_s(parse_marks(text))
+    return len(text) / CHARACTERS_PER_S + silent_s + CUE_S * order.upload.n_cues
 
 
 def _size(path: Path) -> int:

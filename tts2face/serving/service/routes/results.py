@@ -11,7 +11,7 @@ from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.job_views import HASH
 from tts2face.serving.service.state import service_state
 from tts2face.serving.work.client import JobClient
-from tts2face.serving.work.job_record import JobFile
+from tts2face.serving.work.jobs import JobFile
 
 router = APIRouter(prefix="/v1", tags=["jobs"])
 

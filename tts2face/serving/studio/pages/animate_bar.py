@@ -10,7 +10,7 @@ from tts2face.serving.studio.pages.open_page import OpenPage
 from tts2face.serving.studio.renders import RENDER, formats
 from tts2face.serving.studio.work import BackgroundWork
 from tts2face.serving.studio.workspace import Workspace
-from tts2face.serving.work.job_record import DONE, RUNNING
+from tts2face.serving.work.jobs import DONE, RUNNING
 
 CLOCK = 'import("tts2face-studio/clock.js").then((m) => '
 TOGGLE_SIDES = 'import("tts2face-studio/preview.js").then((m) => m.sides.toggle())'

@@ -18,7 +18,7 @@ from tts2face.serving.studio.pages.styles import ANY_TAKE
 from tts2face.serving.studio.routes.recordings import MAX_TAKE_BYTES
 from tts2face.serving.studio.studio import Studio
 from tts2face.serving.studio.take_store import FILM, READING, SOUND, TABLE, TakeEntry
-from tts2face.serving.work.job_record import FAILED
+from tts2face.serving.work.jobs import FAILED
 
 REFRESH_S = 0.5
 FILES = "/api/takes"  # below the address of the pages

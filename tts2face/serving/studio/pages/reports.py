@@ -13,7 +13,7 @@ from tts2face.serving.studio.pages.frame import begin_page, confirm, heading, ic
 from tts2face.serving.studio.reports import KINDS, REPORT
 from tts2face.serving.studio.studio import Studio
 from tts2face.serving.studio.work import BackgroundWork
-from tts2face.serving.work.job_record import DONE, RUNNING
+from tts2face.serving.work.jobs import DONE, RUNNING
 
 ALL_REPORTS = ("All reports", "/reports")
 # Loads a report into its frame in the colours of the studio: a frame knows only those of the system.

@@ -23,7 +23,7 @@ from tts2face.serving.studio.requests import data_of, events_of
 from tts2face.serving.studio.studio import Studio
 from tts2face.serving.studio.work import BackgroundWork
 from tts2face.serving.studio.workspace import Workspace
-from tts2face.serving.work.job_record import DONE
+from tts2face.serving.work.jobs import DONE
 from tts2face.session.project_file import project_json
 
 API = f"{PAGES}/api"

@@ -1,26 +1,21 @@
-"""Tables of the jobs of the service: jobs, their files, events and segments; read and changed by server and workers."""
+"""Jobs of the service in the database: records of them, and tables of jobs, files, events and segments."""
 
 import json
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, get_args
 
 from lexicon.errors import BackendError, InputError
 from tts2face.serving.work.connection import JobDatabase, Transaction, create_tables
-from tts2face.serving.work.job_record import (
-    COLUMNS,
-    OPEN_STATES,
-    STATES,
-    WAITING,
-    JobEvent,
-    JobFile,
-    JobRecord,
-    NewJob,
-    event_from_row,
-    record_from_row,
-)
 from tts2face.serving.work.queues import WORKFLOWS
 
+State = Literal["waiting", "running", "done", "failed", "cancelled"]  # of jobs, and of the studio's background work
+WAITING, RUNNING, DONE, FAILED, CANCELLED = STATES = get_args(State)
+OPEN_STATES = (WAITING, RUNNING)
+COLUMNS = (
+    "id", "key_name", "kind", "state", "request", "body_hash", "created", "started", "finished", "n_done", "n_all",
+    "error", "webhook", "webhook_state", "webhook_tries",
+)  # fmt: skip
 INPUT, OUTPUT = "input", "output"  # roles of files
 _TABLES = (
     """CREATE TABLE IF NOT EXISTS tts2face_jobs (
@@ -50,6 +45,98 @@ _STATE = f"""CASE WHEN NOT {IS_OPEN} THEN state
     WHEN EXISTS (SELECT 1 FROM {{workflows}} WHERE workflow_uuid = tts2face_jobs.id
         AND status NOT IN ('ENQUEUED', 'DELAYED')) THEN 'running' ELSE 'waiting' END"""
 CHILD_TABLES = ("tts2face_job_files", "tts2face_job_events", "tts2face_job_segments")
+
+
+@dataclass(frozen=True, slots=True)
+class JobFile:
+    """A file of a job by the hash of its content; `name` is given by the service, never by a client."""
+
+    name: str
+    sha256: str
+    media_type: str = "application/octet-stream"
+    n_bytes: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class NewJob:
+    """A job that is to be queued.
+
+    Parameters
+    ----------
+    id
+        Name of the job, which is also that of its workflow.
+    key_name
+        Name of the API key of its owner.
+    body_hash
+        Hash of all that was sent, for the comparison of requests with the same `idempotency_key`.
+    webhook
+        URL that learns of its end.
+    """
+
+    id: str
+    key_name: str
+    kind: str
+    request: Mapping[str, Any]
+    body_hash: str
+    inputs: tuple[JobFile, ...] = ()
+    idempotency_key: str | None = None
+    webhook: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class JobRecord:
+    """A job in the database; times are seconds since 1970 by its clock.
+
+    Parameters
+    ----------
+    state
+        Its ending; of an open job what DBOS says of its workflow.
+    started
+        When a worker first took it; DBOS forgets this when another one takes it over, and when it is cancelled.
+    """
+
+    id: str
+    key_name: str
+    kind: str
+    state: str
+    request: Mapping[str, Any]
+    body_hash: str
+    created: float
+    started: float | None = None
+    finished: float | None = None
+    n_done: int = 0
+    n_all: int = 0
+    error: str | None = None
+    webhook: str | None = None
+    webhook_state: str | None = None
+    webhook_tries: int = 0
+    inputs: tuple[JobFile, ...] = field(default=())
+    outputs: tuple[JobFile, ...] = field(default=())
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it waits or runs."""
+        return self.state in OPEN_STATES
+
+
+@dataclass(frozen=True, slots=True)
+class JobEvent:
+    """An event of a job; numbers rise from 1."""
+
+    number: int
+    time: float
+    content: Mapping[str, Any]
+
+
+def record_from_row(row: Any) -> JobRecord:
+    """The record of a row with `COLUMNS`."""
+    values = dict(zip(COLUMNS, row, strict=True))
+    return JobRecord(**{**values, "request": json.loads(values["request"])})
+
+
+def event_from_row(row: Any) -> JobEvent:
+    """The event of a row with its number, time and content."""
+    return JobEvent(row[0], row[1], json.loads(row[2]))
 
 
 class QueueFullError(BackendError):
