@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 from lexicon.errors import BackendError
 from lexicon.g2p import languages
 from lexicon.japanese import has_kanji, load_reader
-from lexicon.letter_names import letter_name, run_name
 from lexicon.marked_text import Mark, MarkedText, PhoneMark, StyleRun
-from lexicon.scripts import SCRIPTS, blank_given_words, foreign_runs, letter_script, script_name
+from lexicon.scripts import SCRIPTS, blank_given_words, foreign_runs, letter_name, letter_script, run_name, script_name
 from lexicon.text_language import guess_language
 from lexicon.written_forms import read_table
 

@@ -10,9 +10,9 @@ from lexicon.dictionary import Dictionary
 from lexicon.errors import InputError
 from lexicon.ipa import IpaPhone
 from lexicon.marked_text import PhoneMark
+from lexicon.normalize import spoken_form
 from lexicon.pronounce import Word, pronounce
 from lexicon.sentence_ends import MARKS
-from lexicon.spoken_form import spoken_form
 
 _STEM = "qzx"  # of the placeholders of given words during normalisation; not a word of any language
 

@@ -1,4 +1,4 @@
-"""Normalise English text: numbers, dates, money, units, abbreviations, addresses and symbols become words.
+"""Spoken form of a text, the input of a voice: English numbers, dates, money, units and symbols become words.
 
 One scan from left to right: each written form has a pattern and a reader. The result consists of words, with
 apostrophes and hyphens inside them, and sentence punctuation; normalisation is idempotent and linear in time.
@@ -13,7 +13,10 @@ from lexicon import form_readers as forms
 from lexicon import written_forms as readings
 from lexicon.canonical import canonical_text
 from lexicon.capitals import sentence_case
-from lexicon.foreign_letters import name_letters_in_words
+from lexicon.german_dates import read_german_dates
+from lexicon.japanese import has_kanji, to_kana
+from lexicon.number_words import MAX_CARDINAL_DIGITS
+from lexicon.scripts import name_foreign_letters, name_letters_in_words
 
 MARKS = frozenset(".,;:!?")
 _FULL_MONTH = "|".join(readings.MONTHS)
@@ -30,6 +33,10 @@ _HALF = r"(?:[aApP]\.[mM]\.?|[aApP][mM]\b)"
 _START, _STOP = r"(?<![^\W\d_])", r"(?![^\W\d_])"  # no letter before, after
 _LETTERS = r"[^\W\d_]+"
 _SINGLE_LETTER = re.compile(rf"{_START}[^\W\d_]{_STOP}")
+# espeak-ng omits what follows the first 160 letters of a word; the longest in use have 85. From U+0900 on, scripts
+# without spaces between words begin.
+_LONG_WORD = re.compile(r"[^\W\d_\u0900-\U0010ffff]{100}(?=[^\W\d_\u0900-\U0010ffff])")
+_LONG_NUMBER = re.compile(rf"[0-9]{{{MAX_CARDINAL_DIGITS + 1},}}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,3 +231,25 @@ def normalize(text: str, language: str = "en-us") -> str:
     if not language.startswith("en"):
         return canonical_text(text, keep_marks=True)
     return join_words([token.spoken for token in split_tokens(text)])
+
+
+def spoken_form(text: str, language: str) -> str:
+    """Spoken form of a text.
+
+    English is normalised, days of German dates are written as words, Japanese with Chinese characters is converted to
+    kana, and single letters of other writing systems are replaced by their names. A word of more than 100 letters is
+    divided, and the digits of a longer number than English names are separated.
+
+    Raises
+    ------
+    BackendError
+        The text is Japanese with Chinese characters, and the library that reads them is not installed.
+    """
+    if language.startswith("en"):
+        return _LONG_WORD.sub(r"\g<0> ", normalize(text))
+    if language == "ja" and has_kanji(text):
+        text = to_kana(text)
+    if language.partition("-")[0] == "de":
+        text = read_german_dates(text)
+    text = _LONG_NUMBER.sub(lambda number: " ".join(number.group()), name_foreign_letters(text, language))
+    return _LONG_WORD.sub(r"\g<0> ", text)

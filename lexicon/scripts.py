@@ -1,4 +1,4 @@
-"""Writing systems of languages, and checks that a text can be read in its language."""
+"""Writing systems: which letters a language reads, names of single other ones, and whether a text can be read."""
 
 import functools
 import re
@@ -10,7 +10,6 @@ from lexicon import written_forms as readings
 from lexicon.errors import InputError
 from lexicon.g2p import check_language
 from lexicon.japanese import has_kanji, load_reader
-from lexicon.letter_names import run_name
 from lexicon.marked_text import MarkedText, PhoneMark
 
 _CYRILLIC = frozenset({"CYRILLIC"})
@@ -44,6 +43,15 @@ _LOOSE_MARKS = re.compile(
     "[\u0300-\u036f\u0483-\u0489\u1ab0-\u1aff\u1dc0-\u1dff\u20d0-\u20ff\ufe00-\ufe0f\ufe20-\ufe2f]"
 )
 _FOREIGN = re.compile("f[fm]*")
+# Scripts whose letters espeak-ng names in every language; for others it speaks a code, as in "Thai letter E 0 1".
+NAMED_BY_ESPEAK = frozenset({
+    "GREEK", "CYRILLIC", "HEBREW", "ARABIC", "GEORGIAN", "ARMENIAN", "HANGUL", "DEVANAGARI", "BENGALI", "GUJARATI",
+    "GURMUKHI", "KANNADA", "MALAYALAM", "TAMIL", "TELUGU", "SINHALA",
+})  # fmt: skip
+_WORD = re.compile(r"[^\W\d_]+")
+_UNICODE_NAME = re.compile(r"(?:LETTER|CHARACTER|SYLLABLE) (?:(?:FINAL|SMALL) )?(.+?)(?: WITH .*)?")
+_PREFIX = re.compile(r"^.*?\b(?=(?:LETTER|CHARACTER|SYLLABLE) )")
+_VOWELS = MappingProxyType({"a": "ah", "e": "eh", "i": "ee", "o": "oh", "u": "oo"})  # Unicode's names of vowels
 
 
 def letter_script(letter: str) -> str:
@@ -150,3 +158,59 @@ def blank_given_words(text: MarkedText) -> str:
             pieces += [text.text[at : mark.at], " " * (mark.end - mark.at)]
             at = mark.end
     return "".join([*pieces, text.text[at:]])
+
+
+def name_foreign_letters(text: str, language: str) -> str:
+    """The text with each single foreign letter that espeak-ng cannot name replaced by its name.
+
+    Foreign words are kept; in Japanese, where espeak-ng reads no Latin letters as words, so are letters.
+    """
+    if text.isascii() or language.partition("-")[0] == "ja":
+        return text
+    return "".join(_pieces(text, language, NAMED_BY_ESPEAK))
+
+
+def name_letters_in_words(text: str) -> str:
+    """English text with the names of single foreign letters that stand within a word (ΔT), except in units (kΩ)."""
+    return text if text.isascii() else _WORD.sub(_name_letters, text)
+
+
+def _name_letters(match: "re.Match[str]") -> str:
+    word = match.group()
+    if len(word) == 1 or word.isascii() or word in readings.read_table("units.tsv"):
+        return word
+    return "".join(_pieces(word, "en", frozenset()))
+
+
+def _pieces(text: str, language: str, kept: frozenset[str]) -> Iterator[str]:
+    at = 0
+    for start, end in foreign_runs(text, language):
+        name = "" if letter_script(text[start]) in kept else run_name(text[start:end])
+        if name:
+            yield text[at:start]
+            yield " " * text[start - 1 : start].isalnum() + name + " " * text[end : end + 1].isalnum()
+            at = end
+    yield text[at:]
+
+
+@functools.lru_cache(maxsize=2000)
+def letter_name(letter: str) -> str:
+    """Name of a letter from the table of symbols, else from its Unicode name; empty if it has none.
+
+    Chinese characters have none, as each is a word.
+    """
+    known = readings.read_table("symbols.tsv").get(letter)
+    if known:
+        return known[0]
+    base = unicodedata.normalize("NFD", letter)[:1]
+    if base != letter and unicodedata.name(letter, "").startswith("GREEK"):
+        return letter_name(base)
+    match = _UNICODE_NAME.fullmatch(_PREFIX.sub("", unicodedata.name(letter, ""), count=1))
+    name = "" if match is None else match[1].lower().replace(" ", "-")
+    return _VOWELS.get(name, name) if name.replace("-", "").isalpha() else ""
+
+
+def run_name(run: str) -> str:
+    """Name of a run that is a single letter; empty for words."""
+    letter = unicodedata.normalize("NFKC", run)
+    return letter_name(letter) if len(letter) == 1 else ""

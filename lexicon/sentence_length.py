@@ -9,7 +9,7 @@ from lexicon.dictionary import word_key
 from lexicon.errors import InputError
 from lexicon.ipa import IpaPhone
 from lexicon.marked_text import MarkedText, PauseMark, PhoneMark, StyleRun
-from lexicon.spoken_form import spoken_form
+from lexicon.normalize import spoken_form
 
 MAX_SENTENCE_CHARACTERS = 300  # longer sentences are split at a clause mark or a space
 # Letters of the spoken form; a sentence with more (of numbers, symbols, given phones) is divided. 65 s of English.

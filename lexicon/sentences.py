@@ -13,8 +13,8 @@ from lexicon.capitals import sentence_case
 from lexicon.given_phones import TextWord, words_with_given_phones
 from lexicon.ipa import IpaPhone
 from lexicon.marked_text import Mark, MarkedText, NodMark, PauseMark, PhoneMark, StyleRun
+from lexicon.normalize import spoken_form
 from lexicon.sentence_length import n_letters, overlapping_runs, pieces_of_text
-from lexicon.spoken_form import spoken_form
 
 
 @dataclass(frozen=True, slots=True)

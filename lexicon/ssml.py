@@ -36,7 +36,6 @@ from lexicon.ssml_values import (
     primary_subtag,
 )
 
-_STARTS = re.compile(r"\ufeff?\s*<(?:speak[\s>/]|\?xml\s|!DOCTYPE\s)")
 _MARK = re.compile(r"\[/?(?:style|nod|pause)\b")
 _TIME = re.compile(r"\+?([0-9]{1,9}(?:\.[0-9]{1,9})?|\.[0-9]{1,9})\s*(ms|s)")
 # Volume factor and nod size of each level: accented words are 2-5 dB louder than their neighbours, and nods are the
@@ -47,11 +46,6 @@ LEAF_KINDS = frozenset({"break", "mark", "sub", "phoneme", "say-as"})  # contain
 REPLACED_KINDS = frozenset({"phoneme", "say-as"})  # speak other words than their text
 LANGUAGE = "xml:lang"
 Attributes = Mapping[str, str]
-
-
-def is_ssml(text: str) -> bool:
-    """Whether a text is SSML: it begins with ``<speak``, an XML or a document type declaration."""
-    return _STARTS.match(text) is not None
 
 
 def parse_ssml(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:

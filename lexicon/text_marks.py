@@ -8,7 +8,7 @@ import re
 from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.marked_text import MarkedText, MarkedTextBuilder, NodMark, PauseMark
-from lexicon.ssml import _add_phonemes, is_ssml, parse_ssml
+from lexicon.ssml import _add_phonemes, parse_ssml
 
 # A bracket, one of the words, and the rest up to the closing bracket, which a mark must have; words with phones up to
 # their end. Each part ends where the next begins, so that the scan is linear.
@@ -17,7 +17,13 @@ MARK_PATTERN = re.compile(
     r"|\[(?P<name>/?(?:style|nod|pause)\b|phoneme(?=:)|/phoneme(?=\]))(?P<rest>[^\[\]]*)(?P<end>\]?)"
 )
 MAX_QUOTED_CHARACTERS = 40
+_SSML = re.compile(r"\ufeff?\s*<(?:speak[\s>/]|\?xml\s|!DOCTYPE\s)")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
+
+
+def is_ssml(text: str) -> bool:
+    """Whether a text is SSML: it begins with ``<speak``, an XML or a document type declaration."""
+    return _SSML.match(text) is not None
 
 
 def parse_marks(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:

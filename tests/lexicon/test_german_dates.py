@@ -2,8 +2,8 @@
 
 import pytest
 
+from lexicon.normalize import spoken_form
 from lexicon.pronounce import pronounce
-from lexicon.spoken_form import spoken_form
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,9 @@ from lexicon.dictionary import parse_dictionary
 from lexicon.errors import InputError
 from lexicon.g2p import segments_by_rules
 from lexicon.marked_text import PauseMark
+from lexicon.normalize import spoken_form
 from lexicon.sentence_length import FIRST_SPOKEN_LETTERS, LETTERS_PER_S, MAX_SPOKEN_LETTERS, check_silence
 from lexicon.sentences import Sentence, split_sentences
-from lexicon.spoken_form import spoken_form
 from lexicon.ssml import parse_ssml
 from lexicon.text_marks import parse_marks
 

@@ -17,7 +17,7 @@ from tests.tones import LEAD_S, LEVEL, PHONE_S, RATE_HZ, TRAIL_S, LetterVoice
 from tts2face.gestures.elements import Nod, StyleSpan
 from tts2face.request import Request
 from tts2face.session.joining import join_utterances, silent_speech, trim_silence
-from tts2face.session.prepared import prepare
+from tts2face.session.prepared import check_marks, marked_styles, prepare
 from tts2face.session.speech import (
     MIN_UTTERANCE_GAP_S,
     MarkTime,
@@ -27,7 +27,6 @@ from tts2face.session.speech import (
     voice_in,
 )
 from tts2face.session.speech_stream import SpeechModels, spoken_pieces
-from tts2face.session.text_marks import check_marks, marked_styles
 from tts2face.sound.voice_pool import load_voice
 
 WORDS = st.lists(

@@ -8,17 +8,19 @@ from numpy.typing import NDArray
 
 from tts2face.models.baked_light import LEAST_SIDE
 from tts2face.photo.eyes import EyePatch
-from tts2face.photo.mesh import PhotoMesh
+from tts2face.photo.lines import N_LID
+from tts2face.photo.mesh import PhotoMesh, grid_triangles
 from tts2face.photo.teeth import OwnTeeth
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
 SKIN, LIDS, EYES = "skin", "lids", "eyes"  # parts, of which the first two show the picture itself
 PAGE_MARGIN = 1 / 64  # of a page, beyond what it shows: the places nearest to its edges are not read
 BETWEEN_PX = 4  # of patches on their page
 MOVED = 1e-3  # mm, or share of the head's motion, from which a vertex moves
 UNSEEN = 128.0  # colour of vertices whose colour is a picture's
+N_LID_ROWS = 5  # of vertices, from the fold to the band
+SHOWN_ABOVE = 0.018  # of the eye distance above the fold, whose skin a lid shows on its way there and back
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,3 +134,20 @@ def _page_side(least: int) -> int:
     while side * (1 - 2 * PAGE_MARGIN) < least:
         side *= 2
     return side
+
+
+def add_lids(surface: PhotoSurface, mesh: PhotoMesh, pages: PhotoPages, scale: float) -> None:
+    """Add the lids, whose skin is that above the fold, mirrored: it fits at both ends."""
+    skin = surface.vertices[0]
+    bow = np.sin(np.linspace(0, np.pi, N_LID))[:, None] ** 0.5
+    for fold, band, margin in zip(mesh.folds, mesh.bands, mesh.upper_lids, strict=True):
+        moving = np.concatenate([fold[:1], band[-1], fold[-1:]])
+        up = mesh.places[fold] - mesh.places[margin]
+        way = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-6) * (SHOWN_ABOVE * scale) * bow
+        rows = []
+        for share in np.linspace(0, 1, N_LID_ROWS):
+            shown = mesh.places[fold] + way * (1 - abs(2 * share - 1))
+            rows.append(surface.add(skin.at(fold).between(skin.at(moving), float(share)), uv=pages.uv(shown)))
+        triangles = grid_triangles(np.stack(rows))
+        is_mirrored = mesh.places[fold[0], 0] > mesh.places[fold[-1], 0]
+        surface.parts.append((LIDS, triangles[:, ::-1] if is_mirrored else triangles))

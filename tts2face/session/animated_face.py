@@ -38,9 +38,8 @@ from tts2face.models.face import Face
 from tts2face.models.palette import MEASURED_STYLE, Palette
 from tts2face.models.talker import Talker
 from tts2face.picture.frame_renderer import FrameRenderer
-from tts2face.picture.mark import marked
 from tts2face.picture.options import Picture
-from tts2face.picture.renderer import mesh_renderer
+from tts2face.picture.renderer import marked, mesh_renderer
 from tts2face.processes.shared import shared
 from tts2face.source import NATURAL
 from tts2face.types import Trajectory, YieldTurn, keep_on, resting_head

@@ -23,9 +23,8 @@ from tts2face.models.palette import Palette
 from tts2face.request import FIELDS
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.edits import ChannelEdits
-from tts2face.session.prepared import PreparedRequest
+from tts2face.session.prepared import PreparedRequest, marked_styles
 from tts2face.session.speech_stream import Piece
-from tts2face.session.text_marks import marked_styles
 from tts2face.storage.memory import NO_MEMORY, ResultMemory
 from tts2face.types import Clip, Waveform, YieldTurn, keep_on
 

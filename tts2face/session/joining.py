@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.canonical import canonical_text
+from lexicon.normalize import spoken_form
 from lexicon.sentence_length import n_letters
 from lexicon.sentences import text_prefix
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan, enforce_increasing
-from lexicon.spoken_form import spoken_form
 from tts2face.sound.pauses import speech_onset
 from tts2face.types import Speech, Waveform, concatenate_speech, first_sample
 

@@ -1,28 +1,34 @@
-"""A request that is parsed and checked once: its text with its marks, its timeline and its options of synthesis."""
+"""A request that is parsed and checked once: its text and marks, its timelines and its options of synthesis."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from lexicon.dictionary import read_dictionary
 from lexicon.errors import InputError
 from lexicon.foreign_words import make_readable
 from lexicon.ipa import IpaPhone
-from lexicon.marked_text import MarkedText
+from lexicon.languages import language_code
+from lexicon.marked_text import RATE_LIMITS, VOLUME_LIMITS, MarkedText
 from lexicon.scripts import check_readable
+from lexicon.sentence_length import check_silence
 from lexicon.sentences import Sentence, split_sentences
 from lexicon.text_marks import parse_marks
 from lexicon.values.files import is_file
-from tts2face.gestures.timeline import Timeline
+from tts2face.gestures.elements import ExpressionSpan, Gains, ListeningSpan
+from tts2face.gestures.listening import CUE_RATE, cue_times, responses
+from tts2face.gestures.timeline import Timeline, parse_expressions, parse_gains, parse_style
+from tts2face.gestures.timeline_file import read_timeline
 from tts2face.lips.options import METHOD_OPTIONS, ExcludedToken, SynthesisOptions
 from tts2face.picture.options import Picture
-from tts2face.request import Request, option_fields
+from tts2face.request import CAMERA, Request, option_fields
 from tts2face.session.corrections import SentenceEdges
 from tts2face.session.joining import Excerpt
-from tts2face.session.request_timeline import build_request_timeline, listening_timeline
-from tts2face.session.text_marks import check_marks
 from tts2face.source import Listening, Recorded, Source, Spoken
 from tts2face.storage.output_paths import AnyPath
 from tts2face.types import exact_rate
@@ -32,6 +38,8 @@ if TYPE_CHECKING:
 
 HEARING_STEPS, RECORDING_STEPS = 300, 700  # steps of progress of a recording: until its phones are known, and then
 IDLE_STEPS = 1000  # steps of progress of idle animation
+OF_VIDEO = "video"  # expression of the person in the video of a recording
+SMILE_S = 10.0  # of its beginning are read: as `held_smile`, its score is the weight of happy (.63 for .7)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -193,3 +201,98 @@ def input_paths(request: Request, picture: Picture) -> dict[str, AnyPath]:
         "voice settings": f"{voice}.json" if voice else None,
         "background": picture.background,
     }
+
+
+@lru_cache(maxsize=1000)
+def innermost_styles(nested: tuple[str, ...]) -> Mapping[str, str]:
+    """Style of each feature under nested marks; the innermost mark of a feature applies."""
+    chosen: dict[str, str] = {}
+    for written in nested:
+        chosen |= parse_style(written)
+    return chosen
+
+
+def marked_styles(text: MarkedText) -> tuple[str, ...]:
+    """Names of all styles in the marks of a text, in order of first use; raises as `check_marks`."""
+    runs = dict.fromkeys(run.styles for run in text.runs)
+    return tuple(dict.fromkeys(style for styles in runs for style in innermost_styles(styles).values()))
+
+
+def check_marks(text: MarkedText, request: Request) -> None:
+    """Reject marks that are invalid or do not go with the request, in time linear in the length of the text."""
+    if isinstance(request.source, Recorded) and text.has_voice_changes:
+        raise InputError(
+            "[pause], <break>, <prosody>, <emphasis>, <voice> and <lang> have no effect on a recording; remove them or "
+            "--audio"
+        )
+    if text.language is not None and _primary(language_code(text.language)) != _primary(request.language):
+        raise InputError(f"the text names the language {text.language}, not {request.language}; choose one of them")
+    marked_styles(text)
+    check_silence(text)
+    spoken = request.spoken or Spoken("")
+    for what, marked, requested, (low, high) in (
+        ("speed", {run.rate for run in text.runs}, spoken.rate, RATE_LIMITS),
+        ("loudness", {run.volume for run in text.runs}, spoken.volume, VOLUME_LIMITS),
+    ):
+        for factor in marked:
+            if not low <= factor * requested <= high:
+                raise InputError(
+                    f"a {what} of {factor:g} in the text times {requested:g} of the request lies outside "
+                    f"{low:g} to {high:g}; change one of them"
+                )
+
+
+def _primary(language: str) -> str:
+    """Primary language of a code: ``en`` of ``en-gb``."""
+    return language.partition("-")[0]
+
+
+def build_request_timeline(request: Request) -> Timeline:
+    """Timeline of a request's ``timeline`` file, overridden by its ``style``, ``gain`` and ``expression``."""
+    flags = Timeline(
+        style=parse_style(request.style) if request.style is not None else {},
+        expressions=_expressions(request),
+        gains=_gains(request),
+    )
+    return read_timeline(request.timeline).merge(flags) if request.timeline is not None else flags
+
+
+def _expressions(request: Request) -> tuple[ExpressionSpan, ...]:
+    if request.expression is None:
+        return ()
+    if request.expression.strip() != OF_VIDEO:
+        return parse_expressions(request.expression)
+    source = request.source
+    if not isinstance(source, Recorded):
+        raise InputError("--expression video needs a recording with pictures of the person; add --audio clip.mp4")
+    from tts2face.lips.performer import held_smile
+    from tts2face.video.blendshapes import BlendshapeReader
+    from tts2face.video.streaming import StreamingTracker
+    from tts2face.video.take import read_take
+
+    take = read_take(source.audio, StreamingTracker(), BlendshapeReader(), seconds=SMILE_S)
+    smile = held_smile(take.landmarks, take.scores)
+    return (ExpressionSpan("happy", float(np.mean(list(smile.values())))),) if smile else ()
+
+
+def _gains(request: Request) -> Gains:
+    gains = parse_gains(request.gain) if request.gain is not None else Gains()
+    if request.gaze != CAMERA:
+        return gains
+    if "gaze" in gains.factors:
+        raise InputError("--gain of the gaze has no effect with --gaze camera; remove one of them")
+    return Gains({**gains.factors, "gaze": 0.0})
+
+
+def listening_timeline(request: Request) -> Timeline:
+    """Motion of the face while it listens; what is heard of a partner gives the responses."""
+    source = request.source
+    if not isinstance(source, Listening):
+        return Timeline()
+    span = ListeningSpan(0.0, source.seconds, reacts=source.partner is None)
+    cues: list[float] = []
+    if source.partner is not None:
+        from tts2face.video.media import read_sound
+
+        cues = [time for time in cue_times(read_sound(source.partner, CUE_RATE)) if time < source.seconds]
+    return responses(cues, request.seed).merge(Timeline(listens=(span,)))

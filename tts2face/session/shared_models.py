@@ -26,11 +26,10 @@ from tts2face.request import FIELDS, OWN_FACE, Request
 from tts2face.session.animated_face import AnimatedFace, mesh_face, own_appearance_face
 from tts2face.session.gesture_layer import GestureLayer
 from tts2face.session.lip_steps import SynthesisModels
-from tts2face.session.prepared import PreparedRequest
+from tts2face.session.prepared import PreparedRequest, marked_styles
 from tts2face.session.speech import NO_DELIVERIES
 from tts2face.session.speech_stream import Piece, SpeechModels
 from tts2face.session.steps import pieces
-from tts2face.session.text_marks import marked_styles
 from tts2face.sound.voice import Voice
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.storage.memory import NO_MEMORY, ResultMemory

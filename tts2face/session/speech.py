@@ -31,7 +31,7 @@ from tts2face.session.joining import (
     silent_speech,
     trim_end,
 )
-from tts2face.session.text_marks import innermost_styles
+from tts2face.session.prepared import innermost_styles
 from tts2face.sound.level import level_speech
 from tts2face.sound.voice import SpeechInput, SpokenWord, Voice, apply_volume
 from tts2face.sound.voice_pool import has_voice, speaks

@@ -8,7 +8,7 @@ import re
 
 from lexicon.errors import InputError
 from lexicon.ipa import parse_ipa
-from lexicon.ssml import is_ssml
+from lexicon.text_marks import is_ssml
 
 _PAUSE = re.compile(r"\[pause:([^\[\]\n]*+)(\]?)", re.IGNORECASE)
 _SECONDS = re.compile(r"([0-9]{1,4}(?:\.[0-9]{1,9})?) ?s?", re.IGNORECASE)
