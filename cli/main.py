@@ -19,7 +19,8 @@ from cli.photo import (
     check_photo,
     face_of_photo,
     is_missing_model,
-    refuse_others,
+    refuse_beside,
+    refuse_without,
     sets_up_model,
 )
 from cli.process import (
@@ -153,9 +154,11 @@ def speak(  # noqa: PLR0913 - one parameter a flag
         raise InputError("the text is given twice, as an argument and as --text; remove one of them")
     options["gestures"] = _gesture_method(options.get("gestures"), noise=noise, none=no_gestures)
     needs_text = all(options.get(name) is None for name in ("audio", "idle", "listen"))
-    others = {"--face": face, "--identity": identity, "--hair": hair, "--hair-color": hair_color}
     files = {"--fit": fit, "--smile": smile}
-    refuse_others(photo, {"--consent": consent, **files}, others)
+    if photo is None:
+        refuse_without({"--consent": consent, **files})
+    else:
+        refuse_beside({"--face": face, "--identity": identity, "--hair": hair, "--hair-color": hair_color})
     picture = options_from_flags(Picture, options)
     if photo is not None:  # before a text is read: a command that has to set up the landmark model is run again
         check_photo(photo, files, {"--out": out, "--explain": explain, **{path: path for path in export or ()}})

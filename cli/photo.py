@@ -79,15 +79,17 @@ def warner(*, quiet: bool) -> Callable[[str], None]:
     return warn
 
 
-def refuse_others(
-    photo: str | None, belonging: Mapping[str, str | Path | None], others: Mapping[str, str | None]
-) -> None:
-    """Refuse other faces and hair beside a photo, and what belongs to a photo without one, by their flags."""
+def refuse_beside(others: Mapping[str, str | None]) -> None:
+    """Refuse other faces and hair beside a photo, by their flags."""
     for name, given in others.items():
-        if photo is not None and given is not None:
+        if given is not None:
             raise InputError(f"--photo cannot be combined with {name}; remove one of them")
+
+
+def refuse_without(belonging: Mapping[str, str | Path | None]) -> None:
+    """Refuse what belongs to a photo without one, by its flags."""
     for name, value in belonging.items():
-        if photo is None and value is not None:
+        if value is not None:
             raise InputError(f"{name} belongs to --photo; add the photo, or remove it")
 
 

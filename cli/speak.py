@@ -230,7 +230,7 @@ def _warn_mismatches(mismatches: "Sequence[TextMismatch]") -> None:
 
 
 def _open_session(options: SpeakOptions, voices: "VoicePool") -> "Session":
-    from tts2face.picture.outputs import check_output
+    from tts2face.picture.film import check_output
     from tts2face.session.warm_up import compile_kernels, kernels_are_compiled
 
     if options.out is not None:

@@ -12,7 +12,7 @@ from cli.flags import check_options
 from cli.main import app, run
 from lexicon.errors import InputError
 from tests.world import World
-from tts2face.picture.outputs import check_output
+from tts2face.picture.film import check_output
 from tts2face.storage.output_paths import check_name
 
 

@@ -14,9 +14,8 @@ from lexicon.errors import BackendError, InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.picture.tiny_face import tiny_face
 from tts2face.picture import film
-from tts2face.picture.film import ClipWriter, write_clips
+from tts2face.picture.film import ClipWriter, check_output, write_clips
 from tts2face.picture.options import Picture
-from tts2face.picture.outputs import check_output
 from tts2face.picture.renderer import mesh_renderer
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, exact_rate, frame_count
 

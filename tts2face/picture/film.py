@@ -1,6 +1,7 @@
 """Files of clips, written while they are drawn: .mp4, .webm, .mov, .gif, or a folder of .png pictures."""
 
 import contextlib
+import os
 from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
@@ -14,22 +15,14 @@ from tts2face.picture.encoder_thread import EncoderThread, Sink
 from tts2face.picture.frame_renderer import FrameRenderer
 from tts2face.picture.gif import GifWriter
 from tts2face.picture.movie import MKV_MOVIE, MOV_MOVIE, MP4_MOVIE, WEBM_MOVIE, MovieWriter
-from tts2face.picture.outputs import (
-    FOLDER,
-    GIF,
-    MOV,
-    MP4,
-    WEBM,
-    check_output,
-    make_temporary,
-    move_into_place,
-    output_kind,
-)
-from tts2face.picture.png_folder import PngFolderWriter
+from tts2face.picture.png_folder import PngFolderWriter, is_png_folder
 from tts2face.storage.files import translate_disk_errors
+from tts2face.storage.output_paths import MOVIE_SUFFIXES, check_name
 from tts2face.storage.temporary import Temporary
 from tts2face.types import Clip, Progress, exact_rate
 
+FILE_SUFFIXES = MP4, WEBM, MOV, GIF = MOVIE_SUFFIXES
+FOLDER = ""
 OPAQUE = frozenset({MP4, MOV})  # H.264 as players know it has no coverage
 MKV = ".mkv"  # parts of a .webm file
 _MOVIES = {MP4: MP4_MOVIE, WEBM: WEBM_MOVIE, MOV: MOV_MOVIE, MKV: MKV_MOVIE}
@@ -174,3 +167,61 @@ def write_clips(
     with ClipWriter(path, renderer, on_progress=on_progress) as writer:
         for clip in clips:
             writer.add(clip)
+
+
+def output_kind(path: Path | str) -> str:
+    """Kind of an output path: one of `FILE_SUFFIXES`, or `FOLDER`."""
+    suffix = Path(path).suffix.lower()
+    if str(path).endswith(("/", os.sep)) or suffix == "" or (suffix not in FILE_SUFFIXES and Path(path).is_dir()):
+        return FOLDER
+    if suffix not in FILE_SUFFIXES:
+        raise InputError(
+            f"{path} has the unknown suffix {suffix}; give one of {', '.join(FILE_SUFFIXES)}, "
+            "a folder without a suffix for .png pictures, or a suffix that `tts2face formats` lists"
+        )
+    return suffix
+
+
+def check_output(path: Path | str) -> Path:
+    """Checked path of an output.
+
+    Raises
+    ------
+    InputError
+        The suffix is unknown, the parent folder does not exist, the name is only a suffix or too long, or the path is
+        a folder of other files.
+    BackendError
+        The parent folder cannot be written.
+    """
+    output = Path(path)
+    check_name(output)
+    kind = output_kind(path)
+    if kind == FOLDER and output.exists() and not (output.is_dir() and is_png_folder(output)):
+        raise InputError(f"{output} contains files other than the pictures of a clip; choose another folder")
+    if kind != FOLDER and output.is_dir():
+        raise InputError(f"{output} is a folder; choose another name")
+    return output
+
+
+def make_temporary(path: Path, kind: str) -> Temporary:
+    """New, empty, hidden file or folder in the same folder as a path.
+
+    Raises
+    ------
+    BackendError
+        The folder cannot be written.
+    """
+    with translate_disk_errors(path):
+        return Temporary(path, is_folder=kind == FOLDER)
+
+
+def move_into_place(temporary: Temporary, path: Path) -> None:
+    """Rename a temporary file or folder to `path`, replacing what exists there.
+
+    Raises
+    ------
+    BackendError
+        The folder cannot be written.
+    """
+    with translate_disk_errors(path):
+        temporary.replace(path)

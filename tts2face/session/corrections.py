@@ -1,6 +1,5 @@
 """Phone edges of sentences that were corrected by hand."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,16 +74,3 @@ class SentenceEdges:
             return None
         own[-1] = phones.end
         return PhoneSequence(phones.phones, own)
-
-
-def correct_phones(
-    phones: PhoneSequence, text: str, occurrence: int, corrections: Sequence[SentenceEdges]
-) -> PhoneSequence:
-    """Phones of a sentence at their corrected edges, or as they are without a correction."""
-    for correction in corrections:
-        if (correction.text, correction.occurrence) == (text, occurrence):
-            corrected = correction.applied(phones)
-            if corrected is None:
-                raise StaleEdgesError(text, occurrence)
-            return corrected
-    return phones

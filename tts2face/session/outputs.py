@@ -122,7 +122,7 @@ def plan_outputs(out: str | Path | None, exports: Sequence[str | Path], inputs: 
         A folder cannot be written.
     """
     if out is not None:
-        from tts2face.picture.outputs import check_output
+        from tts2face.picture.film import check_output
 
         check_output(out)
     files = plan_exports(exports)

@@ -18,6 +18,7 @@ from lexicon.marked_text import RATE_LIMITS, VOLUME_LIMITS, MarkedText
 from lexicon.scripts import check_readable
 from lexicon.sentence_length import check_silence
 from lexicon.sentences import Sentence, split_sentences
+from lexicon.sequence import PhoneSequence
 from lexicon.text_marks import parse_marks
 from lexicon.values.files import is_file
 from tts2face.gestures.elements import ExpressionSpan, Gains, ListeningSpan
@@ -27,7 +28,7 @@ from tts2face.gestures.timeline_file import read_timeline
 from tts2face.lips.options import METHOD_OPTIONS, ExcludedToken, SynthesisOptions
 from tts2face.picture.options import Picture
 from tts2face.request import CAMERA, Request, option_fields
-from tts2face.session.corrections import SentenceEdges
+from tts2face.session.corrections import SentenceEdges, StaleEdgesError
 from tts2face.session.joining import Excerpt
 from tts2face.source import Listening, Recorded, Source, Spoken
 from tts2face.storage.output_paths import AnyPath
@@ -98,6 +99,16 @@ class PreparedRequest:
     def sentences(self) -> Iterator[Sentence]:
         """Sentences of the text in order."""
         return split_sentences(self.text, self.request.language, self.dictionary)
+
+    def corrected(self, phones: PhoneSequence, text: str, occurrence: int) -> PhoneSequence:
+        """Phones of a sentence at their corrected edges, or as they are without a correction."""
+        for correction in self.edges:
+            if (correction.text, correction.occurrence) == (text, occurrence):
+                corrected = correction.applied(phones)
+                if corrected is None:
+                    raise StaleEdgesError(text, occurrence)
+                return corrected
+        return phones
 
     def preload_voice(self, voices: "VoicePool") -> None:
         """Load the voice of the text in a thread; none for a recording or a request without text."""

@@ -4,7 +4,7 @@ from collections.abc import Hashable, Iterator
 from dataclasses import replace
 
 from tts2face.models.talker import Talker
-from tts2face.session.corrections import RECORDING, correct_phones
+from tts2face.session.corrections import RECORDING
 from tts2face.session.prepared import HEARING_STEPS, RECORDING_STEPS, PreparedRequest
 from tts2face.session.recording import (
     TimedTranscript,
@@ -48,7 +48,7 @@ def hear(
         return align_transcript(prepared.text.text, language, source.audio, prepared.dictionary, on_heard)
 
     found = memory.recall(key, find, lambda made: TRANSCRIPT_BYTES + made.phones.edges.nbytes * 8)
-    return replace(found, phones=correct_phones(found.phones, RECORDING, 0, prepared.edges))
+    return replace(found, phones=prepared.corrected(found.phones, RECORDING, 0))
 
 
 def recorded_pieces(prepared: PreparedRequest, source: Recorded, heard: TimedTranscript) -> Iterator[Piece]:

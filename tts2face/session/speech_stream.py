@@ -16,7 +16,6 @@ from lexicon.sentences import Sentence, text_prefix
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.gestures.timeline import Timeline
 from tts2face.request import CONVERSATION
-from tts2face.session.corrections import correct_phones
 from tts2face.session.joining import Excerpt, excerpt_of_speech, shift_start, silent_speech, word_bounds
 from tts2face.session.prepared import IDLE_STEPS, PreparedRequest
 from tts2face.session.speech import (
@@ -274,7 +273,7 @@ def speak_sentences(
         yield from long_silence(before_s, fps, Timeline(), voice.sample_rate)
         spoken = found
         if has_phones:
-            phones = correct_phones(spoken.speech.phones, text, said[text], prepared.edges)
+            phones = prepared.corrected(spoken.speech.phones, text, said[text])
             spoken = replace(spoken, speech=replace(spoken.speech, phones=phones))
         said[text] += 1
         yield spoken, sentence.n_characters, text

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
+from tts2face.picture.film import MOV, MP4, WEBM, make_temporary, move_into_place
 from tts2face.picture.movie import MOV_MOVIE, MP4_MOVIE, WEBM_MOVIE, MovieKind, mux_pictures
-from tts2face.picture.outputs import MOV, MP4, WEBM, make_temporary, move_into_place
 from tts2face.picture.provenance import append_to_mp4
 from tts2face.serving.batch.audio_track import open_track
 from tts2face.serving.batch.output import Sound
