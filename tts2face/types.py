@@ -309,23 +309,3 @@ def exact_rate(fps: float) -> Fraction:
 def first_sample(frame: int, rate: int, fps: Fraction) -> int:
     """Index of the audio sample, at `rate` Hz, that coincides with the start of a frame."""
     return round(Fraction(frame) * rate / fps)
-
-
-def pad_to_frame(speech: Speech, first_frame: int, fps: Fraction) -> Speech:
-    """Speech padded with silence up to the end of its last frame.
-
-    Parameters
-    ----------
-    first_frame
-        Index of the speech's first frame within the whole clip, from which sample positions are rounded.
-    """
-    rate = speech.waveform.rate
-    n_frames = frame_count(speech.waveform.duration, float(fps))
-    n_samples = first_sample(first_frame + n_frames, rate, fps) - first_sample(first_frame, rate, fps)
-    sound = speech.waveform.padded(n_samples)
-    phones, edges = list(speech.phones.phones), list(speech.phones.edges)
-    if phones[-1] != SILENCE and len(sound.samples) > len(speech.waveform.samples):
-        phones.append(SILENCE)
-        edges.append(edges[-1])
-    edges[-1] = sound.duration
-    return Speech(sound, PhoneSequence(phones, edges), speech.words)

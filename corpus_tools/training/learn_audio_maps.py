@@ -15,7 +15,8 @@ from corpus_tools.training.linear_audio_map import (
 from corpus_tools.training.network_audio_map import NetworkMapOptions, learn_network_map
 from tts2face.models.audio_map import AudioMap
 from tts2face.models.talker import ShapeModel, Talker
-from tts2face.sound.features import FEATURE_RATE, speech_features, speech_level
+from tts2face.sound.features import FEATURE_RATE, speech_features
+from tts2face.sound.pauses import speech_level
 from tts2face.types import Progress, Waveform
 from tts2face.video.media import read_sound
 

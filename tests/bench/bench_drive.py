@@ -33,7 +33,8 @@ from corpus_tools.training.pose_correction import fit_pose_correction
 from corpus_tools.training.train_talker import learn_talker
 from tts2face.lips import explanation
 from tts2face.models.audio_map import AudioMap
-from tts2face.sound.features import FEATURE_RATE, speech_level
+from tts2face.sound.features import FEATURE_RATE
+from tts2face.sound.pauses import speech_level
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 

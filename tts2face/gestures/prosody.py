@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.numeric.arrays import Float32Array
-from tts2face.sound.features import speech_level
+from tts2face.sound.pauses import speech_level
 from tts2face.sound.praat import IntensityTrack, intensity_track, pitch
 from tts2face.types import Waveform
 

@@ -15,7 +15,7 @@ from lexicon.sentence_length import n_letters
 from lexicon.sentences import text_prefix
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan, enforce_increasing
 from tts2face.sound.pauses import speech_onset
-from tts2face.types import Speech, Waveform, concatenate_speech, first_sample
+from tts2face.types import Speech, Waveform, concatenate_speech, first_sample, frame_count
 
 CUT_SILENCE_S = 0.05  # after a phrase within a sentence; with the silence before the next one a pause as at a comma
 AUDIBLE_SHARE = 0.01  # of the largest amplitude
@@ -154,6 +154,26 @@ def silent_speech(seconds: float, rate: int) -> Speech:
 def silent_frames(first: int, last: int, rate: int, fps: Fraction) -> Speech:
     """Silence of the frames of a clip from `first` to before `last`."""
     return silent_speech((first_sample(last, rate, fps) - first_sample(first, rate, fps)) / rate, rate)
+
+
+def pad_to_frame(speech: Speech, first_frame: int, fps: Fraction) -> Speech:
+    """Speech padded with silence up to the end of its last frame.
+
+    Parameters
+    ----------
+    first_frame
+        Index of the speech's first frame within the whole clip, from which sample positions are rounded.
+    """
+    rate = speech.waveform.rate
+    n_frames = frame_count(speech.waveform.duration, float(fps))
+    n_samples = first_sample(first_frame + n_frames, rate, fps) - first_sample(first_frame, rate, fps)
+    sound = speech.waveform.padded(n_samples)
+    phones, edges = list(speech.phones.phones), list(speech.phones.edges)
+    if phones[-1] != SILENCE and len(sound.samples) > len(speech.waveform.samples):
+        phones.append(SILENCE)
+        edges.append(edges[-1])
+    edges[-1] = sound.duration
+    return Speech(sound, PhoneSequence(phones, edges), speech.words)
 
 
 def resampled_speech(speech: Speech, rate: int) -> Speech:

@@ -16,7 +16,7 @@ from lexicon.sentences import Sentence, text_prefix
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.gestures.timeline import Timeline
 from tts2face.request import CONVERSATION
-from tts2face.session.joining import Excerpt, excerpt_of_speech, shift_start, silent_speech, word_bounds
+from tts2face.session.joining import Excerpt, excerpt_of_speech, pad_to_frame, shift_start, silent_speech, word_bounds
 from tts2face.session.prepared import IDLE_STEPS, PreparedRequest
 from tts2face.session.speech import (
     NO_DELIVERIES,
@@ -43,7 +43,6 @@ from tts2face.types import (
     concatenate_speech,
     frame_count,
     keep_on,
-    pad_to_frame,
 )
 
 if TYPE_CHECKING:

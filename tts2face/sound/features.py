@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from tts2face.numeric.arrays import ordered_product
-from tts2face.sound.pauses import NOISE_QUANTILE, SPEECH_QUANTILE
 from tts2face.types import Trajectory, Waveform
 
 FEATURE_RATE = 16_000  # Hz, sample rate of the analysed sound
@@ -245,12 +244,6 @@ class ChannelMean:
 def channel_adaptation(kind: str) -> Callable[[NDArray[np.float32]], NDArray[np.float32]]:
     """Normalisation that makes features of a kind independent of voice and microphone, for one sound."""
     return ChannelMean() if kind == "mel" else np.asarray
-
-
-def speech_level(levels: NDArray[np.floating]) -> float:
-    """Mean in dB of those (T, 1) levels that exceed the midpoint of the noise and speech levels."""
-    noise, speech = np.quantile(levels, NOISE_QUANTILE), np.quantile(levels, SPEECH_QUANTILE)
-    return float(levels[levels >= (noise + speech) / 2].mean())
 
 
 MEASURES: Mapping[str, Measure] = MappingProxyType(

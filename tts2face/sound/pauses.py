@@ -1,4 +1,4 @@
-"""Detection of the first sound of speech and of its pauses, and division of long recordings at pauses."""
+"""Speech and its pauses in a sound: level, onset and pauses, and division of long recordings at these."""
 
 from itertools import pairwise
 
@@ -25,6 +25,12 @@ MIN_SOUND_S, BREATH_DB = 0.02, -25.0  # what is shorter is a click; a weak sound
 MIN_STRETCH_SHARE = 0.5  # least length of a part, relative to the largest one; the last part may be shorter
 
 Span = tuple[float, float]
+
+
+def speech_level(levels: NDArray[np.floating]) -> float:
+    """Mean in dB of those (T, 1) levels that exceed the midpoint of the noise and speech levels."""
+    noise, speech = np.quantile(levels, NOISE_QUANTILE), np.quantile(levels, SPEECH_QUANTILE)
+    return float(levels[levels >= (noise + speech) / 2].mean())
 
 
 def find_pauses(sound: Waveform) -> tuple[Span, ...]:
