@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,8 @@ class BuildOrder:
     Parameters
     ----------
     folder
-        Folder with the folder ``recordings``; gets ``made.talker``, the folder ``checked`` and perhaps ``report.html``.
+        Folder with the folder ``recordings``; gets ``made.talker``, the folder ``checked`` and, where matplotlib
+        is, ``report.html``.
     name, provenance
         Name of the talker, and fields of `corpus_tools.recordings.provenance.read_provenance`.
     consent
@@ -36,7 +38,6 @@ class BuildOrder:
     provenance: Mapping[str, str]
     consent: str | None
     with_appearance: bool
-    with_report: bool
     max_bytes: float
 
 
@@ -63,7 +64,7 @@ def build(call: Call) -> dict[str, Any]:
         folder / "made.talker",
         name=order.name,
         consent=consent_record(order.name, order.consent) if order.with_appearance else None,
-        report=folder / "report.html" if order.with_report else None,
+        report=folder / "report.html" if find_spec("matplotlib") is not None else None,
         run_options=RunOptions(folder / "cache", 1),
         stages=call.stage,
     )

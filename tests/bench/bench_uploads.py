@@ -16,7 +16,7 @@ from tests.interchange.characters.made import write_character_file
 from tts2face import Session
 from tts2face.processes.async_parent import call_once
 from tts2face.processes.program import Program
-from tts2face.serving.work.talker_build import BUILDER, LIMITS, TOOL
+from tts2face.serving.work.tools import TALKER_BUILDER, TALKER_LIMITS, TALKER_TOOL
 from tts2face.serving.work.uploaded_file import DECODE, program
 from tts2face.storage.shipped import find_file
 from tts2face.video.networks import find_bundle
@@ -58,9 +58,9 @@ def build(folder: Path, appearance: bool) -> tuple[tuple[float, float], Path]:
     take.with_suffix(".txt").write_text(TEXT)
     order = {
         "folder": str(folder), "name": "anna", "provenance": {}, "consent": "I agree to this." if appearance else None,
-        "with_appearance": appearance, "with_report": False, "max_bytes": 1e9,
+        "with_appearance": appearance, "max_bytes": 1e9,
     }  # fmt: skip
-    return cost(Program(BUILDER, replace(LIMITS, cpu_s=1200)), TOOL, order), take
+    return cost(Program(TALKER_BUILDER, replace(TALKER_LIMITS, cpu_s=1200)), TALKER_TOOL, order), take
 
 
 def cost(program: Program, kind: str, order: Mapping[str, Any]) -> tuple[float, float]:

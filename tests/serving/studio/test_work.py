@@ -15,7 +15,7 @@ from lexicon.errors import DataError, InputError
 from tts2face.serving.service import decoders
 from tts2face.serving.service.access import KeyRing
 from tts2face.serving.service.keys import LOCAL_KEY
-from tts2face.serving.studio import recorded_talker, reports, styles
+from tts2face.serving.studio import recorded_talker, recording_work, reports, styles
 from tts2face.serving.studio.palette_store import PaletteStore
 from tts2face.serving.studio.recording_work import Recordings
 from tts2face.serving.studio.recordings import GOOD, REFUSED, WEAK, RecordingStore
@@ -433,7 +433,8 @@ def test_a_talker_and_its_first_sentence_go_on(tmp_path, monkeypatch, task):
     store, number = make_recording(tmp_path)
     folder = store.at(number)
     tool = Tool({"n_kept": 1, "minutes": 0.1, "refused": []}, folder / "made.talker")
-    monkeypatch.setattr(recorded_talker, "run_tool" if task == "build" else "call_once", tool)
+    child = (recording_work, "run_tool") if task == "build" else (recorded_talker, "call_once")
+    monkeypatch.setattr(*child, tool)
 
     async def begin(host: Host) -> None:
         recordings = Recordings(tmp_path, host.work)
@@ -454,7 +455,7 @@ def test_a_talker_and_its_first_sentence_go_on(tmp_path, monkeypatch, task):
 
 
 def test_cancelled_work_on_a_recording_says_so(tmp_path, monkeypatch):
-    monkeypatch.setattr(recorded_talker, "run_tool", Tool({}))
+    monkeypatch.setattr(recording_work, "run_tool", Tool({}))
     store, number = make_recording(tmp_path)
 
     async def check() -> None:

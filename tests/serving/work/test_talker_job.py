@@ -11,7 +11,7 @@ from corpus_tools.tools.talker import BuildOrder
 from lexicon.errors import DataError
 from tests.models.made import write_made_talker
 from tests.serving.work.stub_builder import MADE, ORDER
-from tts2face.serving.work import talker_build
+from tts2face.serving.work import tools
 from tts2face.serving.work.blobs import open_blobs
 from tts2face.serving.work.connection import DatabaseAwayError
 from tts2face.serving.work.database import database_url
@@ -30,7 +30,7 @@ def events() -> list[dict[str, Any]]:
 @pytest.fixture
 def run(tmp_path: Path, events: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch) -> Run:
     """Function that executes a job."""
-    monkeypatch.setattr(talker_build, "BUILDER", "tests.serving.work.stub_builder:HANDLERS")
+    monkeypatch.setattr(tools, "TALKER_BUILDER", "tests.serving.work.stub_builder:HANDLERS")
     (tmp_path / "a.mp4").write_bytes(b"video")
     write_made_talker(tmp_path / MADE, has_face=False)
     blobs = open_blobs(tmp_path / "store", "resources")

@@ -6,11 +6,9 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 from fastapi import FastAPI
-from fastapi import Request as HttpRequest
 from nicegui import app as pages_app
 from nicegui import ui
 
-from lexicon.errors import InputError
 from tts2face.serving.service.application import NO_TELEMETRY, Mount
 from tts2face.serving.service.page_addresses import PAGES
 from tts2face.serving.service.state import ServiceState
@@ -37,7 +35,7 @@ def mount_studio(app: FastAPI, state: ServiceState) -> None:
         app.include_router(room.router)
     for page in (projects, animate, styles, puppet, reports):
         page.register(studio)
-    add_record_page(app, studio.recordings, _recording_owner)
+    add_record_page(app, studio.recordings)
     _disable_telemetry()
     pages_app.config.socket_io_js_transports = ["websocket"]
     ui.run_with(
@@ -48,17 +46,6 @@ def mount_studio(app: FastAPI, state: ServiceState) -> None:
 
 
 STUDIO = Mount(mount_studio, TASKS)
-
-
-def _recording_owner(request: HttpRequest) -> str:
-    """Name of the key of a request that may build talkers."""
-    key = request.state.key
-    if "build" not in key.scopes:
-        raise InputError(
-            f"the key {key.name} lacks the scope build, which recordings need; ask the operator for a key with it "
-            "(`tts2face keys add NAME --scope speak --scope build`)"
-        )
-    return str(key.name)
 
 
 def _run_with(app: FastAPI, studio: Studio) -> None:

@@ -5,7 +5,9 @@ networks once, and ends when there was nothing to do for `IDLE_S`.
 """
 
 import asyncio
-from collections.abc import Mapping
+import os
+import shutil
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +18,8 @@ from tts2face.processes.async_parent import AsyncChild
 from tts2face.processes.parent import ChildEndedError
 from tts2face.processes.program import ProcessLimits, Program
 from tts2face.serving.service.decoders import KeyTurns, Shares
-from tts2face.serving.studio.recorded_talker import TALKER, build_talker, speak
+from tts2face.serving.service.keys import ApiKey
+from tts2face.serving.studio.recorded_talker import CLIP, REPORT, TALKER, speak
 from tts2face.serving.studio.recordings import (
     ACCEPTED_FOLDER,
     CACHE,
@@ -29,6 +32,7 @@ from tts2face.serving.studio.recordings import (
 )
 from tts2face.serving.studio.work import BackgroundWork, WorkKind, WorkList
 from tts2face.serving.work.jobs import FAILED
+from tts2face.serving.work.tools import TALKER_TOOL, run_tool, talker_build
 
 TOOL = "recordings"
 TOOL_LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=100_000, file_bytes=1 << 30, n_files=256)
@@ -41,6 +45,10 @@ SAY = "say"
 CHECK = "check"
 WORK, ORDER = "recording", "work.json"  # kind of work, and its order in the folder of a recording
 PLACES = 5  # recordings of an owner
+MADE, CHECKED = "made.talker", "checked"  # as the builder names them
+MAX_TALKER_BYTES = 500e6
+SECONDS_A_TAKE = 10.0  # at most, for the limit of time
+N_SHOWN = 5  # refused takes
 BUILDS = Shares(1, 1, 1000)  # talkers that are built: each takes a core and 1 GB for up to an hour
 
 
@@ -182,3 +190,44 @@ class Recordings:
         while (left_s := self._used_at + IDLE_S - asyncio.get_running_loop().time()) > 0:
             await asyncio.sleep(left_s)
         await self._tool.close_when_idle()
+
+
+async def build_talker(folder: Path, *, name: str, consent: str, n_takes: int, on_message: Callable[..., None]) -> str:
+    """Build the talker of a recording with its own face; one sentence about it.
+
+    Parameters
+    ----------
+    on_message
+        Called with the stage, and the steps done and of all.
+
+    Raises
+    ------
+    InputError, DataError, BackendError
+        As `tts2face corpus build` says.
+    """
+    for old in (TALKER, REPORT, CLIP, MADE):
+        (folder / old).unlink(missing_ok=True)
+    shutil.rmtree(folder / CHECKED, ignore_errors=True)
+    order = {
+        "folder": str(folder), "name": name, "consent": consent, "provenance": {"name": name},
+        "with_appearance": True, "max_bytes": MAX_TALKER_BYTES,
+    }  # fmt: skip
+    build = talker_build(SECONDS_A_TAKE * n_takes)
+    result = await run_tool(
+        build.program, TALKER_TOOL, order, on_message, what="the recording", timeout_s=build.timeout_s
+    )
+    os.replace(folder / MADE, folder / TALKER)
+    shutil.rmtree(folder / CHECKED, ignore_errors=True)
+    refused = "; ".join(f"{take}: {reason}" for take, reason in result["refused"][:N_SHOWN])
+    minutes = f"{result['n_kept']} takes, {result['minutes']:.1f} minutes"
+    return f"The talker {name} is made of {minutes}." + (f" Refused: {refused}." if refused else "")
+
+
+def recording_owner(key: ApiKey) -> str:
+    """Name of a key that may build talkers."""
+    if "build" not in key.scopes:
+        raise InputError(
+            f"the key {key.name} lacks the scope build, which recordings need; ask the operator for a key with it "
+            "(`tts2face keys add NAME --scope speak --scope build`)"
+        )
+    return key.name

@@ -2,14 +2,14 @@
 
 ``recordings/ID/recordings`` holds the accepted takes with their transcripts, as `tts2face corpus build` reads them;
 ``unchecked`` and ``refused`` the others; ``prompts.json`` what is to be read, ``manifest.json`` the state of each take;
-`owned_folders` says whose it is. A crash leaves whole files only. All methods block.
+`owned_folders` says whose it is. A crash leaves whole files only. All methods of the store block.
 """
 
 import json
 import os
 import secrets
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import AsyncIterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,7 @@ REFUSED = "refused"
 FOLDERS = {
     CHECKING: UNCHECKED_FOLDER, GOOD: ACCEPTED_FOLDER, WEAK: ACCEPTED_FOLDER, REFUSED: REFUSED_FOLDER,
 }  # fmt: skip
+MAX_TAKE_BYTES = 64 << 20
 MAX_NAME_CHARACTERS = 60
 ENGLISH = "en"  # language of the transcripts that `tts2face corpus build` pronounces
 
@@ -43,6 +44,20 @@ def judge(findings: Sequence[Mapping[str, Any]]) -> tuple[str, str]:
     if not findings:
         return GOOD, ""
     return REFUSED if findings[0]["severity"] == "refusal" else WEAK, str(findings[0]["message"])
+
+
+async def receive_take(parts: AsyncIterator[bytes], target: Path) -> None:
+    """Write an uploaded take to a file."""
+    n_bytes = 0
+    with target.open("xb") as file:
+        async for part in parts:
+            n_bytes += file.write(part)
+            if n_bytes > MAX_TAKE_BYTES:
+                raise InputError(f"a take may have {MAX_TAKE_BYTES >> 20} MB; record it shorter")
+        file.flush()
+        os.fsync(file.fileno())
+    if not n_bytes:
+        raise InputError("the take is empty; record it again")
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,8 +16,7 @@ from tts2face.serving.work.connection import DatabaseAwayError
 from tts2face.serving.work.kinds import JobTask, Product, Products
 from tts2face.serving.work.resource_check import TALKER
 from tts2face.serving.work.resources import ResourceTable, Usage, keep_files, over_quota, resource_from_folder
-from tts2face.serving.work.talker_build import TOOL, talker_build
-from tts2face.serving.work.tools import limits_of
+from tts2face.serving.work.tools import TALKER_TOOL, limits_of, talker_build
 
 AWAY_S = 2.0  # between tries to reach the database
 N_SHOWN_NOTES = 20  # refused parts, and warnings, that are reported
@@ -63,7 +62,7 @@ def _build(task: JobTask) -> Mapping[str, Any]:
         "provenance": asked["provenance"], "with_appearance": asked["appearance"],
         "max_bytes": asked["limits"]["n_bytes"],
     }  # fmt: skip
-    build = talker_build(float(asked["seconds"]), order)
+    build = talker_build(float(asked["seconds"]))
 
     def report(event: Message) -> None:
         with suppress(DatabaseAwayError):
@@ -76,7 +75,7 @@ def _build(task: JobTask) -> Mapping[str, Any]:
     child = Child(build.program)
     try:
         with limits_of("the recording"):
-            return child.call(TOOL, build.order, on_event=report, check=check, timeout_s=build.timeout_s).content
+            return child.call(TALKER_TOOL, order, on_event=report, check=check, timeout_s=build.timeout_s).content
     finally:
         child.close()
 

@@ -6,7 +6,7 @@ They read files of strangers: each has limits of memory, time and files, and no 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from lexicon.errors import DataError
 from tts2face.processes.async_parent import call_once
@@ -16,6 +16,11 @@ from tts2face.processes.program import ProcessLimits, Program
 TAKES, TAKE_S = "takes", 1800.0  # the tool, and the time of one order
 TAKE_LIMITS = ProcessLimits(memory_bytes=6 << 30, cpu_s=1800, file_bytes=1 << 30, n_files=256)
 LOW_PRIORITY = 10  # streams go first
+TALKER_BUILDER = TALKER_TOOL = "talker"  # the program, and its handler
+TALKER_LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=0, file_bytes=2 << 30, n_files=256)
+CPU_S = 1200  # of any recording
+CPU_S_PER_S = 40  # for each second of a recording; 256 x 256 pixels take 1 s a second
+SLOWNESS = 5.0  # elapsed time in units of the processor time, on a machine that has other work
 
 
 async def run_take_tool(
@@ -52,3 +57,16 @@ def limits_of(what: str) -> Iterator[None]:
         yield
     except ChildEndedError as ended:
         raise DataError(f"{what} needs too much memory or time; record it shorter, or with smaller pictures") from ended
+
+
+class TalkerBuild(NamedTuple):
+    """The builder of talkers within its limits, called as `TALKER_TOOL` with a `BuildOrder` of the tool, and the seconds for it."""
+
+    program: Program
+    timeout_s: float
+
+
+def talker_build(seconds: float) -> TalkerBuild:
+    """The build of a talker from so many seconds of recordings."""
+    cpu_s = int(CPU_S + CPU_S_PER_S * seconds)
+    return TalkerBuild(Program(TALKER_BUILDER, replace(TALKER_LIMITS, cpu_s=cpu_s)), SLOWNESS * cpu_s)

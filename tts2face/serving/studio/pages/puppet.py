@@ -15,7 +15,7 @@ from tts2face.serving.studio.components.stage import StageElement
 from tts2face.serving.studio.importing import SOUND_SUFFIXES
 from tts2face.serving.studio.pages.frame import begin_page, confirm, heading, icon_button, page_bar, shown_errors
 from tts2face.serving.studio.pages.styles import ANY_TAKE
-from tts2face.serving.studio.routes.recordings import MAX_TAKE_BYTES
+from tts2face.serving.studio.recordings import MAX_TAKE_BYTES
 from tts2face.serving.studio.studio import Studio
 from tts2face.serving.studio.take_store import FILM, READING, SOUND, TABLE, TakeEntry
 from tts2face.serving.work.jobs import FAILED

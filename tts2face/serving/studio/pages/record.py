@@ -15,9 +15,9 @@ from tts2face.serving.studio.components.recorder import STYLE, Recorder, VisemeM
 from tts2face.serving.studio.pages.choices import languages
 from tts2face.serving.studio.pages.frame import RECORD_PAGE, begin_page, confirm, heading, page_bar, sentence
 from tts2face.serving.studio.recorded_talker import CLIP, REPORT, TALKER
-from tts2face.serving.studio.recording_work import Recordings
+from tts2face.serving.studio.recording_work import Recordings, recording_owner
 from tts2face.serving.studio.recordings import RecordingEntry
-from tts2face.serving.studio.routes.recordings import Owner, recording_router
+from tts2face.serving.studio.routes.recordings import recording_router
 
 FILES = RECORDINGS.removeprefix(PAGES)  # links are relative to the mounted pages
 TITLE = "Record your own talker"
@@ -29,15 +29,15 @@ REFRESH_S = 0.4
 FIRST_SENTENCE = "Hello, this is my own face."
 
 
-def add_record_page(app: FastAPI, recordings: Recordings, owner: Owner) -> None:
+def add_record_page(app: FastAPI, recordings: Recordings) -> None:
     """Add the pages to NiceGUI, which is to be mounted at `PAGES`, and their routes to the application around it."""
-    app.include_router(recording_router(recordings, owner))
+    app.include_router(recording_router(recordings))
 
     @ui.page(RECORD_PAGE, title="Record - tts2face studio", language="en-US")
     def show_list(request: Request) -> None:
         with _page(request, TITLE):
             try:
-                name = owner(request)
+                name = recording_owner(request.state.key)
             except InputError as refused:
                 _show_refusal(refused)
                 return
@@ -46,7 +46,7 @@ def add_record_page(app: FastAPI, recordings: Recordings, owner: Owner) -> None:
     @ui.page(RECORD_PAGE + "/{number}", title="Record - tts2face studio", language="en-US")
     def show_recording(request: Request, number: str) -> None:
         try:
-            here = recordings.store.folder(number, owner(request))
+            here = recordings.store.folder(number, recording_owner(request.state.key))
         except InputError as unknown:
             with _page(request, TITLE, RECORDINGS_LIST):
                 _show_refusal(unknown)

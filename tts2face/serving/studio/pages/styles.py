@@ -23,8 +23,7 @@ from tts2face.serving.studio.importing import SAMPLE_TEXT
 from tts2face.serving.studio.pages.frame import begin_page, confirm, heading, icon_button, page_bar, shown_errors
 from tts2face.serving.studio.pages.mix_panel import MixPanel
 from tts2face.serving.studio.palette_store import FILE, SUFFIXES, shipped
-from tts2face.serving.studio.recordings import REFUSED
-from tts2face.serving.studio.routes.recordings import MAX_TAKE_BYTES
+from tts2face.serving.studio.recordings import MAX_TAKE_BYTES, REFUSED
 from tts2face.serving.studio.studio import Studio
 from tts2face.serving.studio.styles import CHECKING, MAKING, named
 from tts2face.session import catalogue

@@ -1,9 +1,8 @@
 """Addresses of takes and of the files that are made of them."""
 
-import os
 import secrets
 import tempfile
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -13,11 +12,10 @@ from fastapi.responses import FileResponse, JSONResponse, Response
 from lexicon.errors import InputError, Tts2faceError
 from tts2face.serving.service.page_addresses import RECORDINGS
 from tts2face.serving.studio.recorded_talker import CLIP, REPORT, TALKER
-from tts2face.serving.studio.recording_work import Recordings
-from tts2face.serving.studio.recordings import SUFFIXES, RecordingStore
+from tts2face.serving.studio.recording_work import Recordings, recording_owner
+from tts2face.serving.studio.recordings import SUFFIXES, RecordingStore, receive_take
 
 TAKE = "/{number}/takes/{at}"
-MAX_TAKE_BYTES = 64 << 20
 NO_STORE = {"Cache-Control": "no-store"}
 # The report holds a user's names and must not act as a page of this origin.
 DOWNLOADS: Mapping[str, tuple[str, Mapping[str, str]]] = {
@@ -27,17 +25,14 @@ DOWNLOADS: Mapping[str, tuple[str, Mapping[str, str]]] = {
 }
 
 
-Owner = Callable[[Request], str]  # name of the key of a request
-
-
-def recording_router(recordings: Recordings, owner: Owner) -> APIRouter:
+def recording_router(recordings: Recordings) -> APIRouter:
     """Routes of the takes and files of recordings."""
     store, router = recordings.store, APIRouter(prefix=RECORDINGS, include_in_schema=False)
 
     @router.put(TAKE)
     async def put_take(request: Request, number: str, at: int) -> Response:
         try:
-            folder = store.folder(number, owner(request))
+            folder = store.folder(number, recording_owner(request.state.key))
             upload = folder / f"upload-{secrets.token_hex(8)}"
             try:
                 await receive_take(request.stream(), upload)
@@ -51,7 +46,7 @@ def recording_router(recordings: Recordings, owner: Owner) -> APIRouter:
 
     @router.get(TAKE)
     def get_take(request: Request, number: str, at: int) -> Response:
-        path = _take_path(store, number, owner(request), at)
+        path = _take_path(store, number, recording_owner(request.state.key), at)
         if path is None:
             return JSONResponse({"error": "there is no such take"}, 404)
         kinds = {suffix: kind for kind, suffix in SUFFIXES.items()}
@@ -59,7 +54,7 @@ def recording_router(recordings: Recordings, owner: Owner) -> APIRouter:
 
     @router.get("/{number}/files/{name}")
     def get_file(request: Request, number: str, name: str) -> Response:
-        path = _download_path(store, number, owner(request), name)
+        path = _download_path(store, number, recording_owner(request.state.key), name)
         if path is None:
             return JSONResponse({"error": "there is no such file"}, 404)
         kind, headers = DOWNLOADS[name]
@@ -79,20 +74,6 @@ async def uploaded_take(request: Request) -> AsyncIterator[tuple[Path, str]]:
         upload = Path(folder, "upload")
         await receive_take(request.stream(), upload)
         yield upload, suffix
-
-
-async def receive_take(parts: AsyncIterator[bytes], target: Path) -> None:
-    """Write an uploaded take to a file."""
-    n_bytes = 0
-    with target.open("xb") as file:
-        async for part in parts:
-            n_bytes += file.write(part)
-            if n_bytes > MAX_TAKE_BYTES:
-                raise InputError(f"a take may have {MAX_TAKE_BYTES >> 20} MB; record it shorter")
-        file.flush()
-        os.fsync(file.fileno())
-    if not n_bytes:
-        raise InputError("the take is empty; record it again")
 
 
 def _take_path(store: RecordingStore, number: str, owner: str, at: int) -> Path | None:

@@ -13,7 +13,8 @@ from lexicon.errors import InputError
 from tts2face.serving.service.page_addresses import TAKES
 from tts2face.serving.studio.camera import follow_camera
 from tts2face.serving.studio.face_answer import face_answer
-from tts2face.serving.studio.routes.recordings import receive_take, uploaded_take
+from tts2face.serving.studio.recordings import receive_take
+from tts2face.serving.studio.routes.recordings import uploaded_take
 from tts2face.serving.studio.take_store import FILM, SOUND, TABLE
 from tts2face.serving.studio.takes import Takes
 
