@@ -7,8 +7,8 @@ import pytest
 from lexicon.errors import DataError
 from tests.serving.batch.conftest import SRT, Planner
 from tts2face.serving.batch.cast import read_cast
-from tts2face.serving.batch.distinct_faces import other_face
 from tts2face.serving.batch.report import planned_speakers
+from tts2face.serving.batch.speakers import other_face
 from tts2face.session.named_models import Models
 from tts2face.sound.voice_pool import find_voice
 

@@ -29,8 +29,7 @@ from tts2face.serving.service.pool import PoolProcess
 from tts2face.serving.service.preparation import Preparation
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
-from tts2face.serving.service.synthesis import Synthesis
-from tts2face.serving.service.tasks import TASKS
+from tts2face.serving.service.synthesis import TASKS, Synthesis
 from tts2face.serving.service.warm_process import InputItem
 from tts2face.session.session_cache import SessionCache
 

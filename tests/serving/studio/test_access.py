@@ -10,8 +10,7 @@ from starlette.testclient import TestClient, WebSocketDenialResponse
 
 from tests.running import eventually
 from tests.serving.service.in_process import another_client
-from tts2face.serving.service.browser_key import COOKIE, cookie_key, set_cookie
-from tts2face.serving.service.page_addresses import POLICY
+from tts2face.serving.service.page_addresses import COOKIE, POLICY, cookie_key, set_cookie
 
 HTML = {"Accept": "text/html"}
 CONNECTIONS = ("/_nicegui_ws/socket.io/?EIO=4&transport=websocket", "/api/takes/live")

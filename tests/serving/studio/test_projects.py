@@ -14,7 +14,7 @@ from tests.serving.studio.server.test_comparison_http import compare
 from tests.serving.studio.server.test_projects_http import TEXT, create, edit, preview, project_file, wait_until_saved
 from tests.serving.studio.server.test_reports_http import REPORTS
 from tests.serving.studio.server.test_styles_http import MIX
-from tts2face.serving.service.browser_key import COOKIE
+from tts2face.serving.service.page_addresses import COOKIE
 from tts2face.session.project_file import load_project
 from tts2face.session.session import Session
 

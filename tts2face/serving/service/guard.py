@@ -8,12 +8,20 @@ from urllib.parse import parse_qs, urlsplit
 from starlette.requests import ClientDisconnect
 from starlette.websockets import WebSocketDisconnect
 
-from tts2face.serving.service.browser_key import cookie_key, wants_login
 from tts2face.serving.service.errors import RefusedError, draining
 from tts2face.serving.service.exchange import CLIENT, PROBES, Exchange, Incoming, Receive, Scope, Send
 from tts2face.serving.service.keys import NOBODY, ApiKey
 from tts2face.serving.service.origins import answer_headers, check_origin, preflight_headers
-from tts2face.serving.service.page_addresses import LOGIN_PATH, RECORDINGS, REFERENCE, STYLES, TAKES, is_page, is_static
+from tts2face.serving.service.page_addresses import (
+    LOGIN_PATH,
+    RECORDINGS,
+    REFERENCE,
+    STYLES,
+    TAKES,
+    cookie_key,
+    is_page,
+    is_static,
+)
 from tts2face.storage.files import is_disk_full
 
 if TYPE_CHECKING:
@@ -141,9 +149,15 @@ class Guard:
         try:
             return self._state.keys.find(given)
         except RefusedError as refused:
-            if wants_login(request):
+            if _wants_login(request):
                 raise RefusedError(303, refused.code, refused.message, {"Location": LOGIN_PATH}) from refused
             raise
+
+
+def _wants_login(request: Exchange) -> bool:
+    """Whether a request without a key is that of a person who opens a page."""
+    wants_page = b"text/html" in request.headers.get(b"accept", b"")
+    return request.scope["type"] == "http" and request.method == "GET" and is_page(request.scope["path"]) and wants_page
 
 
 def _brings_video(scope: Scope) -> bool:

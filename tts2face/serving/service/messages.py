@@ -39,7 +39,7 @@ class Work:
     Parameters
     ----------
     kind
-        Name of a task: one of `tts2face.serving.service.tasks.TASKS`, or of a table given to the service.
+        Name of a task: one of `tts2face.serving.service.synthesis.TASKS`, or of a table given to the service.
     models
         Fields of `tts2face.session.named_models.Models` that differ from their defaults.
     request, picture

@@ -1,4 +1,7 @@
-"""Addresses of the studio's pages, and headers that keep them within this service."""
+"""The studio's pages in a browser: their addresses, headers that keep them within this service, and a cookie as key."""
+
+from collections.abc import Mapping
+from http.cookies import CookieError, SimpleCookie
 
 PAGES = "/studio"
 REFERENCE = "/docs"
@@ -22,6 +25,8 @@ PAGE_HEADERS = (
 
 LOGIN_PATH = f"{PAGES}/login"
 STATIC_PATHS = (f"{PAGES}/_nicegui/", f"{PAGES}/_nicegui_ws/")  # libraries of a page, and its connection
+COOKIE = "tts2face_key"
+COOKIE_S = 30 * 86_400
 UPLOADS = f"{PAGES}/_nicegui/client/"
 
 
@@ -41,3 +46,23 @@ def is_page(path: str) -> bool:
 def page_headers(path: str) -> tuple[tuple[bytes, bytes], ...]:
     """Further headers of an answer, if its address belongs to the studio."""
     return PAGE_HEADERS if is_page(path) else ()
+
+
+def cookie_key(headers: Mapping[bytes, bytes]) -> str:
+    """Key in the cookie of a request; empty if there is none."""
+    cookies: SimpleCookie = SimpleCookie()
+    try:
+        cookies.load(headers.get(b"cookie", b"").decode("latin-1"))
+    except CookieError:
+        return ""
+    return cookies[COOKIE].value if COOKIE in cookies else ""
+
+
+def set_cookie(key: str, *, is_secure: bool) -> str:
+    """Header ``Set-Cookie`` that keeps a key, or removes it if it is empty.
+
+    Scripts cannot read it, and no request that another site causes has it.
+    """
+    age = COOKIE_S if key else 0
+    secure = "; Secure" if is_secure else ""
+    return f"{COOKIE}={key}; Path={PAGES}; Max-Age={age}; HttpOnly; SameSite=Strict{secure}"

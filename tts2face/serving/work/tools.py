@@ -60,7 +60,7 @@ def limits_of(what: str) -> Iterator[None]:
 
 
 class TalkerBuild(NamedTuple):
-    """The builder of talkers within its limits, called as `TALKER_TOOL` with a `BuildOrder` of the tool, and the seconds for it."""
+    """The builder of talkers within its limits, for a call `TALKER_TOOL` with its `BuildOrder`; the seconds for it."""
 
     program: Program
     timeout_s: float

@@ -26,8 +26,7 @@ from tts2face.serving.service.access import require_scope
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.guard import VIDEO_PATH
 from tts2face.serving.service.job_kinds.order import JobKind, JobOrder, Upload
-from tts2face.serving.service.job_kinds.schema import new_job_schema
-from tts2face.serving.service.job_kinds.table import JOB_KINDS
+from tts2face.serving.service.job_kinds.table import JOB_KINDS, new_job_schema
 from tts2face.serving.service.job_views import EXAMPLE_ID, JobDetail, JobPage, NewJobBody, job_detail, job_view
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.results import error_event

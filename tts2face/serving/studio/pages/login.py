@@ -6,9 +6,8 @@ from fastapi import APIRouter, Form
 from fastapi import Request as HttpRequest
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 
-from tts2face.serving.service.browser_key import set_cookie
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.page_addresses import LOGIN_PATH, PAGES
+from tts2face.serving.service.page_addresses import LOGIN_PATH, PAGES, set_cookie
 from tts2face.serving.service.state import ServiceState
 
 LOGOUT_PATH = f"{PAGES}/logout"
