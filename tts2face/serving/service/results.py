@@ -165,8 +165,9 @@ async def stream_work(
     resources
         Closed when the answer is complete or has failed.
     """
+    results: Results = request.app.state.service.results
     stack = resources or AsyncExitStack()
-    messages = _results(request).messages(work, request.state.key)
+    messages = results.messages(work, request.state.key)
     convert = convert or DataBytes(media_type)
     chunks = convert(messages)
     try:
@@ -232,14 +233,10 @@ async def timed_speech(request: HttpRequest | WebSocket, work: Work) -> tuple[li
     """All events of a task of kind ``speech``, and its sound as 16-bit PCM."""
     events: list[dict[str, Any]] = []
     sound = bytearray()
-    async with aclosing(_results(request).messages(work, request.state.key)) as messages:  # type: ignore[type-var]
+    results: Results = request.app.state.service.results
+    async with aclosing(results.messages(work, request.state.key)) as messages:  # type: ignore[type-var]
         async for message in messages:
             sound += message.payload
             if "event" in message.content:
                 events.append(message.content["event"])
     return events, bytes(sound)
-
-
-def _results(request: HttpRequest | WebSocket) -> Results:
-    results: Results = request.app.state.service.results
-    return results
