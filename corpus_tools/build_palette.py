@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +31,9 @@ from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
 from corpus_tools.training.pose_correction import fit_pose_correction
 from lexicon.errors import DataError, InputError
 from lexicon.values.fields import check_fields
-from tts2face.face.deformation import rest_landmarks
 from tts2face.face.expressions import expression_landmarks
-from tts2face.face.mouth import MIDDLE_PAIR
+from tts2face.face.landmarks import rest_landmarks
+from tts2face.face.lip_constraints import MIDDLE_PAIR
 from tts2face.lips.performer import CLOSED_FRAME_SHARE
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
@@ -132,7 +131,19 @@ def build_style(  # noqa: PLR0913 - run options change no motion
         captured, basis, build_estimator(estimator, basis, epsilon), stages("decomposing recordings")
     )
     words = _command_words(recorded, style, out, base is None, epsilon)
-    learnt = add_style(base, style, parts, basis.rest, _metadata(recorded, stated, words))
+    learnt = add_style(
+        base,
+        style,
+        parts,
+        basis.rest,
+        {
+            **dict.fromkeys(PROVENANCE_FIELDS, NOT_STATED),
+            **stated,
+            "command": shlex.join(words),
+            "created": datetime.now(UTC).date().isoformat(),
+            "content": CONTENT,
+        },
+    )
     palette = learnt.palette
     if base is None:
         palette = replace(palette, derivations=read_derived_styles(style))
@@ -206,13 +217,3 @@ def _command_words(recorded: StyleSource, style: str, out: Path, is_alone: bool,
     words += ["--provenance", recorded.provenance.name] if recorded.provenance else []
     words += ["--epsilon", f"{epsilon:g}"] if epsilon else []
     return [*words, "--out", out.name]
-
-
-def _metadata(recorded: StyleSource, stated: Mapping[str, Any], words: Sequence[str]) -> dict[str, Any]:
-    return {
-        **dict.fromkeys(PROVENANCE_FIELDS, NOT_STATED),
-        **stated,
-        "command": shlex.join(words),
-        "created": datetime.now(UTC).date().isoformat(),
-        "content": CONTENT,
-    }

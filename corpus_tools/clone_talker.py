@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.appearance.transfer import build_appearance_transfer
 from lexicon.errors import InputError
-from tts2face.face.own_face import fit_appearance_regression
+from tts2face.face.appearance_regression import fit_appearance_regression
 from tts2face.lips.cloning import ParameterTransfer, build_parameter_transfer, extend_talker
 from tts2face.models.talker import NOT_STATED, Talker, Utterance, speech_channels
 from tts2face.models.talker_file import load_talker, write_talker

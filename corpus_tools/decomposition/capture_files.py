@@ -11,7 +11,7 @@ from corpus_tools.decomposition.marker_sets import DEFAULT_MARKER_TABLE, read_ma
 from corpus_tools.decomposition.markers import read_marker_recording
 from lexicon.errors import InputError
 from lexicon.values.fields import check_fields
-from tts2face.face.deformation import moved_landmarks, rest_landmarks
+from tts2face.face.landmarks import moved_landmarks, rest_landmarks
 from tts2face.lips.performer import match_shapes
 from tts2face.models.face import Face
 from tts2face.types import Trajectory

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from corpus_tools.decomposition.decompose import Decomposition
 from corpus_tools.decomposition.regions import feature_landmarks
 from lexicon.errors import InputError
-from tts2face.face.deformation import axis_ratios
+from tts2face.face.landmarks import axis_ratios
 from tts2face.models.palette import (
     FEATURES,
     REGION_FEATURES,

@@ -13,7 +13,7 @@ from corpus_tools.decomposition.marker_interpolation import MarkerInterpolator, 
 from corpus_tools.decomposition.marker_poses import HeadPoses, fit_head_poses
 from corpus_tools.decomposition.marker_sets import MIN_FACE_MARKERS, MarkerSet
 from lexicon.errors import DataError
-from tts2face.face.deformation import rest_landmarks
+from tts2face.face.landmarks import rest_landmarks
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import nearest_rotation
 from tts2face.video.pose import head_angles

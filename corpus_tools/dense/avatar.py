@@ -1,6 +1,6 @@
 """A head of a person from photographs: shape, skin, eyes and hair, for everything that a head can."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -82,7 +82,19 @@ def build_avatar(  # noqa: PLR0913 - one parameter an option
     mirrored = [_mirrored(observed, mirror_table(head)) for observed in seen]
     fitted = fit_person(head, np.mean(neutral, axis=0))
     face, look = paint_person(fitted, [*seen, *mirrored], lambda done, of: None, choices)
-    face = replace(face, metadata=_metadata(head, record, look.summary()))
+    face = replace(
+        face,
+        metadata={
+            **head.metadata,
+            "name": record["name"],
+            "licence": f"mesh: {head.metadata['licence']}; likeness of the person: as stated in the consent",
+            "content": CONTENT,
+            "look": look.summary(),
+            "consent": dict(record),
+            "made_by": PHOTO_TOOL,
+            "created": datetime.now(UTC).date().isoformat(),
+        },
+    )
     write_face(out, bake_occlusion(face, available_cores()))
     return BuiltFace(len(seen), len(photos), fitted.error_mm(), look)
 
@@ -144,16 +156,3 @@ def _mirrored(seen: TrackedPictures, table: NDArray[np.int64]) -> TrackedPicture
     picture = np.ascontiguousarray(pixels[:, ::-1])
     opening = None if seen.opening is None else np.array([width - 1, 0]) + seen.opening * (-1, 1)
     return TrackedPictures(seen.file, points, landmarks, (picture,), MIRRORED_WEIGHT, opening)
-
-
-def _metadata(head: Face, record: Mapping[str, str], look: str) -> dict[str, object]:
-    return {
-        **head.metadata,
-        "name": record["name"],
-        "licence": f"mesh: {head.metadata['licence']}; likeness of the person: as stated in the consent",
-        "content": CONTENT,
-        "look": look,
-        "consent": dict(record),
-        "made_by": PHOTO_TOOL,
-        "created": datetime.now(UTC).date().isoformat(),
-    }

@@ -80,7 +80,7 @@ def sentence_units(text: str, language: str) -> Units:
         phones += [*word.phones, *([SILENCE] if word.mark else [])]
     if phones[-1] != SILENCE:
         phones.append(SILENCE)
-    visemes = [_visemes(phone) for phone in phones]
+    visemes = [viseme_table(INVENTORY)[look_up_phone(phone).symbol] for phone in phones]
     triphones = [
         (before[-1], "-".join(here), behind[0])
         for (before, here), (_, behind) in pairwise(pairwise(visemes))
@@ -97,10 +97,6 @@ def count_units(sentences: Iterable[Units]) -> RunningText:
         phones.update(units.phones)
         triphones.update(units.triphones)
     return RunningText(dict(sorted(phones.items())), dict(sorted(triphones.items())))
-
-
-def _visemes(phone: str) -> tuple[str, ...]:
-    return viseme_table(INVENTORY)[look_up_phone(phone).symbol]
 
 
 def select_sentences(candidates: Sequence[Units], running: RunningText) -> Iterator[int]:

@@ -62,7 +62,11 @@ def find_recordings(folder: Path) -> tuple[Recording, ...]:
     if not folder.is_dir():
         raise InputError(f"there is no folder {folder}; give the folder of recordings")
     manifest = folder / MANIFEST
-    found = _recordings_from_manifest(folder, manifest) if manifest.is_file() else _recordings_without_manifest(folder)
+    found = (
+        _recordings_from_manifest(folder, manifest)
+        if manifest.is_file()
+        else tuple(recording for video in _list_videos(folder) for recording in _recordings_in_video(video))
+    )
     if not found:
         raise InputError(
             f"{folder} contains no video ({', '.join(sorted(VIDEO_SUFFIXES))}); give a folder of recordings"
@@ -126,10 +130,6 @@ def _recordings_from_manifest(folder: Path, manifest: Path) -> tuple[Recording, 
         Recording(video.stem, video, transcripts.get(video.name, transcripts.get(video.stem)), is_spelling=True)
         for video in videos
     )
-
-
-def _recordings_without_manifest(folder: Path) -> tuple[Recording, ...]:
-    return tuple(recording for video in _list_videos(folder) for recording in _recordings_in_video(video))
 
 
 def _recordings_in_video(video: Path) -> Iterator[Recording]:

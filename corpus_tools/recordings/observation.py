@@ -155,7 +155,7 @@ def observe_recording(
         intensity=intensity(sound.sound, start + np.arange(len(filled)) / fps),
         quality=Quality(
             fit=sound.fit,
-            score=_lowest_score(tracked, here),
+            score=float(tracked.tracking.scores[here & ~tracked.tracking.is_missing].min(initial=1.0)),
             n_filled=n_filled,
             cut=first_frame,
             lag=timing.lag,
@@ -225,7 +225,3 @@ def head_motion(posed: PoseFreeLandmarks) -> NDArray[np.float32]:
     """(T, 6) head pose as in `Observation`."""
     place = posed.translations - np.median(posed.translations, axis=0)
     return np.column_stack([head_angles(posed.rotations), place]).astype(np.float32)
-
-
-def _lowest_score(tracked: TrackedVideo, here: NDArray[np.bool_]) -> float:
-    return float(tracked.tracking.scores[here & ~tracked.tracking.is_missing].min(initial=1.0))

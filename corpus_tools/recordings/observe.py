@@ -100,7 +100,7 @@ def observe(
     found: dict[Path, RecordingOutcomes] = {}
     for task, outcomes in _observe_tasks(tasks, cache, model, min(processes, len(tasks)), on_progress):
         found[task.video] = outcomes
-    kept = _kept_observations(found)
+    kept = [outcome for outcomes in found.values() for outcome in outcomes if isinstance(outcome, Observation)]
     agreed = estimate_sync_by_video(kept)
     timing = corrected_timings(kept, agreed)
     again = [replace(task, timing=timing[task.video]) for task in tasks if task.video in timing]
@@ -141,10 +141,6 @@ def check_any_kept(observations: Observations) -> tuple[Observation, ...]:
     reasons = "; ".join(f"{refusal.name}: {refusal.reason}" for refusal in refused[:MAX_QUOTED_REASONS])
     more = f"; and {len(refused) - MAX_QUOTED_REASONS} more" if len(refused) > MAX_QUOTED_REASONS else ""
     raise InputError(f"no recording could be used: {reasons}{more}")
-
-
-def _kept_observations(found: Mapping[Path, RecordingOutcomes]) -> list[Observation]:
-    return [outcome for outcomes in found.values() for outcome in outcomes if isinstance(outcome, Observation)]
 
 
 def _refusal(recording: Recording, reason: DataError) -> Refusal:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.recordings.limits import LIMITS, Limit
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.recordings.observe import Observations, Refusal
+from corpus_tools.recordings.observe import Observations
 from corpus_tools.studies.evaluation.page import label_phones
 from corpus_tools.studies.pages import note_paragraph, page, paragraphs, picture_tag, table
 from corpus_tools.studies.plots import FIRST, SECOND, draw_svg
@@ -64,7 +64,10 @@ def recordings_page(name: str, found: Observations) -> str:
             f"<h2>Warnings ({len(found.warnings)})</h2>",
             *(paragraphs(f"{warning.name}: {warning.message}") for warning in found.warnings),
             f"<h2>Refused ({len(found.refused)})</h2>",
-            *(_refused_item(refusal, pictures.get(refusal.name)) for refusal in found.refused),
+            *(
+                _item(refusal.name, f'<p class="bad">{escape(refusal.reason)}</p>', pictures.get(refusal.name))
+                for refusal in found.refused
+            ),
             f"<h2>Kept ({len(found.kept)})</h2>",
             note_paragraph("Blue: lip gap relative to the eye distance. Ochre: sound intensity, 25 to 85 dB."),
             *(_kept_item(observation, pictures.get(observation.name)) for observation in found.kept),
@@ -134,10 +137,6 @@ def _phones(kept: Iterable[Observation]) -> str:
     spoken = ", ".join(f"{phone} {count}" for phone, count in counts.most_common()) or "none"
     missing = ", ".join(sorted({phone for phone in ARPABET.values() if phone not in counts})) or "none"
     return paragraphs(spoken, f"English phones that do not occur: {missing}")
-
-
-def _refused_item(refusal: Refusal, picture: NDArray[np.uint8] | None) -> str:
-    return _item(refusal.name, f'<p class="bad">{escape(refusal.reason)}</p>', picture)
 
 
 def _kept_item(observation: Observation, picture: NDArray[np.uint8] | None) -> str:

@@ -53,18 +53,18 @@ def _checker(cache: Path) -> RecordingChecker:
 def prompts_answer(texts: Sequence[str], units: Sequence[Units], running: RunningText) -> dict[str, Any]:
     """The answer about prompts, as above."""
     return {
-        "prompts": [{"text": text, **_units(unit)} for text, unit in zip(texts, units, strict=True)],
+        "prompts": [
+            {
+                "text": text,
+                "phones": sorted(set(unit.phones)),
+                "triphones": sorted({" ".join(triphone) for triphone in unit.triphones}),
+            }
+            for text, unit in zip(texts, units, strict=True)
+        ],
         "running": {
             "phones": dict(running.phones),
             "triphones": {" ".join(triphone): n for triphone, n in running.triphones.items()},
         },
-    }
-
-
-def _units(units: Units) -> dict[str, list[str]]:
-    return {
-        "phones": sorted(set(units.phones)),
-        "triphones": sorted({" ".join(triphone) for triphone in units.triphones}),
     }
 
 

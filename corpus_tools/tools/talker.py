@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from corpus_tools.build_talker import BuiltTalker, build_talker
+from corpus_tools.build_talker import build_talker
 from corpus_tools.recordings.provenance import PROVENANCE
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError
@@ -73,10 +73,6 @@ def build(call: Call) -> dict[str, Any]:
         check_resource(TALKER, folder / "made.talker", folder / "checked", order.max_bytes)
     except RefusedFileError as refused:
         raise DataError(f"the talker cannot be used: {refused}") from refused
-    return _result(built)
-
-
-def _result(built: BuiltTalker) -> dict[str, Any]:
     return {
         "n_kept": built.n_kept,
         "minutes": round(built.minutes, 2),

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from corpus_tools.training.score_map import clipped_logits, fit_score_map, read_mouth_scores
 from lexicon.errors import DataError
-from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
-from tts2face.face.mouth import SPEECH_SHAPE_PREFIXES
+from tts2face.face.landmarks import landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES
 from tts2face.lips.retargeting import build_retargeter
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_LANDMARKS

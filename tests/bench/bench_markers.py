@@ -17,8 +17,8 @@ from corpus_tools.decomposition.capture_files import read_livelink_recording
 from corpus_tools.decomposition.marker_sets import read_marker_set
 from corpus_tools.decomposition.markers import read_marker_recording
 from tests.corpus_tools.decomposition.made_markers import FPS, SIZE, made_take, write_c3d
-from tts2face.face.deformation import rest_landmarks
 from tts2face.face.expressions import expression_landmarks
+from tts2face.face.landmarks import rest_landmarks
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, N_MESH_LANDMARKS, UPPER_LIP_INNER_MID
 from tts2face.models.palette import EXPRESSIONS

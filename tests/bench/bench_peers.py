@@ -23,7 +23,7 @@ from corpus_tools.measures.reference import LipCurves
 from corpus_tools.studies.evaluation.person_tracks import read_person
 from lexicon.phones import ARPABET, nearest_phones
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.face.deformation import moved_landmarks
+from tts2face.face.landmarks import moved_landmarks
 from tts2face.lips.performer import match_shapes
 from tts2face.models.face_loading import load_face
 from tts2face.models.talker_file import load_talker

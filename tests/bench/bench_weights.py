@@ -27,8 +27,8 @@ from corpus_tools.decomposition.capture_files import read_livelink_recording
 from corpus_tools.recordings.observe import observe
 from corpus_tools.training.pose_correction import correct_pose
 from tests.corpus_tools.decomposition.weight_errors import approximation_error
-from tts2face.face.deformation import rest_landmarks
 from tts2face.face.expressions import expression_landmarks
+from tts2face.face.landmarks import rest_landmarks
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.models.palette import EXPRESSIONS, GESTURE_FPS

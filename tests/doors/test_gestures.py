@@ -13,8 +13,8 @@ from lexicon.errors import InputError
 from tests.made_models import made_style
 from tests.tones import VOICE
 from tests.world import World
-from tts2face.face.deformation import moved_landmarks
 from tts2face.face.gestures import gesture_face
+from tts2face.face.landmarks import moved_landmarks
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.palette import FEATURES

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tts2face.face.deformation import landmark_motion, landmark_positions
+from tts2face.face.landmarks import landmark_motion, landmark_positions
 from tts2face.models.face import Face
 from tts2face.models.palette import FaceRegion, Palette, Style
 from tts2face.models.talker_file import load_talker

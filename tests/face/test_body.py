@@ -2,7 +2,10 @@
 
 import numpy as np
 
-from tts2face.face.body import BREATH_SHAPE, PUPIL_SHAPE, SWING_SHAPES, Body
+from tts2face.face.body import Body
+from tts2face.face.breathing import BREATH_SHAPE
+from tts2face.face.pupils import PUPIL_SHAPE
+from tts2face.models.lit_hair import SWING_SHAPES
 from tts2face.session import performance, recording
 from tts2face.session.animated_face import FaceMotion
 from tts2face.types import HEAD_CHANNELS, Trajectory, Waveform

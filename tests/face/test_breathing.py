@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.face.body import BREATH_SHAPE, REST_CYCLE_S, Breathing, phrase_starts
+from tts2face.face.breathing import BREATH_SHAPE, REST_CYCLE_S, Breathing, phrase_starts
 from tts2face.types import Trajectory
 
 CHANNELS = ("jawOpen", BREATH_SHAPE)

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.face.posing import posed_vertices
-from tts2face.face.deformation import (
+from tts2face.face.landmarks import (
     axis_scales,
     landmark_motion,
     landmark_positions,

@@ -9,9 +9,10 @@ from scipy.spatial import KDTree
 
 from lexicon.errors import DataError, InputError
 from tests.face.gestures import BROWS, CHEEKS, palette, posed_landmarks
-from tts2face.face.deformation import build_rig, landmark_positions
+from tts2face.face.deformation import build_rig
 from tts2face.face.expressions import add_expression_shapes, expression_landmarks, expression_table
 from tts2face.face.gestures import LID_LANDMARKS, GestureFace, gesture_face
+from tts2face.face.landmarks import landmark_positions
 from tts2face.face.shape_transfer import eye_distance
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face

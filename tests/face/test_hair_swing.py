@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tts2face.face.body import BREATH_SHAPE, LIMIT_RAD, SWING_SHAPES, HairSwing
+from tts2face.face.breathing import BREATH_SHAPE
+from tts2face.face.hair_swing import LIMIT_RAD, HairSwing
 from tts2face.models.face_loading import load_face
+from tts2face.models.lit_hair import SWING_SHAPES
 from tts2face.session.session import Session
 from tts2face.types import HEAD_CHANNELS, Trajectory
 

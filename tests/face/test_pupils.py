@@ -3,7 +3,7 @@
 import numpy as np
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.face.body import DILATION, PUPIL_SHAPE, SPEECH, Pupils
+from tts2face.face.pupils import DILATION, PUPIL_SHAPE, SPEECH, Pupils
 from tts2face.types import Trajectory
 
 FPS = 30.0

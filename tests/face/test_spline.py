@@ -5,9 +5,10 @@ import pytest
 from scipy.interpolate import BSpline
 
 from lexicon.errors import DataError, InputError
-from tts2face.face.deformation import landmark_motion, landmark_positions
+from tts2face.face.landmarks import landmark_motion, landmark_positions
 from tts2face.models.face_loading import load_face
-from tts2face.numeric.splines import CHUNK_SIZE, cubic_bspline, fit_local_interpolant
+from tts2face.numeric.local_splines import cubic_bspline, fit_local_interpolant
+from tts2face.numeric.splines import CHUNK_SIZE
 
 SUPPORT = 30.0  # mm
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.photo.pictures import SMILE, found_in, photographed, projected, still
-from tts2face.face.deformation import landmark_positions, scatter_landmarks
+from tts2face.face.landmarks import landmark_positions, scatter_landmarks
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.photo.camera import find_camera

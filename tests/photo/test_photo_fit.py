@@ -9,7 +9,7 @@ import pytest
 
 from lexicon.errors import DataError, InputError
 from tests.photo.pictures import ONE_PROCESS, found_in, photographed, still
-from tts2face.face.deformation import landmark_positions
+from tts2face.face.landmarks import landmark_positions
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import INNER_LIP_UPPER, LEFT_LIDS, LOWER_LIP_INNER_MID, RIGHT_LIDS, UPPER_LIP_INNER_MID

@@ -11,7 +11,8 @@ from scipy.spatial import cKDTree
 from lexicon.errors import DataError, InputError
 from tests.interchange.exports.test_stage_glb import Read
 from tests.photo.pictures import ONE_PROCESS, found_in, speaking, still
-from tts2face.face.deformation import REST_HEAD, moved_landmarks
+from tts2face.face.deformation import REST_HEAD
+from tts2face.face.landmarks import moved_landmarks
 from tts2face.interchange.exports.stage_glb import stage_glb
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face

@@ -8,7 +8,7 @@ import pytest
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.picture.test_plate import own_talker
-from tts2face.face.own_face import fit_appearance_regression
+from tts2face.face.appearance_regression import fit_appearance_regression
 from tts2face.models.talker import Utterance
 from tts2face.session.animated_face import OwnAppearanceFace
 from tts2face.types import Trajectory

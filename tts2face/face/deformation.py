@@ -1,9 +1,4 @@
-"""Deformation of a face: rest plus weighted shapes, eyeball rotations, and head motion about the pivot.
-
-Landmarks of a face moved by weights of its shapes.
-
-Landmark positions and motion of a face, and alignment of two sets of landmarks.
-"""
+"""Deformation of a face: rest plus weighted shapes, eyeball rotations, and head motion about the pivot."""
 
 import math
 from dataclasses import dataclass
@@ -11,22 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import DataError
 from tts2face.face.eyeballs import EyeballClearance, build_clearance
 from tts2face.models.face import Face
-from tts2face.models.landmarks import CHIN, N_LANDMARKS
+from tts2face.models.landmarks import CHIN
 from tts2face.models.light import Photographed
-from tts2face.numeric.arrays import nearest_rotation, smoothstep
+from tts2face.numeric.arrays import smoothstep
 from tts2face.numeric.kernels import kernel
-from tts2face.processes.shared import shared
-from tts2face.types import HEAD_CHANNELS, Trajectory
+from tts2face.types import HEAD_CHANNELS
 
 REST_HEAD = np.zeros(len(HEAD_CHANNELS), np.float32)  # head pose at rest
 CHIN_MARGIN_MM = 8.0  # height below the chin that still moves rigidly with the head
 MIN_NECK_MM = 20.0  # meshes with a shorter neck move rigidly as a whole
-FloatArray = NDArray[np.float64]
-DIGITS = 9  # decimals kept: the last bits of LAPACK's results depend on its threads
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -187,99 +177,3 @@ def _move_head(transform, follow, vertices):  # type: ignore[no-untyped-def]
         for c in range(3):
             target = transform[c, 0] * x + transform[c, 1] * y + transform[c, 2] * z + transform[c, 3]
             vertices[v, c] += follow[v] * (target - vertices[v, c])
-
-
-def landmark_positions(face: Face) -> FloatArray:
-    """Landmarks (L, 3) of a face at rest, mm, in the order of `Face.landmarks`."""
-    mixed = face.landmark_weights.astype(np.float64)[..., None]
-    places: FloatArray = (face.vertices[face.landmark_vertices] * mixed).sum(axis=1)
-    return places
-
-
-def landmark_motion(face: Face, shapes: NDArray[np.integer]) -> FloatArray:
-    """Landmark motion (L, 3, k) per weight of the shapes with indices `shapes` (k,), mm."""
-    return np.ascontiguousarray(np.moveaxis(_landmark_moves(face)[np.asarray(shapes)], 0, -1))
-
-
-@shared
-def _landmark_moves(face: Face) -> FloatArray:
-    """Landmark motion (K, L, 3) per weight of all shapes, mm; a face that is prepared needs it eight times."""
-    mixed = face.landmark_weights.astype(np.float64)[..., None]
-    moves: FloatArray = (face.shapes[:, face.landmark_vertices] * mixed).sum(axis=2)
-    moves.setflags(write=False)
-    return moves
-
-
-def scatter_landmarks(face: Face, values: FloatArray) -> FloatArray:
-    """Values (L, ...) of a face's landmarks in an array (478, ...) by landmark index; NaN for missing landmarks."""
-    spread: FloatArray = np.full((N_LANDMARKS, *values.shape[1:]), np.nan)
-    spread[face.landmarks] = values
-    return spread
-
-
-def procrustes_rotation(source: FloatArray, target: FloatArray) -> FloatArray:
-    """Rotation (3, 3) of points (N, 3) that fits the target best, up to translation and scale (Procrustes)."""
-    inertia = np.einsum("nc,nd->cd", source - source.mean(axis=0), target - target.mean(axis=0))
-    turn: FloatArray = np.round(nearest_rotation(inertia).T, DIGITS)
-    return turn
-
-
-def axis_scales(source: FloatArray, target: FloatArray, bounds: tuple[float, float]) -> FloatArray:
-    """Factors s (3,) of the least-squares fit ``target = s * source + shift`` per axis, clipped to `bounds`."""
-    clipped: FloatArray = np.clip(axis_ratios(source, target), *bounds).round(DIGITS)
-    return clipped
-
-
-def axis_ratios(source: NDArray[np.floating], target: NDArray[np.floating]) -> FloatArray:
-    """Factors s (3,) of the least-squares fit ``target = s * source + shift`` per axis."""
-    here, there = (np.asarray(points, np.float64) for points in (source, target))
-    here, there = here - here.mean(axis=0), there - there.mean(axis=0)
-    ratios: FloatArray = (here * there).sum(axis=0) / np.maximum((here**2).sum(axis=0), 1e-12)
-    return ratios
-
-
-def rest_landmarks(face: Face) -> Floats:
-    """(478, 3) landmarks of a face at rest, mm.
-
-    Raises
-    ------
-    DataError
-        The face has not all of them.
-    """
-    if sorted(face.landmarks.tolist()) != list(range(N_LANDMARKS)):
-        raise DataError(f"the face has {len(face.landmarks)} of {N_LANDMARKS} landmarks; build it with all of them")
-    return scatter_landmarks(face, landmark_positions(face))
-
-
-def moved_landmarks(face: Face, motion: Trajectory) -> NDArray[np.float32]:
-    """(T, 478, 3) landmarks of a face, mm, for weights (T, K) of its first K shapes; its eyes turn.
-
-    Raises
-    ------
-    DataError
-        The face has not all landmarks, or the weights are not of its shapes.
-    """
-    n = len(motion.channels)
-    if motion.channels != face.shape_names[:n]:
-        raise DataError("the weights are not for the shapes of this face; retarget them to it first")
-    weights = motion.values.astype(np.float64)
-    moves = scatter_landmarks(face, landmark_motion(face, np.arange(n)))
-    found = rest_landmarks(face) + np.tensordot(weights, moves, axes=(1, 2))
-    _turn_eye_landmarks(face, weights, found)
-    return found.astype(np.float32)
-
-
-def _turn_eye_landmarks(face: Face, weights: Floats, landmarks: Floats) -> None:
-    """Turn those landmarks (T, 478, 3) that lie on eyeballs."""
-    from scipy.spatial.transform import Rotation
-
-    for eye in face.eyes:
-        on_it = ((face.landmark_vertices >= eye.first) & (face.landmark_vertices < eye.first + eye.count)).all(axis=1)
-        known = [name for name in eye.turns if name in face.shape_names[: weights.shape[1]]]
-        if not on_it.any() or not known:
-            continue
-        columns = [face.shape_names.index(name) for name in known]
-        turns = weights[:, columns] @ np.array([eye.turns[name] for name in known], np.float64)
-        rows = face.landmarks[on_it]
-        about = Rotation.from_rotvec(turns).as_matrix()
-        landmarks[:, rows] = np.einsum("tij,tlj->tli", about, landmarks[:, rows] - eye.centre) + eye.centre

@@ -13,15 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.face.deformation import axis_scales, landmark_positions, procrustes_rotation, scatter_landmarks
-from tts2face.face.expressions import (
-    GAZE_SHAPES,
-    EyelidModel,
-    add_expression_shapes,
-    build_eyelid_model,
-    expression_weights,
-)
-from tts2face.face.mouth import SPEECH_SHAPE_PREFIXES, LipConstraints, build_lip_constraints
+from tts2face.face.expressions import GAZE_SHAPES, add_expression_shapes, expression_weights
+from tts2face.face.eyelids import EyelidModel, build_eyelid_model
+from tts2face.face.landmarks import axis_scales, landmark_positions, procrustes_rotation, scatter_landmarks
+from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES, LipConstraints, build_lip_constraints
 from tts2face.face.shape_transfer import SCALE_LIMITS, append_shapes, spread_landmark_motion
 from tts2face.models.face import Face
 from tts2face.models.landmarks import LID_RINGS, LIP_LANDMARKS, N_MESH_LANDMARKS

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.face.deformation import axis_scales, landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.face.landmarks import axis_scales, landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.models.face import Eye, Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.numeric.arrays import append_rows
-from tts2face.numeric.splines import fit_local_interpolant
+from tts2face.numeric.local_splines import fit_local_interpolant
 from tts2face.storage.array_cache import computed_once
 
 DEFAULT_FACE = "head"

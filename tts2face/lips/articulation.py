@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lexicon.sequence import PhoneSequence
-from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
-from tts2face.face.mouth import MIDDLE_PAIR, LipConstraints, build_lip_constraints
+from tts2face.face.landmarks import landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.face.lip_constraints import MIDDLE_PAIR, LipConstraints, build_lip_constraints
 from tts2face.lips.articulation_tracks import articulation_tracks, pause_closure, seconds_from_closure
 from tts2face.lips.mouth_limits import close_lips, largest_gaps, limit_speed
 from tts2face.lips.teeth_and_tongue import IncisorContact, Tongue, build_incisor_contact, build_tongue, incisor_edge

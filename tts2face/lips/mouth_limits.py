@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tts2face.face.mouth import LipConstraints
+from tts2face.face.lip_constraints import LipConstraints
 from tts2face.numeric.arrays import FloatArray, ordered_product
 
 # Largest change of a shape's weight per second, .3 per 1/60 s; closing the lips afterwards adds a little. The fastest

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.face.mouth import MIDDLE_PAIR
+from tts2face.face.lip_constraints import MIDDLE_PAIR
 from tts2face.lips.retargeting import MAX_CONTACT_MM, Retargeter, build_retargeter
 from tts2face.lips.score_matching import scaled_scores
 from tts2face.models.face import Face

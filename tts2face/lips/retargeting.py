@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence
-from tts2face.face.deformation import landmark_motion, landmark_positions, procrustes_rotation
+from tts2face.face.landmarks import landmark_motion, landmark_positions, procrustes_rotation
+from tts2face.face.lip_constraints import MIDDLE_PAIR, SPEECH_SHAPE_PREFIXES
 from tts2face.face.mouth import (
     CHIN_LANDMARKS,
     CORNERS_LEFT,
     CORNERS_RIGHT,
-    MIDDLE_PAIR,
-    SPEECH_SHAPE_PREFIXES,
     VISIBLE,
     MouthWeights,
     landmark_weights,

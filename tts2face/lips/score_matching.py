@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.face.mouth import MIDDLE_PAIR
+from tts2face.face.lip_constraints import MIDDLE_PAIR
 from tts2face.models.score_map import N_SCORES, SCORE_SHAPES, ScoreMap, logistic
 from tts2face.numeric.arrays import FloatArray, ordered_product, smoothstep
 from tts2face.numeric.least_squares import bounded_least_squares

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tts2face.face.mouth import LipConstraints
+from tts2face.face.lip_constraints import LipConstraints
 from tts2face.models.face import Face
 from tts2face.models.face_schema import WIDE_OPEN
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, UPPER_LIP_INNER_MID

@@ -7,7 +7,7 @@ the shape of its pose.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tts2face.models.codec import Stored, StoredModel
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.models.view_transform import TABLE_SIDE
+from tts2face.numeric.arrays import make_read_only
 from tts2face.storage.model_pictures import encode_colours
 from tts2face.storage.schema import MAX_MM, Tensor
 
@@ -65,7 +66,7 @@ class HairTint:
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
-        _make_read_only(self)
+        make_read_only(self)
 
 
 def _tint_picture(tint: HairTint) -> NDArray[np.uint8]:
@@ -117,7 +118,7 @@ class HairLight(StoredModel):
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
-        _make_read_only(self)
+        make_read_only(self)
 
     @property
     def triangle_numbers(self) -> NDArray[np.int32]:
@@ -275,9 +276,3 @@ def equal_limits(most: float, n: int) -> NDArray[np.int8]:
     limits: NDArray[np.int8] = np.tile(np.array([-steps, steps], np.int8)[:, None, None], (1, 3, n))
     limits.setflags(write=False)  # as other limits are, so that kernels are compiled once
     return limits
-
-
-def _make_read_only(record: Any) -> None:
-    for one in fields(record):
-        if isinstance(array := getattr(record, one.name), np.ndarray):
-            array.setflags(write=False)

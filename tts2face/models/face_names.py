@@ -1,4 +1,4 @@
-"""Names of haircuts, and the face that is shown where none is named. The module imports no numeric library."""
+"""Names of haircuts, and the face that is shown where none is named; no numeric library is imported for them."""
 
 from pathlib import Path
 

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import make_read_only
+
 HEAD_GAIN = 0.75  # of the turns of a head, in a photograph
 HEAD_LIMIT_RAD = np.radians(9.0)
 SHIFT_GAIN = 0.45
@@ -32,9 +34,7 @@ class PhotoView:
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
-        for array in (self.view, self.lens, self.follow, self.alpha, self.behind):
-            if array is not None:
-                array.setflags(write=False)
+        make_read_only(self)
 
     @property
     def turn(self) -> NDArray[np.float64]:

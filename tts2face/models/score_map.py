@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from tts2face.models.codec import StoredModel, check_model, has_part, model_of
-from tts2face.numeric.arrays import ordered_product
+from tts2face.numeric.arrays import make_read_only, ordered_product
 from tts2face.storage.schema import Contents, Tensor
 from tts2face.types import Trajectory
 
@@ -72,8 +72,7 @@ class ScoreMap(StoredModel):
             or self.bias.shape != (N_SCORES,)
         ):
             raise DataError("the arrays of the score map do not fit each other; train it again")
-        for array in (self.hidden, self.hidden_bias, self.output, self.direct, self.bias):
-            array.setflags(write=False)
+        make_read_only(self)
 
     def logits(self, values: NDArray[np.floating]) -> FloatArray:
         """Logits (T, S) of the scores for inputs (T, K)."""

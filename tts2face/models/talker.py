@@ -16,6 +16,7 @@ from tts2face.models.codec import InHeader, StoredModel
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.score_map import ScoreMap
+from tts2face.numeric.arrays import make_read_only
 from tts2face.storage.schema import MAX_MM, Contents, Tensor, millimetres
 from tts2face.types import Trajectory
 
@@ -53,8 +54,7 @@ class ShapeModel(StoredModel):
         fits = self.mean.shape == (landmarks, 3) and self.basis.shape[2:] == (3,)
         if not fits or not self.spread.shape == self.rest.shape == (modes,) or not 0 < self.n_speech <= modes:
             raise DataError("the shape model's mean, basis, spread and rest do not fit each other; build it again")
-        for array in (self.mean, self.basis, self.spread, self.rest):
-            array.setflags(write=False)
+        make_read_only(self)
 
     @classmethod
     def check_stored(cls, contents: Contents, prefix: str) -> None:
@@ -95,9 +95,7 @@ class Utterance:
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
-        for array in (self.shape, self.head, self.intensity, self.appearance_parameters):
-            if array is not None:
-                array.setflags(write=False)
+        make_read_only(self)
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)

@@ -5,6 +5,7 @@ sRGB values and linear light (IEC 61966-2-1).
 
 import threading
 import weakref
+from dataclasses import fields
 from typing import Any, TypeVar
 
 import numpy as np
@@ -17,6 +18,13 @@ AnyFloat = TypeVar("AnyFloat", np.float32, np.float64)
 _N_USED: dict[int, int] = {}  # rows that arrays of `zeros_with_room` have given away, by their numbers
 _LOCK = threading.Lock()
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB, IEC 61966-2-1
+
+
+def make_read_only(record: Any) -> None:
+    """Lock the arrays of a dataclass against writing."""
+    for field in fields(record):
+        if isinstance(array := getattr(record, field.name), np.ndarray):
+            array.setflags(write=False)
 
 
 def ordered_product(a: NDArray[np.floating], b: NDArray[np.floating]) -> FloatArray:

@@ -4,8 +4,6 @@ All kernels of the package use these decorators. Compiled code is kept in the us
 module and of what it takes from others, the processor, and the compiler: installations of the same code share it, and a
 changed module is never used with the code of an earlier one. If the folder cannot be written, a private temporary
 folder takes its place. A process whose kernels are all in the cache imports neither numba nor LLVM.
-
-Switch for ONNX Runtime's telemetry, which would send data and write to the user's home folder.
 """
 
 import ctypes
@@ -50,7 +48,6 @@ CODES = {"O": ctypes.py_object, "?": ctypes.c_bool, "d": ctypes.c_double, "f": c
 BLOCK = 8  # entries that `write_larger` writes at once
 _loading = threading.RLock()
 _stamps: dict[str, str] = {}  # by the path of the module
-VARIABLE = "ORT_DISABLE_TELEMETRY"  # read when the native library is loaded
 
 
 class Intrinsic:
@@ -333,20 +330,3 @@ def _private_folder() -> Path:
 
 
 FOLDER = cache_folder()
-
-
-def disable_telemetry() -> None:
-    """Switch ONNX Runtime's telemetry off; call this before every import of the library.
-
-    By default, ONNX Runtime writes a device id and an event database under ``~/.cache/Microsoft`` and uploads events.
-    The environment variable acts if the library is not loaded yet, the library's own function if it is. Without ONNX
-    Runtime the call has no effect.
-    """
-    os.environ[VARIABLE] = "1"
-    try:
-        runtime = importlib.import_module("onnxruntime")
-    except ImportError:
-        return
-    disable = getattr(runtime, "disable_telemetry_events", None)  # missing in some builds
-    if disable is not None:
-        disable()

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.face.landmarks import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.models.face import Face, FacePart
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.light import Photographed

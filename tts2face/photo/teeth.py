@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
 from lexicon.errors import DataError
-from tts2face.face.deformation import landmark_positions, scatter_landmarks
+from tts2face.face.landmarks import landmark_positions, scatter_landmarks
 from tts2face.models.face import Face
 from tts2face.models.landmarks import UPPER_LIP_INNER_MID
 from tts2face.numeric.arrays import decode_srgb, encode_srgb, points_in_polygon, smoothstep

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.face.deformation import landmark_positions
+from tts2face.face.landmarks import landmark_positions
 from tts2face.models.face import Face
 from tts2face.models.landmarks import CHIN
 from tts2face.models.light import Photographed

@@ -14,14 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.face.deformation import moved_landmarks
+from tts2face.face.appearance_regression import AppearanceRegression, fit_appearance_regression
 from tts2face.face.gestures import SPEECH_GAINS, GestureFace, gesture_face
-from tts2face.face.own_face import (
-    AppearanceRegression,
-    OwnFaceGestures,
-    build_own_face_gestures,
-    fit_appearance_regression,
-)
+from tts2face.face.landmarks import moved_landmarks
+from tts2face.face.own_face import OwnFaceGestures, build_own_face_gestures
 from tts2face.lips.articulation import DEFAULT_ARTICULATION, Articulator, build_articulator
 from tts2face.lips.cloning import build_parameter_transfer, extend_talker
 from tts2face.lips.exemplar import (

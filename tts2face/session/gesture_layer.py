@@ -10,7 +10,8 @@ from hashlib import blake2b
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.face.body import Body, phrase_starts
+from tts2face.face.body import Body
+from tts2face.face.breathing import phrase_starts
 from tts2face.face.gestures import SPEECH_GAINS
 from tts2face.gestures.elements import interpolate_keys
 from tts2face.gestures.gaze import microsaccades

@@ -19,7 +19,7 @@ from lexicon.errors import BackendError
 from lexicon.phones import PHONES, nearest_phones
 from lexicon.pronounce import PAUSES_S, Word
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tts2face.numeric.kernels import disable_telemetry
+from tts2face.numeric.telemetry import disable_telemetry
 from tts2face.sound.transforms import import_hibari
 from tts2face.sound.voice import (
     NativeRun,

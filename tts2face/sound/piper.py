@@ -23,7 +23,7 @@ from lexicon.pronounce import Word
 from lexicon.scripts import check_script
 from lexicon.sequence import PhoneSequence, WordSpan
 from lexicon.values.json_text import read_json
-from tts2face.numeric.kernels import disable_telemetry
+from tts2face.numeric.telemetry import disable_telemetry
 from tts2face.sound.alignment import Align, Aligner
 from tts2face.sound.voice import (
     PronunciationMap,

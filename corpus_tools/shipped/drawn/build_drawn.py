@@ -38,7 +38,9 @@ from corpus_tools.shipped.head.skin import HeadSkin, build_shoulders, build_skin
 from corpus_tools.shipped.head.source import SourceMesh
 from corpus_tools.shipped.head.tongue import tongue_piece
 from corpus_tools.training.calibrate_file import calibrate_face_file
-from tts2face.face.body import BREATH_SHAPE, LIMIT_RAD, PUPIL_SHAPE
+from tts2face.face.breathing import BREATH_SHAPE
+from tts2face.face.hair_swing import LIMIT_RAD
+from tts2face.face.pupils import PUPIL_SHAPE
 from tts2face.models.face import Face, Hairdo, Texture
 from tts2face.models.face_file import write_face
 from tts2face.models.lit_hair import SWING_SHAPES

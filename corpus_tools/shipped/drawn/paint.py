@@ -191,10 +191,6 @@ def _brow_hairs(place: Floats, brow: Brow) -> Floats:
     return np.asarray(1 - uncovered)
 
 
-def _as_bytes(colours: Floats) -> NDArray[np.uint8]:
-    return np.asarray(np.rint(255 * np.clip(colours, 0, 1)), np.uint8)
-
-
 def paint_eye(style: EyeStyle, palette: CharacterColours) -> NDArray[np.uint8]:
     """(TEXTURE_SIDE, TEXTURE_SIDE, 3) texture of an eyeball: a dark ring, a light crescent opposite the key light."""
     grid = (np.arange(TEXTURE_SIDE) + 0.5) / TEXTURE_SIDE - 0.5
@@ -221,4 +217,4 @@ def paint_eye(style: EyeStyle, palette: CharacterColours) -> NDArray[np.uint8]:
     white = np.array(palette.sclera) * (1 - far * np.array([0.05, 0.11, 0.11]))
     white = white * (1 - 0.12 * np.exp(-(((off - style.iris) / 0.05) ** 2))[..., None])
     border = smoothstep(off, style.iris - 0.012, style.iris + 0.020)[..., None]
-    return _as_bytes(iris + border * (white - iris))
+    return np.asarray(np.rint(255 * np.clip(iris + border * (white - iris), 0, 1)), np.uint8)

@@ -56,7 +56,7 @@ def bake_poses(
     rest = [_displayed(TexelBake(scene, parts, effort.side).light(effort.rest)) for parts in (SKIN, FAR)]
     far_other = _bake_other_hair(scene, other_hair.vertices, effort)
     bakes = [TexelBake(scene, parts, effort.pose_side) for parts in (SKIN, FAR)]
-    small = _small_parts(scene)
+    small = [name for name in scene.objects if name not in (*SKIN, *FAR) and not name.startswith("cornea")]
     light: tuple[list[Float32Array], ...] = ([], [], [], [])
     for pose in poses:
         report(pose.name)
@@ -117,10 +117,6 @@ def bake_backdrop(scene: FilmScene, effort: Effort) -> NDArray[np.uint8]:
 
 def _pose(scene: FilmScene, pose: LitPose) -> None:
     scene.pose(pose.weights, pose.head, turns_eyes=False)
-
-
-def _small_parts(scene: FilmScene) -> list[str]:
-    return [name for name in scene.objects if name not in (*SKIN, *FAR) and not name.startswith("cornea")]
 
 
 def _small_light(scene: FilmScene, small: Sequence[str], effort: Effort) -> Float32Array:

@@ -61,7 +61,7 @@ def paint_texture(
     where = texels.interpolate(skin.source_uv)
     colour = _flesh(place, where, source, palette, generator)
     lips = sample_mask(gaussian_filter(source.mask("lips"), 5.0), where)
-    colour += _lip_share(lips)[:, None] * (_lip_colour(place, palette, generator) - colour)
+    colour += (0.88 * smoothstep(lips, 0.12, 0.93))[:, None] * (_lip_colour(place, palette, generator) - colour)
     inside = np.maximum(sample_mask(gaussian_filter(source.mask("inside-mouth"), 2.0), where), in_mouth(where))
     colour += smoothstep(inside, 0.15, 0.95)[:, None] * (_cavity_colour(place, palette) - colour)
     for edge in lids:
@@ -109,10 +109,6 @@ def _freckles(place: Floats, generator: np.random.Generator) -> Floats:
         near = tree.query_ball_point(centre, 2.2 * size)
         spots[near] += generator.uniform(0.15, 0.7) * np.exp(-(((place[near] - centre) / size) ** 2).sum(axis=1))
     return np.clip(spots, 0, 1)
-
-
-def _lip_share(mask: Floats) -> Floats:
-    return 0.88 * smoothstep(mask, 0.12, 0.93)
 
 
 def _lip_colour(place: Floats, palette: HeadColours, generator: np.random.Generator) -> Floats:

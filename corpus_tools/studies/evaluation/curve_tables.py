@@ -2,9 +2,8 @@
 
 from collections.abc import Iterator
 
-from corpus_tools.measures.intervals import IntervalEstimate
 from corpus_tools.studies.evaluation.curve import ChoiceEstimate, CurveDifference, LearningCurve
-from corpus_tools.studies.evaluation.people_tables import FIGURE_HEADS
+from corpus_tools.studies.evaluation.people_tables import FIGURE_HEADS, interval_text
 from corpus_tools.studies.report import markdown_table
 
 CSV_HEAD = ("table", "seconds", "method", "minus", "figure", "value", "low", "high", "deviation")
@@ -19,20 +18,28 @@ def curve_tables(curve: LearningCurve) -> str:
 
 def figure_rows(curve: LearningCurve, figure: str) -> list[tuple[str, ...]]:
     """Heads, and a row for each amount: mean and standard deviation over the choices, one method a column."""
-    rows: list[tuple[str, ...]] = [("own material (s)", "choices", *curve.methods)]
-    for point in curve.points:
-        cells = (_estimate_text(point.figures[method][figure]) for method in curve.methods)
-        rows.append((f"{point.seconds:.0f}", str(point.n_choices), *cells))
-    return rows
+    return [
+        ("own material (s)", "choices", *curve.methods),
+        *(
+            (
+                f"{point.seconds:.0f}",
+                str(point.n_choices),
+                *(_estimate_text(point.figures[method][figure]) for method in curve.methods),
+            )
+            for point in curve.points
+        ),
+    ]
 
 
 def gain_rows(curve: LearningCurve) -> list[tuple[str, ...]]:
     """Heads, and a row for each amount and other method: differences of the first method with 95 % intervals."""
-    rows: list[tuple[str, ...]] = [("own material (s)", f"{curve.methods[0]} minus", *HEADS.values())]
-    for gain in curve.gains:
-        cells = (_interval_text(gain.figures[name]) for name in HEADS)
-        rows.append((f"{gain.seconds:.0f}", gain.minus, *cells))
-    return rows
+    return [
+        ("own material (s)", f"{curve.methods[0]} minus", *HEADS.values()),
+        *(
+            (f"{gain.seconds:.0f}", gain.minus, *(interval_text(gain.figures[name], signed=True) for name in HEADS))
+            for gain in curve.gains
+        ),
+    ]
 
 
 def monotony(curve: LearningCurve) -> str:
@@ -69,7 +76,3 @@ def _step_text(difference: CurveDifference) -> str:
 def _estimate_text(estimate: ChoiceEstimate) -> str:
     value = f"{round(estimate.value, 3) + 0.0:.3f}"  # no minus before 0.000
     return value if estimate.deviation is None else f"{value} ± {estimate.deviation:.3f}"
-
-
-def _interval_text(interval: IntervalEstimate) -> str:
-    return f"{interval.value:+.3f} ({interval.low:+.3f} to {interval.high:+.3f})"

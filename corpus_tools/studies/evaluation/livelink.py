@@ -10,7 +10,7 @@ from corpus_tools.recordings.observation import Observation, Quality, trim_to_pi
 from corpus_tools.recordings.sound import CachedAligner
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
-from tts2face.face.deformation import moved_landmarks
+from tts2face.face.landmarks import moved_landmarks
 from tts2face.lips.performer import match_shapes
 from tts2face.models.face_loading import load_face
 from tts2face.sound.pauses import cut_at_pauses

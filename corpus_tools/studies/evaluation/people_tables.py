@@ -15,31 +15,40 @@ CSV_HEAD = ("table", "method", "figure", "value", "low", "high")
 
 def people_table(found: PeopleEvaluation) -> str:
     """Markdown table of the figures with their intervals, one method a line."""
-    rows = [("method", *(head for _, head in FIGURE_HEADS), "r opening, phones recorded", "not recorded")]
-    for method, figures in found.figures.items():
-        cells = (_interval_text(figures[name], signed=False) for name, _ in FIGURE_HEADS)
-        rows.append((method, *cells, *(_plain_text(value) for value in found.heard[method])))
-    return markdown_table(rows)
+    head = ("method", *(head for _, head in FIGURE_HEADS), "r opening, phones recorded", "not recorded")
+    rows = (
+        (
+            method,
+            *(interval_text(figures[name]) for name, _ in FIGURE_HEADS),
+            *(_plain_text(value) for value in found.heard[method]),
+        )
+        for method, figures in found.figures.items()
+    )
+    return markdown_table([head, *rows])
 
 
 def difference_table(found: PeopleEvaluation, method: str) -> str:
     """Markdown table of the differences of a method from the others, with paired intervals."""
-    rows = [(f"{method} minus", *(head for _, head in FIGURE_HEADS))]
-    for (difference, other), values in found.differences.items():
-        if difference == method:
-            rows.append((other, *(_interval_text(values[name], signed=True) for name, _ in FIGURE_HEADS)))
-    return markdown_table(rows)
+    rows = (
+        (other, *(interval_text(values[name], signed=True) for name, _ in FIGURE_HEADS))
+        for (difference, other), values in found.differences.items()
+        if difference == method
+    )
+    return markdown_table([(f"{method} minus", *(head for _, head in FIGURE_HEADS)), *rows])
 
 
 def phone_table(found: PeopleEvaluation, methods: Sequence[str]) -> str:
     """Markdown table of mean opening and width by phone in z, recorded and of some methods."""
-    rows = [("phone", "tokens", "in the talker", "recorded: opening, width", *methods)]
-    for phone in found.phones:
-        cells = (_pair_text(phone.made[method]) for method in methods)
-        rows.append(
-            (phone.phone, str(phone.n_tokens), "yes" if phone.is_heard else "no", _pair_text(phone.real), *cells)
+    rows = (
+        (
+            phone.phone,
+            str(phone.n_tokens),
+            "yes" if phone.is_heard else "no",
+            *(_pair_text(pair) for pair in (phone.real, *(phone.made[method] for method in methods))),
         )
-    return markdown_table(rows)
+        for phone in found.phones
+    )
+    return markdown_table([("phone", "tokens", "in the talker", "recorded: opening, width", *methods), *rows])
 
 
 def people_rows(found: PeopleEvaluation) -> Iterator[tuple[str, ...]]:
@@ -53,7 +62,8 @@ def people_rows(found: PeopleEvaluation) -> Iterator[tuple[str, ...]]:
             yield f"minus {other}", difference, name, *_interval_cells(value)
 
 
-def _interval_text(value: IntervalEstimate, *, signed: bool) -> str:
+def interval_text(value: IntervalEstimate, *, signed: bool = False) -> str:
+    """A figure with its interval in brackets."""
     sign = "+" if signed else ""
     return f"{value.value:{sign}.3f} ({value.low:{sign}.3f} to {value.high:{sign}.3f})"
 

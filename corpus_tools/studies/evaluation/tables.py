@@ -94,12 +94,13 @@ class Evaluation:
 def figure_rows(scores: Sequence[Scores], *, intervals: bool = False) -> list[tuple[str, ...]]:
     """Heads of a table of figures, and a row for each method."""
     heads = available_figures(scores)
-    rows = [("method", *(head for _, head, _ in heads))]
-    for score in scores:
-        rows.append(
+    return [
+        ("method", *(head for _, head, _ in heads)),
+        *(
             (score.method, *(figure_text(score, name, digits, intervals=intervals) for name, _, digits in heads))
-        )
-    return rows
+            for score in scores
+        ),
+    ]
 
 
 def class_rows(scores: Sequence[Scores]) -> list[tuple[str, ...]]:

@@ -6,7 +6,8 @@ import numpy as np
 
 from corpus_tools.studies.gestures.measures import Doubles
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.face.body import BREATH_SHAPE, DILATION, PUPIL_SHAPE, Breathing, Pupils
+from tts2face.face.breathing import BREATH_SHAPE, Breathing
+from tts2face.face.pupils import DILATION, PUPIL_SHAPE, Pupils
 from tts2face.gestures.gaze import microsaccades
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.types import Trajectory

@@ -13,8 +13,8 @@ from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
 from corpus_tools.training.score_map import read_scores
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE
-from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
-from tts2face.face.mouth import MIDDLE_PAIR
+from tts2face.face.landmarks import landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.face.lip_constraints import MIDDLE_PAIR
 from tts2face.lips.motion_measures import correlation, range_ratio, speech_frames
 from tts2face.lips.performer import build_performer_retargeter
 from tts2face.lips.retargeting import BILABIALS

@@ -17,7 +17,7 @@ from corpus_tools.studies.evaluation.page import evaluation_page
 from corpus_tools.studies.evaluation.tables import Evaluation
 from lexicon.errors import InputError
 from tests.corpus_tools.speaking import observation
-from tts2face.face.deformation import moved_landmarks
+from tts2face.face.landmarks import moved_landmarks
 from tts2face.models.face_loading import load_face
 from tts2face.types import Trajectory
 

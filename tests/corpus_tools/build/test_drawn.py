@@ -5,8 +5,8 @@ import pytest
 
 from corpus_tools.shipped.drawn.build_drawn import BODY_SHAPES, CAST, drawn_face
 from tests.interchange.characters.makehuman import makehuman
-from tts2face.face.body import BREATH_SHAPE
-from tts2face.face.deformation import landmark_motion, landmark_positions
+from tts2face.face.breathing import BREATH_SHAPE
+from tts2face.face.landmarks import landmark_motion, landmark_positions
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID

@@ -5,7 +5,7 @@ import pytest
 
 from corpus_tools.decomposition.marker_sets import MarkerSet, read_marker_set
 from tests.corpus_tools.decomposition.made_markers import FPS, Made, made_take
-from tts2face.face.deformation import moved_landmarks
+from tts2face.face.landmarks import moved_landmarks
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.types import Trajectory

@@ -18,7 +18,7 @@ from corpus_tools.decomposition.recordings import read_sound_span
 from lexicon.errors import DataError, InputError
 from tests.face.posing import posed_vertices
 from tests.rendered_takes import write_sound
-from tts2face.face.deformation import moved_landmarks, rest_landmarks
+from tts2face.face.landmarks import moved_landmarks, rest_landmarks
 from tts2face.lips.performer import match_shapes
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_LANDMARKS

@@ -21,8 +21,8 @@ from corpus_tools.decomposition.derived_styles import read_derived_styles
 from corpus_tools.decomposition.learnt_style import add_style
 from corpus_tools.decomposition.regions import feature_landmarks
 from lexicon.errors import DataError, InputError
-from tts2face.face.deformation import axis_ratios, moved_landmarks, rest_landmarks
 from tts2face.face.expressions import expression_landmarks
+from tts2face.face.landmarks import axis_ratios, moved_landmarks, rest_landmarks
 from tts2face.models.face import Face
 from tts2face.models.landmarks import EYELID_LANDMARKS, MOUTH_REGION
 from tts2face.models.palette import EXPRESSIONS, PLAIN, REGION_FEATURES, Delivery

@@ -13,9 +13,9 @@ from corpus_tools.decomposition.stills import Still, find_stills
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
 from tests.corpus_tools.decomposition.made_markers import Made, made_take, write_c3d, write_table
-from tts2face.face.deformation import moved_landmarks
 from tts2face.face.expressions import add_expression_shapes, expression_weights
-from tts2face.face.mouth import build_lip_constraints
+from tts2face.face.landmarks import moved_landmarks
+from tts2face.face.lip_constraints import build_lip_constraints
 from tts2face.models.face import Face
 from tts2face.models.palette import EXPRESSIONS
 from tts2face.models.palette_file import load_palette, read_palette

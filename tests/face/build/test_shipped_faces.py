@@ -5,10 +5,12 @@ import pytest
 
 from tests.face.people import LIT, REALISTIC
 from tests.face.posing import posed_vertices
-from tts2face.face.body import BREATH_SHAPE, PUPIL_SHAPE, SWING_SHAPES
+from tts2face.face.breathing import BREATH_SHAPE
+from tts2face.face.pupils import PUPIL_SHAPE
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.light import Baked
+from tts2face.models.lit_hair import SWING_SHAPES
 from tts2face.storage.shipped import find_file
 
 UPPER_LID, LOWER_LID = (159, 386), (145, 374)  # right and left eye, in the middle

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from tts2face.face.deformation import landmark_positions
+from tts2face.face.landmarks import landmark_positions
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.face.posing import posed_vertices
-from tts2face.face.deformation import landmark_positions, scatter_landmarks
-from tts2face.face.mouth import MIDDLE_PAIR
+from tts2face.face.landmarks import landmark_positions, scatter_landmarks
+from tts2face.face.lip_constraints import MIDDLE_PAIR
 from tts2face.lips.articulation import build_articulator
 from tts2face.lips.articulation_tracks import articulation_tracks, pause_closure, seconds_from_closure
 from tts2face.lips.exemplar import ExemplarModel, select_tokens

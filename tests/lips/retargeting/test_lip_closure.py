@@ -5,9 +5,9 @@ import pytest
 from numpy.typing import NDArray
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.face.gestures import gesture_face
-from tts2face.face.mouth import build_lip_constraints
+from tts2face.face.landmarks import landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.face.lip_constraints import build_lip_constraints
 from tts2face.lips.articulation_tracks import MIN_CLOSURE_S, seconds_from_closure
 from tts2face.lips.exemplar import ExemplarModel, select_tokens
 from tts2face.lips.mouth_limits import LARGEST_SPEED_PER_S, close_lips, largest_gaps, limit_speed

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tts2face
-from tts2face.face.deformation import moved_landmarks
+from tts2face.face.landmarks import moved_landmarks
 from tts2face.lips.performer import build_performer_retargeter
 from tts2face.models.score_map import SCORE_SHAPES
 from tts2face.types import Trajectory

@@ -9,7 +9,7 @@ from PIL import Image
 from lexicon.errors import DataError, InputError
 from tests.face.people import LIT
 from tests.photo.pictures import SMILE, still
-from tts2face.face.deformation import moved_landmarks
+from tts2face.face.landmarks import moved_landmarks
 from tts2face.models.face import Face
 from tts2face.models.landmarks import inner_lip_gaps, lip_opening, lip_width
 from tts2face.photo.face_from_photo import face_from_photo

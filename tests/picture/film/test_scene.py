@@ -16,8 +16,8 @@ from tests.picture.film.lit_face import (
     WALL,
     lit_tiny_face,
 )
-from tts2face.face.body import DILATION, PUPIL_SHAPE
 from tts2face.face.deformation import REST_HEAD
+from tts2face.face.pupils import DILATION, PUPIL_SHAPE
 from tts2face.models.face import Texture, keep_parts
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.light import Baked, Lamps

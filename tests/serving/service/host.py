@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from tts2face.numeric.kernels import disable_telemetry
+from tts2face.numeric.telemetry import disable_telemetry
 from tts2face.serving.service import job_service
 from tts2face.serving.service import pool as service_pool
 from tts2face.serving.service import state as service_state

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.face.deformation import landmark_motion
-from tts2face.face.mouth import SPEECH_SHAPE_PREFIXES
+from tts2face.face.landmarks import landmark_motion
+from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES
 from tts2face.interchange.characters.binding import character_file, read_binding
 from tts2face.interchange.characters.bone_tracks import BoneTracks, FloatArray, Track
 from tts2face.interchange.characters.character import Character, MorphTarget

@@ -5,17 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from lexicon.errors import DataError
-from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
-from tts2face.face.expressions import (
-    BLINK_SHAPES,
-    GAZE_SHAPES,
-    LID_LANDMARK_PAIRS,
-    WIDE_SHAPES,
-    add_expression_shapes,
-    build_eyelid_model,
-    expression_table,
-)
-from tts2face.face.mouth import build_lip_constraints
+from tts2face.face.expressions import GAZE_SHAPES, add_expression_shapes, expression_table
+from tts2face.face.eyelids import BLINK_SHAPES, LID_LANDMARK_PAIRS, WIDE_SHAPES, build_eyelid_model
+from tts2face.face.landmarks import landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.face.lip_constraints import build_lip_constraints
 from tts2face.face.shape_transfer import default_head, eye_distance
 from tts2face.interchange.characters.character import Character
 from tts2face.interchange.characters.head_mesh import HeadMesh

@@ -5,8 +5,9 @@ import io
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.face.deformation import build_rig, scatter_landmarks
-from tts2face.face.expressions import BLINK_SHAPES
+from tts2face.face.deformation import build_rig
+from tts2face.face.eyelids import BLINK_SHAPES
+from tts2face.face.landmarks import scatter_landmarks
 from tts2face.interchange.characters.shape_names import VISEME_PREFIX
 from tts2face.models.face import Face
 from tts2face.models.landmarks import (

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.face.mouth import SPEECH_SHAPE_PREFIXES
+from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES
 from tts2face.interchange.characters.atlas import CUTOUT, Atlas, build_atlas, srgb, triangle_opacity
 from tts2face.interchange.characters.character import OPAQUE, Character, Material
 from tts2face.interchange.characters.eyeballs import eyeball_centres, fit_sphere, gaze_turns

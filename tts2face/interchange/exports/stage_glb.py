@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.face.deformation import landmark_positions
+from tts2face.face.landmarks import landmark_positions
 from tts2face.face.rest_light import in_rest_light
 from tts2face.interchange.exports.skeleton import HEAD, Skeleton, build_skeleton
 from tts2face.interchange.exports.stage_surfaces import stage_surfaces

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.face.body import DILATION, PUPIL_SHAPE
 from tts2face.face.deformation import eye_rotations, head_transform
+from tts2face.face.pupils import DILATION, PUPIL_SHAPE
 from tts2face.models.baked_light import LEAST_SIDE, N_BALL_TERMS, N_PAGES, N_TERMS, BakedLight, equal_limits
 from tts2face.models.face import Face
 from tts2face.models.light import Lit

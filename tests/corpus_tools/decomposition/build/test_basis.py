@@ -11,7 +11,7 @@ from corpus_tools.decomposition.markers import read_marker_face
 from corpus_tools.decomposition.stills import PictureReader, Still, build_marker_reader, find_stills, parse_stills
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.decomposition.made_markers import SIZE, made_take, write_table
-from tts2face.face.deformation import moved_landmarks, rest_landmarks
+from tts2face.face.landmarks import moved_landmarks, rest_landmarks
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.palette import EXPRESSIONS

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.interchange.characters.made import Variant, shipped_head, write_character_file, write_landmarks
-from tts2face.face.deformation import landmark_motion, scatter_landmarks
+from tts2face.face.landmarks import landmark_motion, scatter_landmarks
 from tts2face.interchange.characters.importing import import_face
 from tts2face.interchange.characters.saving import save_face
 from tts2face.models.face import Face

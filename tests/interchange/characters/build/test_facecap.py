@@ -9,7 +9,7 @@ import pytest
 from tests.interchange.characters.build.test_animation import Played
 from tests.interchange.exports import programs
 from tests.packages import package
-from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.face.landmarks import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.interchange.characters.animation import write_character
 from tts2face.interchange.characters.gltf_reader import read_gltf_character
 from tts2face.interchange.characters.importing import ImportedFace, import_face

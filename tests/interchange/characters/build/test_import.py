@@ -18,8 +18,8 @@ from tests.interchange.characters.made import (
     write_character_file,
     write_landmarks,
 )
-from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.face.gestures import gesture_face
+from tts2face.face.landmarks import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.interchange.characters.importing import ImportedFace, import_face
 from tts2face.interchange.characters.landmark_table import landmark_table, read_landmark_table
 from tts2face.interchange.characters.saving import save_face

@@ -7,7 +7,7 @@ import pytest
 
 from tests.interchange.characters.build.test_animation import Played, made_clip
 from tests.interchange.characters.makehuman import makehuman, write_obj_folder, write_rigged
-from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.face.landmarks import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.face.shape_transfer import eye_distance
 from tts2face.interchange.characters.animation import write_character
 from tts2face.interchange.characters.importing import ImportedFace, import_face

@@ -7,7 +7,7 @@ from tests.face.people import DRAWN, PEOPLE, load_plain
 from tests.lips.retargeting.test_articulation import Spoken, tooth_distance
 from tests.lips.retargeting.test_articulation import sequence as articulated
 from tests.lips.retargeting.test_lip_closure import CLOSED_MM, FPS, TEXTS, gaps_of, middles, sequence, speak
-from tts2face.face.mouth import build_lip_constraints
+from tts2face.face.lip_constraints import build_lip_constraints
 from tts2face.lips.exemplar import ExemplarModel
 from tts2face.models.talker import Talker
 
