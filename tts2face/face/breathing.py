@@ -22,7 +22,7 @@ REST_CYCLE_S = (3.4, 4.8)  # between breaths at rest: 12 to 18 a minute
 REST_DEPTH = 0.7  # of a breath at rest
 LOWEST = 0.1
 JAW_SHAPE, PARTED = "jawOpen", 0.07  # weight at which a mouth that was closed draws breath
-PARTS_S, CLOSES_S = 0.3, 0.05  # before the first phone: begin and end, so that its closure is the phone's own
+PARTS_S, CLOSES_S = 0.3, 0.05  # before the first phone: start and end, so that its closure is the phone's own
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,12 +70,12 @@ def phrase_starts(phones: PhoneSequence) -> list[float]:
     """Seconds at which speech begins after a pause, or at the beginning of a piece."""
     starts, silence = [], math.inf
     for number, phone in enumerate(phones.phones):
-        begin, end = float(phones.edges[number]), float(phones.edges[number + 1])
+        start, end = float(phones.edges[number]), float(phones.edges[number + 1])
         if phone == SILENCE:
-            silence = (silence if number == 0 else 0.0) + end - begin
+            silence = (silence if number == 0 else 0.0) + end - start
         else:
             if silence >= LEAST_PAUSE_S:
-                starts.append(begin)
+                starts.append(start)
             silence = 0.0
     return starts
 

@@ -65,7 +65,7 @@ class AudioMap:
     def __post_init__(self) -> None:
         """Check that the shapes of all arrays agree."""
         sizes = [(self.before + 1 + self.after) * len(self.mean), *map(len, self.biases)]
-        fits = [one.shape for one in self.weights] == [(outer, inner) for inner, outer in pairwise(sizes)]
+        fits = [layer.shape for layer in self.weights] == [(outer, inner) for inner, outer in pairwise(sizes)]
         fits = fits and len(self.weights) in (2, 3)
         if not fits or self.spread.shape != self.mean.shape or min(self.before, self.after) < 0:
             raise DataError(f"the parts of the audio map of {self.feature} do not fit each other; train it again")

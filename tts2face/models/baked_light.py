@@ -78,7 +78,7 @@ TINT = Stored(Tensor("uint8", ("bytes of tint",), is_optional=True), encode=_tin
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class HairLight(StoredModel):
-    """What of a face's light depends on its haircut.
+    """Part of a face's light that depends on its haircut.
 
     Attributes
     ----------
@@ -230,7 +230,7 @@ class BakedLight(HairLight):
 
     def with_hair(self, worn: HairLight) -> "BakedLight":
         """Light of the face with another haircut, of which the skin's change from cameras is beside this one's."""
-        new = {one.name: getattr(worn, one.name) for one in fields(HairLight)}
+        new = {field.name: getattr(worn, field.name) for field in fields(HairLight)}
         n = worn.turn_side**2
         if n < min(self.camera_modes.shape[2], worn.camera_modes.shape[2]):
             own = (self.camera_sizes / worn.camera_sizes)[:, None, None] * self.camera_modes[:, :, :n]

@@ -62,7 +62,7 @@ def _tinted(light: BakedLight, tint: HairTint, srgb: NDArray[np.float64]) -> Bak
     side, (high, wide) = light.pages.shape[1], tint.pages.shape[1:3]
     pages = light.pages.copy()
     own = pages[1, : high * side // wide]
-    known = [own.copy(), *(resized(one, own.shape[1::-1]) for one in tint.pages)]
+    known = [own.copy(), *(resized(page, own.shape[1::-1]) for page in tint.pages)]
     small = (light.turn_side, high * light.turn_side // wide)
     before = resized(own, small)
     curves = [*zip(*grey_curves(light.view), strict=True)]

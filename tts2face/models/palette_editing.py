@@ -83,7 +83,7 @@ def mix_styles(palette: Palette, mix: StyleMix) -> Derivation:
                 f"there is no derived style {name[:40]!r} in the palette; it has {', '.join(palette.derivations)}"
             )
     changes = {feature: _mixed_change(palette, mix, feature) for feature in FEATURES}
-    kept = {name: one for name, one in changes.items() if one != FeatureChange()}
+    kept = {name: change for name, change in changes.items() if change != FeatureChange()}
     return Derivation(mix.source, kept, _summary(mix), _mixed_delivery(palette, mix))
 
 
@@ -137,10 +137,10 @@ def rename_style(palette: Palette, name: str, new: str) -> Palette:
     require_own(palette, name)
     names = {name: check_new_style(palette, new)}
     derivations = {
-        names.get(one, one): replace(derived, source=names.get(derived.source, derived.source))
-        for one, derived in palette.derivations.items()
+        names.get(old, old): replace(derived, source=names.get(derived.source, derived.source))
+        for old, derived in palette.derivations.items()
     }
-    styles = {names.get(one, one): style for one, style in palette.styles.items()}
+    styles = {names.get(old, old): style for old, style in palette.styles.items()}
     return replace(palette, styles=styles, derivations=derivations)
 
 
@@ -153,13 +153,13 @@ def remove_style(palette: Palette, name: str) -> Palette:
         There is no such style, other styles are derived from it, or it is the only recorded one.
     """
     require_own(palette, name)
-    dependent = [one for one, derived in palette.derivations.items() if derived.source == name and one != name]
+    dependent = [other for other, derived in palette.derivations.items() if derived.source == name and other != name]
     if dependent and name in palette.styles:
         raise InputError(f"{', '.join(dependent)} is derived from {name}; delete what is derived from it first")
-    styles = {one: style for one, style in palette.styles.items() if one != name}
+    styles = {other: style for other, style in palette.styles.items() if other != name}
     if not styles:
         raise InputError(f"{name} is the only recorded style of the palette; delete the palette")
-    derivations = {one: derived for one, derived in palette.derivations.items() if one != name}
+    derivations = {other: derived for other, derived in palette.derivations.items() if other != name}
     return replace(palette, styles=styles, derivations=derivations)
 
 
