@@ -12,9 +12,8 @@ from cli.progress import compilation_messages, progress_bar
 from lexicon.errors import InputError
 from tts2face.picture.options import Picture
 from tts2face.processes.collection import resume_collection
-from tts2face.request import OWN_FACE, Request
+from tts2face.request import OWN_FACE, FromPhones, Recorded, Request, Spoken
 from tts2face.session.named_models import Models
-from tts2face.source import FromPhones, Recorded, Spoken
 from tts2face.storage.files import write_atomically
 from tts2face.storage.output_paths import check_file_name, refuse_overwriting
 

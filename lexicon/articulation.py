@@ -4,8 +4,7 @@ import functools
 from dataclasses import dataclass, fields
 from types import MappingProxyType
 
-from lexicon.phone_table import HEIGHTS, Phone
-from lexicon.phones import PHONES, look_up_phone
+from lexicon.phones import HEIGHTS, PHONES, Phone, look_up_phone
 
 # Rounding of rounded vowels: the closer the vowel, the smaller and further forward the mouth (Laver 1994, ch. 10).
 _ROUNDING_OF_CLOSE_VOWEL, _ROUNDING_OF_OPEN_VOWEL = 1.0, 0.5

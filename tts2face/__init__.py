@@ -34,7 +34,13 @@ if TYPE_CHECKING:
     from tts2face.models.talker_file import load_talker as load_talker
     from tts2face.photo.face_from_photo import face_from_photo as face_from_photo
     from tts2face.picture.options import Picture as Picture
+    from tts2face.request import FromPhones as FromPhones
+    from tts2face.request import FromSound as FromSound
+    from tts2face.request import Idle as Idle
+    from tts2face.request import Listening as Listening
+    from tts2face.request import Recorded as Recorded
     from tts2face.request import Request as Request
+    from tts2face.request import Spoken as Spoken
     from tts2face.serving.batch.cast import Cast as Cast
     from tts2face.serving.batch.cast import read_cast as read_cast
     from tts2face.serving.batch.options import BatchOptions as BatchOptions
@@ -64,12 +70,6 @@ if TYPE_CHECKING:
     from tts2face.session.project_file import save_project as save_project
     from tts2face.session.session import Session as Session
     from tts2face.session.speech_stream import Piece as Piece
-    from tts2face.source import FromPhones as FromPhones
-    from tts2face.source import FromSound as FromSound
-    from tts2face.source import Idle as Idle
-    from tts2face.source import Listening as Listening
-    from tts2face.source import Recorded as Recorded
-    from tts2face.source import Spoken as Spoken
     from tts2face.types import Chunk as Chunk
     from tts2face.types import Clip as Clip
     from tts2face.types import Speech as Speech
@@ -180,7 +180,7 @@ _MODULES = {
     "tts2face.session.project": ("Project",),
     "tts2face.session.project_file": ("load_project", "save_project"),
     "tts2face.picture.options": ("Picture",),
-    "tts2face.request": ("Request",),
+    "tts2face.request": ("FromPhones", "FromSound", "Idle", "Listening", "Recorded", "Request", "Spoken"),
     "tts2face.session.session": ("Session",),
     "tts2face.session.animated_face": ("AnimatedFace",),
     "tts2face.interchange.subtitles.cues": ("Cue", "Subtitles"),
@@ -188,7 +188,6 @@ _MODULES = {
     "tts2face.session.speech_stream": ("Piece",),
     "tts2face.session.performance": ("Performance",),
     "tts2face.session.outputs": ("WrittenClip",),
-    "tts2face.source": ("FromPhones", "FromSound", "Idle", "Listening", "Recorded", "Spoken"),
     "tts2face.types": ("Chunk", "Clip", "Speech", "Trajectory", "Waveform"),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}

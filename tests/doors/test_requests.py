@@ -12,10 +12,9 @@ import pytest
 from lexicon.errors import DataError, InputError
 from tests.world import ROOT, World
 from tts2face.numeric.kernels import CACHE_VARIABLE, FOLDER
-from tts2face.request import GESTURES, OPTIONS, Request
+from tts2face.request import GESTURES, LEAD_S, OPTIONS, TURN_S, Request
 from tts2face.session.session import Session
 from tts2face.sound.voice_pool import VoicePool
-from tts2face.source import LEAD_S, TURN_S
 from tts2face.types import Clip, concatenate_clips
 
 TEXT = "Bob may move. We were away."

@@ -5,7 +5,6 @@ import itertools
 import pytest
 
 from lexicon.errors import DataError, InputError
-from lexicon.phone_table import read_phones
 from lexicon.phones import (
     ARPABET,
     PHONES,
@@ -14,6 +13,7 @@ from lexicon.phones import (
     look_up_phone,
     nearest_phones,
     phone_distance,
+    read_phones,
     vowel_symbols,
 )
 from lexicon.sequence import SILENCE

@@ -25,7 +25,7 @@ from tts2face.models.landmarks import (
     inner_lip_gaps,
 )
 from tts2face.numeric.arrays import FloatArray, ordered_product, smoothstep
-from tts2face.source import CLEAR, NATURAL
+from tts2face.request import CLEAR, NATURAL
 from tts2face.types import Trajectory
 
 DEFAULT_ARTICULATION = CLEAR  # of a mesh: rounding is not seen otherwise (docs/decisions/102-articulation.md)

@@ -37,7 +37,7 @@ from tts2face.picture.frame_renderer import FrameRenderer
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import marked, mesh_renderer
 from tts2face.processes.shared import shared
-from tts2face.source import NATURAL
+from tts2face.request import NATURAL
 from tts2face.types import Trajectory, YieldTurn, keep_on, resting_head
 
 if TYPE_CHECKING:

@@ -19,11 +19,11 @@ from tts2face.picture.options import Picture
 from tts2face.picture.pace import Pace
 from tts2face.picture.sound_stream import SOUND_KINDS, encode_sound
 from tts2face.picture.streamed_movie import MOVIE_KINDS, encode_movie, find_movie_kind
+from tts2face.request import Recorded
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.prepared import PreparedRequest
 from tts2face.session.shared_models import SessionModels
 from tts2face.session.speech_stream import Piece, timed_speech
-from tts2face.source import Recorded
 from tts2face.types import Chunk
 
 LINES = "application/jsonl"  # media type of lines of JSON

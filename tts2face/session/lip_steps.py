@@ -10,11 +10,11 @@ from lexicon.sequence import PhoneSequence
 from tts2face.lips.exemplar import ExemplarModel, TokenSelection, select_tokens
 from tts2face.lips.explanation import PhoneExplanation, explain_selection
 from tts2face.models.talker import Talker
+from tts2face.request import FromSound, Recorded
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.prepared import PreparedRequest
 from tts2face.session.recording import TimedTranscript, mapped_motion, select_audio_map
 from tts2face.session.speech_stream import Piece, SpeechModels
-from tts2face.source import FromSound, Recorded
 from tts2face.types import Trajectory, frame_count
 
 Explain = Callable[[], tuple[PhoneExplanation, ...]]

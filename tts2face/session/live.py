@@ -22,7 +22,7 @@ from tts2face.gestures.timeline import Timeline
 from tts2face.lips.performer import PerformerRetargeter, build_performer_retargeter
 from tts2face.models.face import Face
 from tts2face.models.talker import speech_channels
-from tts2face.request import Request
+from tts2face.request import Idle, Listening, Request, Spoken
 from tts2face.session.prepared import prepare
 from tts2face.session.recording import select_audio_map
 from tts2face.session.shared_models import SessionModels
@@ -30,7 +30,6 @@ from tts2face.session.speech_stream import Piece, after_listening
 from tts2face.session.steps import pieces_from
 from tts2face.sound.features import FEATURE_RATE
 from tts2face.sound.listener import StreamingAudioMap
-from tts2face.source import Idle, Listening, Spoken
 from tts2face.types import Trajectory, exact_rate
 from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.media import TimedFrame

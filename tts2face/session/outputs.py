@@ -15,11 +15,11 @@ from lexicon.marked_text import NameMark
 from tts2face.gestures.timeline import Timeline
 from tts2face.interchange.exports.writer import ExportFile, ExportWriter, mesh_of, plan_exports
 from tts2face.processes.threads import Prefetch
+from tts2face.request import Recorded
 from tts2face.session.prepared import HEARING_STEPS, PreparedRequest, marked_styles
 from tts2face.session.speech import MarkTime
 from tts2face.session.speech_stream import Piece, SpeechModels, spoken_pieces
 from tts2face.sound.voice_pool import VoicePool
-from tts2face.source import Recorded
 from tts2face.storage.output_paths import AnyPath, refuse_overwriting
 from tts2face.types import Clip, Progress
 

@@ -27,10 +27,9 @@ from tts2face.gestures.timeline import Timeline, parse_expressions, parse_gains,
 from tts2face.gestures.timeline_file import read_timeline
 from tts2face.lips.options import METHOD_OPTIONS, ExcludedToken, SynthesisOptions
 from tts2face.picture.options import Picture
-from tts2face.request import CAMERA, Request, option_fields
+from tts2face.request import CAMERA, Listening, Recorded, Request, Source, Spoken, option_fields
 from tts2face.session.corrections import SentenceEdges, StaleEdgesError
 from tts2face.session.joining import Excerpt
-from tts2face.source import Listening, Recorded, Source, Spoken
 from tts2face.storage.output_paths import AnyPath
 from tts2face.types import exact_rate
 

@@ -4,6 +4,7 @@ from collections.abc import Hashable, Iterator
 from dataclasses import replace
 
 from tts2face.models.talker import Talker
+from tts2face.request import FromSound, Recorded
 from tts2face.session.corrections import RECORDING
 from tts2face.session.prepared import HEARING_STEPS, RECORDING_STEPS, PreparedRequest
 from tts2face.session.recording import (
@@ -16,7 +17,6 @@ from tts2face.session.recording import (
 )
 from tts2face.session.speech import resolve_recording_marks
 from tts2face.session.speech_stream import Piece
-from tts2face.source import FromSound, Recorded
 from tts2face.storage.memory import ResultMemory
 from tts2face.types import Progress, frame_count
 

@@ -20,7 +20,7 @@ from tts2face.gestures.elements import Nod, StyleSpan, span_weights
 from tts2face.gestures.timeline import Timeline, parse_style
 from tts2face.models.palette import FEATURES, PLAIN, Delivery
 from tts2face.numeric.arrays import FloatArray
-from tts2face.request import Request
+from tts2face.request import Request, Spoken
 from tts2face.session.joining import (
     SentenceTimes,
     WordTimes,
@@ -35,7 +35,6 @@ from tts2face.session.prepared import innermost_styles
 from tts2face.sound.level import level_speech
 from tts2face.sound.voice import SpeechInput, SpokenWord, Voice, apply_volume
 from tts2face.sound.voice_pool import has_voice, speaks
-from tts2face.source import Spoken
 from tts2face.types import Speech, Waveform, YieldTurn, concatenate_speech, frame_count, keep_on
 
 Deliveries = Mapping[str, Delivery]  # of a palette's styles, by name

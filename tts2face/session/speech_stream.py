@@ -15,7 +15,7 @@ from lexicon.sentence_length import n_letters
 from lexicon.sentences import Sentence, text_prefix
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.gestures.timeline import Timeline
-from tts2face.request import CONVERSATION
+from tts2face.request import CONVERSATION, TURN_S, Idle, Listening, Recorded, Spoken
 from tts2face.session.joining import Excerpt, excerpt_of_speech, pad_to_frame, shift_start, silent_speech, word_bounds
 from tts2face.session.prepared import IDLE_STEPS, PreparedRequest
 from tts2face.session.speech import (
@@ -33,7 +33,6 @@ from tts2face.session.speech import (
 )
 from tts2face.sound.pauses import speech_onset
 from tts2face.sound.voice_pool import require_installed
-from tts2face.source import TURN_S, Idle, Listening, Recorded, Spoken
 from tts2face.storage.memory import NO_MEMORY, ResultMemory
 from tts2face.types import (
     Clip,

@@ -6,12 +6,12 @@ recording. Gestures are drawn in a thread from the step before the lips on.
 
 from collections.abc import Callable, Iterator
 
+from tts2face.request import Recorded
 from tts2face.session.gesture_layer import GestureLayer
 from tts2face.session.lip_steps import Lips, RecordedLips, SynthesisModels
 from tts2face.session.prepared import PreparedRequest
 from tts2face.session.recorded_speech import hear, recorded_pieces
 from tts2face.session.speech_stream import Piece, spoken_ahead, spoken_pieces
-from tts2face.source import Recorded
 from tts2face.types import Progress
 
 Step = Callable[[Piece], Piece]

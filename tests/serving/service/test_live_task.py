@@ -10,6 +10,7 @@ import pytest
 
 import tts2face
 from tts2face.processes.message import MORE, Message
+from tts2face.request import TURN_S
 from tts2face.serving.service import live_motion
 from tts2face.serving.service.live import LiveTask
 from tts2face.serving.service.live_motion import IDLE_PART_S, Projection, idle_motion
@@ -17,7 +18,6 @@ from tts2face.serving.service.messages import Event, Inputs, Line, Step, Wait, W
 from tts2face.serving.service.scheduler import InterruptedTaskError
 from tts2face.session.live import LiveSpeech
 from tts2face.sound.voice_pool import VoicePool
-from tts2face.source import TURN_S
 from tts2face.types import Chunk
 
 

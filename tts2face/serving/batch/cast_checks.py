@@ -8,11 +8,10 @@ from lexicon.errors import InputError
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_names import BALD
 from tts2face.models.palette_file import load_palette
-from tts2face.request import OWN_FACE
+from tts2face.request import NATURAL, OWN_FACE, parse_articulation
 from tts2face.session.catalogue import identities
 from tts2face.session.named_models import Models
 from tts2face.sound.voice_pool import has_voice, voice_names
-from tts2face.source import NATURAL, parse_articulation
 
 
 def check_names(models: Models, request: Mapping[str, Any]) -> None:

@@ -12,7 +12,7 @@ from lexicon.sentence_length import n_letters
 from tts2face.interchange.exports.table import batch_format
 from tts2face.interchange.subtitles.cues import Cue
 from tts2face.interchange.subtitles.reader import read_subtitles
-from tts2face.request import Request
+from tts2face.request import IDLE_LIMITS_S, ONLY_SPOKEN, SOURCE_OPTIONS, Request
 from tts2face.serving.batch.cast import Cast
 from tts2face.serving.batch.cast_checks import check_names
 from tts2face.serving.batch.content_address import file_hash
@@ -27,7 +27,6 @@ from tts2face.serving.batch.speakers import Speakers
 from tts2face.serving.batch.windows import Window, cue_lines, cue_windows, scenes
 from tts2face.session.named_models import Models
 from tts2face.session.prepared import prepare
-from tts2face.source import IDLE_LIMITS_S, ONLY_SPOKEN, SOURCE_OPTIONS
 from tts2face.types import SOUND_RATE, exact_rate, first_sample
 
 MAX_IDLE_S = 20.0  # of one segment of silence

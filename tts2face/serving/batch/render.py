@@ -20,7 +20,7 @@ from tts2face.picture.options import Picture
 from tts2face.picture.own_face import OwnFaceRenderer
 from tts2face.picture.renderer import MeshRenderer, before_studio
 from tts2face.processes.child import Call, Handler
-from tts2face.request import DRAWN_FACE, Request
+from tts2face.request import DRAWN_FACE, Idle, Recorded, Request, Spoken
 from tts2face.serving.batch.fit import EASY_S, RELEASE_S, Fit, Limits, Room, fit_speech, without_overlap
 from tts2face.serving.batch.options import REPORT
 from tts2face.serving.batch.recorded_segment import excerpt_of, fit_recording
@@ -31,7 +31,6 @@ from tts2face.session.joining import Excerpt, fade_out
 from tts2face.session.prepared import PreparedRequest, prepare
 from tts2face.session.session import Session
 from tts2face.session.session_cache import SessionCache
-from tts2face.source import Idle, Recorded, Spoken
 from tts2face.storage.files import translate_disk_errors
 from tts2face.storage.temporary import Temporary
 from tts2face.types import Clip, Speech, Waveform, concatenate_clips, exact_rate, frame_count

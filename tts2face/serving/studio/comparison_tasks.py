@@ -13,12 +13,12 @@ from lexicon.errors import InputError
 from lexicon.sequence import PhoneSequence
 from tts2face.lips.motion_measures import DTW_BAND_S
 from tts2face.models.talker import Talker
+from tts2face.request import Recorded
 from tts2face.serving.service.messages import Event, Inputs, Task, Work
 from tts2face.serving.studio.tasks import digest_of, read_project
 from tts2face.session.animated_face import AnimatedFace, FaceMotion
 from tts2face.session.comparison import MotionPart, compare_motion, map_channels
 from tts2face.session.project import Project
-from tts2face.source import Recorded
 from tts2face.types import HEAD_CHANNELS, Chunk, Trajectory
 from tts2face.video.livelink import read_livelink
 

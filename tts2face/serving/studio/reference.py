@@ -8,11 +8,10 @@ from typing import Any
 from lexicon.errors import InputError
 from lexicon.values.fields import check_fields
 from lexicon.values.records import checked
-from tts2face.request import OPTIONS, Request
+from tts2face.request import OPTIONS, Recorded, Request, Spoken
 from tts2face.session.named_models import Models
 from tts2face.session.project import Project
 from tts2face.session.project_file import parse_project, project_json
-from tts2face.source import Recorded, Spoken
 
 KEPT = "kept"
 SETTINGS = "settings"
