@@ -3,9 +3,12 @@
 What a step keeps for the next request, and by which key, is its method ``key``.
 """
 
+from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from hashlib import blake2b
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +38,22 @@ TURN_REACH_S = 0.6  # before a phrase within which the face listened, where a tu
 STATE_BYTES = 200_000  # of a stream between two pieces
 POLL_S = 0.005  # between turns of other requests, while gestures are drawn
 Drawn = tuple[GestureValues, GestureStream | NoiseStream]  # gestures of a piece, and the stream for the piece after it
+
+
+class GestureMethod(NamedTuple):
+    """How gestures are made: their stream, the fields from which it draws, and additions to the published method."""
+
+    stream: type[GestureStream] | type[NoiseStream]
+    fields: str
+    has_presentation: bool
+    has_microsaccades: bool
+
+
+METHODS: Mapping[str, GestureMethod] = MappingProxyType({
+    FIELDS: GestureMethod(GestureStream, FIELDS, True, True),
+    "ju2008": GestureMethod(GestureStream, "ju2008", False, False),
+    "noise": GestureMethod(NoiseStream, FIELDS, True, False),
+})  # fmt: skip
 
 
 def default_style(palette: Palette) -> str:
@@ -68,6 +87,7 @@ class GestureLayer:
     def __init__(
         self,
         prepared: PreparedRequest,
+        method: GestureMethod,
         fields: GestureFields,
         face: AnimatedFace,
         yield_turn: YieldTurn = keep_on,
@@ -85,12 +105,11 @@ class GestureLayer:
         self.edits = ChannelEdits(self._requested.edits, face)
         self._body = Body(face.channels, request.seed)
         self._seed, self._options = request.seed, (request.seed, request.gestures, request.pitch)
-        self._has_microsaccades = request.gestures == FIELDS  # other methods are as they were published
-        kind: type[NoiseStream] | type[GestureStream] = NoiseStream if request.gestures == "noise" else GestureStream
+        self._has_microsaccades = method.has_microsaccades
         self._thread = ThreadPoolExecutor(1, "gestures")
         # Building the fields takes 0.5 s, in parallel with loading the voice.
         self._first: Future[GestureStream | NoiseStream] = self._thread.submit(
-            kind,
+            method.stream,
             fields,
             style=default_style(palette),
             seed=request.seed,
@@ -124,7 +143,7 @@ class GestureLayer:
 
     def _recall(self, piece: Piece) -> tuple[bytes, Timeline, Drawn]:
         """Gestures of a piece with their key, after those before it, and the timelines of request and marks."""
-        sound = piece.speech.waveform if piece.voice_sound is None else piece.voice_sound
+        sound = piece.followed_sound
         times = self._now.seconds + piece.clip.motion.times
         timeline = self._requested.merge(self._marked(piece))
         timeline = with_responses(timeline, float(times[0]), float(times[-1]), self._seed)

@@ -22,9 +22,9 @@ from tts2face.models.talker import Talker
 from tts2face.models.talker_file import load_talker
 from tts2face.picture.frame_renderer import FrameRenderer
 from tts2face.picture.options import Picture
-from tts2face.request import FIELDS, OWN_FACE, Request
+from tts2face.request import OWN_FACE
 from tts2face.session.animated_face import AnimatedFace, mesh_face, own_appearance_face
-from tts2face.session.gesture_layer import GestureLayer
+from tts2face.session.gesture_layer import METHODS, GestureLayer, GestureMethod
 from tts2face.session.lip_steps import SynthesisModels
 from tts2face.session.prepared import PreparedRequest, marked_styles
 from tts2face.session.speech import NO_DELIVERIES
@@ -155,7 +155,9 @@ class SessionModels:
         palette = self.palette if request.has_gestures else None
         if palette is None:
             return None
-        return GestureLayer(prepared, self._fields(palette, request), self.face(), self.voices.yield_turn, self._memory)
+        method = METHODS[request.gestures]
+        fields = self._fields(palette, method, has_pitch=request.pitch)
+        return GestureLayer(prepared, method, fields, self.face(), self.voices.yield_turn, self._memory)
 
     def for_request(self, prepared: PreparedRequest, *, keeps_utterances: bool = False) -> SynthesisModels:
         """Models of a request with its own dictionary and without the tokens that it excludes.
@@ -194,12 +196,11 @@ class SessionModels:
                 self._without = (excluded, exclude_tokens(self._exemplars, excluded))
             return self._without[1]
 
-    def _fields(self, palette: Palette, request: Request) -> GestureFields:
-        method = request.gestures if request.gestures in FIELD_OPTIONS else FIELDS  # noise has no options
-        key = ("fields", method, request.pitch)
-        is_published = method == "ju2008"
+    def _fields(self, palette: Palette, method: GestureMethod, *, has_pitch: bool) -> GestureFields:
+        options = FIELD_OPTIONS[method.fields]
         return self._once(
-            key, lambda: GestureFields(palette, FIELD_OPTIONS[method], request.pitch, has_presentation=not is_published)
+            ("fields", method.fields, has_pitch),
+            lambda: GestureFields(palette, options, has_pitch, has_presentation=method.has_presentation),
         )
 
     def _once(self, key: Hashable, make: Callable[[], Value]) -> Value:

@@ -107,6 +107,11 @@ class Piece:
         """Speech with the final sound, in seconds of the piece."""
         return self.clip.speech
 
+    @property
+    def followed_sound(self) -> Waveform:
+        """Sound that gestures follow."""
+        return self.speech.waveform if self.voice_sound is None else self.voice_sound
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpeechModels:
