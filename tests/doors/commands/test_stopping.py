@@ -22,7 +22,7 @@ PATIENCE_S = 120.0
 POOL = """
 import os, sys, time
 from pathlib import Path
-from corpus_tools.run_options import map_unordered
+from corpus_tools.parallel import map_unordered
 
 def start(folder):
     (Path(folder) / str(os.getpid())).touch()
