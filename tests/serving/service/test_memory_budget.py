@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tts2face.session import functions
+from tts2face.session import session_cache
 from tts2face.session.named_models import Models
 from tts2face.session.session_cache import SessionCache
 
@@ -38,7 +38,7 @@ def few_objects() -> None:
 def memory(few_objects: None, monkeypatch: pytest.MonkeyPatch) -> None:
     FakeSession.alive.clear()
     monkeypatch.setattr("tts2face.session.session.Session", FakeSession)
-    monkeypatch.setattr(functions, "resident_bytes", lambda: 100 * MB * len(FakeSession.alive))
+    monkeypatch.setattr(session_cache, "resident_bytes", lambda: 100 * MB * len(FakeSession.alive))
 
 
 @pytest.mark.usefixtures("memory")
