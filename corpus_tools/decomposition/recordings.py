@@ -89,7 +89,7 @@ def read_recordings(
             captured.append(outcome)
         if on_progress:
             on_progress(number, len(files))
-    return sorted(captured, key=lambda one: one.name), sorted(refused, key=lambda one: one.name)
+    return sorted(captured, key=lambda recording: recording.name), sorted(refused, key=lambda recording: recording.name)
 
 
 def find_recording_files(recordings: Path) -> list[Path]:

@@ -65,7 +65,7 @@ def check_gesture_take(take: Path, run_options: RunOptions, on_share: Callable[[
     except DataError as reason:
         return TakeReport(0.0, (Finding(REFUSAL, UNUSABLE, str(reason)),))
     return TakeReport(
-        seconds, tuple(sorted([*found, *_length_findings(seconds)], key=lambda one: one.severity != REFUSAL))
+        seconds, tuple(sorted([*found, *_length_findings(seconds)], key=lambda finding: finding.severity != REFUSAL))
     )
 
 

@@ -200,11 +200,11 @@ def _sound_similarities(ones: Sequence[Fingerprint], others: Sequence[Fingerprin
     return found
 
 
-def _have_same_durations(one: PhoneSequence, other: PhoneSequence) -> bool:
+def _have_same_durations(own: PhoneSequence, other: PhoneSequence) -> bool:
     """Whether both are the same phones and last equally long, apart from the silence at the ends."""
     spoken = [
         (sequence.phones[start:stop], sequence.durations[start:stop])
-        for sequence in (one, other)
+        for sequence in (own, other)
         for start, stop in [(sequence.phones[0] == SILENCE, len(sequence) - (sequence.phones[-1] == SILENCE))]
     ]
     (labels, durations), (others, other_durations) = spoken

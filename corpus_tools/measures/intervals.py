@@ -61,9 +61,9 @@ def draw_weights(n_utterances: int) -> Floats:
     return np.concatenate([np.ones((1, n_utterances)), draws])
 
 
-def estimate(one: PairedCurves) -> Mapping[str, IntervalEstimate]:
+def estimate(pairs: PairedCurves) -> Mapping[str, IntervalEstimate]:
     """Each figure with its interval."""
-    figures = one.figures(draw_weights(len(one.costs)))
+    figures = pairs.figures(draw_weights(len(pairs.costs)))
     return {name: interval_of(values) for name, values in figures.items()}
 
 

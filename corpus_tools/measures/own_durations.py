@@ -88,15 +88,15 @@ def _word_edges(phones: PhoneSequence, words: Sequence[WordSpan]) -> NDArray[np.
 
 
 def compare_own_durations(
-    method: SynthesisMethod, one: ReferenceUtterance, voiced: VoicedUtterance, model: ShapeModel
+    method: SynthesisMethod, real: ReferenceUtterance, voiced: VoicedUtterance, model: ShapeModel
 ) -> UtteranceComparison:
     """Comparison of a method's motion for the voice's phones with the real utterance."""
-    fps, n_fine = one.observation.fps, OVERSAMPLING * (voiced.n_frames - 1) + 1
+    fps, n_fine = real.observation.fps, OVERSAMPLING * (voiced.n_frames - 1) + 1
     synthesised = method(voiced.phones, n_fine, OVERSAMPLING * fps)
-    wanted = voiced.times(np.arange(len(one.parameters)) / fps)
+    wanted = voiced.times(np.arange(len(real.parameters)) / fps)
     there = interpolate_columns(synthesised, np.arange(n_fine) / (OVERSAMPLING * fps), wanted).astype(np.float32)
     ours = synthesised[::OVERSAMPLING]
     own = OwnDurationMotion(
         voiced.phones, speech_frames(voiced.phones, voiced.n_frames, fps), ours, LipCurves.of(model.shapes(ours))
     )
-    return UtteranceComparison(one, there, LipCurves.of(model.shapes(there)), speech_spread(model), own)
+    return UtteranceComparison(real, there, LipCurves.of(model.shapes(there)), speech_spread(model), own)

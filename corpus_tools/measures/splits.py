@@ -122,7 +122,7 @@ def check_unknown(talker: Talker, observations: Sequence[Observation]) -> tuple[
 
 
 def _sort_by_name(observations: Sequence[Observation]) -> list[Observation]:
-    return sorted(observations, key=lambda one: one.name)
+    return sorted(observations, key=lambda observation: observation.name)
 
 
 def _split_at(ordered: Sequence[Observation], held: Collection[int]) -> Split:

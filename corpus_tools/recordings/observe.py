@@ -121,8 +121,10 @@ def observe(
         every = [_refuse(outcome, reasons[outcome.name]) if outcome.name in reasons else outcome for outcome in every]
         warnings = []
     return Observations(
-        tuple(sorted((item for item in every if isinstance(item, Observation)), key=lambda one: one.name)),
-        tuple(sorted((item for item in every if isinstance(item, Refusal)), key=lambda one: one.name)),
+        tuple(
+            sorted((item for item in every if isinstance(item, Observation)), key=lambda observation: observation.name)
+        ),
+        tuple(sorted((item for item in every if isinstance(item, Refusal)), key=lambda refusal: refusal.name)),
         tuple(sorted(warnings, key=lambda warning: warning.name)),
     )
 
@@ -301,6 +303,6 @@ def recordings_to_check(recordings: Path, transcript: str | Path | None = None) 
 def _worst(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """The first refusal of each code, then the first warning of each other code."""
     found: dict[str, Finding] = {}
-    for finding in sorted(findings, key=lambda one: one.severity != REFUSAL):
+    for finding in sorted(findings, key=lambda found: found.severity != REFUSAL):
         found.setdefault(finding.code, finding)
     return tuple(found.values())

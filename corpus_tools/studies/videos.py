@@ -58,10 +58,13 @@ class MethodVideos:
         return video_tag(sides, one.observation.fps, NOTE.format(method=self._method))
 
 
-def evaluated_pictures(one: ReferenceUtterance) -> Iterator[NDArray[np.uint8]]:
+def evaluated_pictures(utterance: ReferenceUtterance) -> Iterator[NDArray[np.uint8]]:
     """The pictures of an utterance's evaluated frames; fewer if the video cannot be read."""
-    observation = one.observation
-    instants = observation.quality.cut + (np.arange(one.evaluated.start, one.evaluated.stop) - 0.5) / observation.fps
+    observation = utterance.observation
+    instants = (
+        observation.quality.cut
+        + (np.arange(utterance.evaluated.start, utterance.evaluated.stop) - 0.5) / observation.fps
+    )
     at = 0
     try:
         for picture in read_frames(observation.video):

@@ -169,9 +169,9 @@ def _adapted_learner(
         model = models[names] = models.get(names) or combined_shapes(base.talker.model, known)
         mapped = learn_base_map(base, known, model, adaptation, lips)
 
-        def synthesise(one: Observation) -> Landmarks:
-            times = np.arange(len(one.landmarks)) / one.fps
-            terms = frame_terms(one.phones, times, mapped.inventory, lips[one.name])
+        def synthesise(observation: Observation) -> Landmarks:
+            times = np.arange(len(observation.landmarks)) / observation.fps
+            terms = frame_terms(observation.phones, times, mapped.inventory, lips[observation.name])
             return model.shapes(mapped.parameters(terms))
 
         return synthesise
@@ -185,6 +185,6 @@ def _own_learner(method: str, talkers: dict[tuple[str, ...], Talker]) -> Learner
         talker = talkers[names] = talkers.get(names) or learn_talker(known, metadata={"name": "held out"})
         motion = build_methods(talker)[method]
         model: ShapeModel = talker.model
-        return lambda one: model.shapes(motion(one.phones, len(one.landmarks), one.fps))
+        return lambda observation: model.shapes(motion(observation.phones, len(observation.landmarks), observation.fps))
 
     return learn

@@ -94,7 +94,7 @@ def learn_audio_maps(
 def _read_sounds(observations: Sequence[Observation]) -> Iterator[tuple[Observation, Waveform]]:
     """Each utterance with the sound of its video; each video is read once."""
     last: tuple[object, Waveform] | None = None
-    for observation in sorted(observations, key=lambda one: str(one.video)):
+    for observation in sorted(observations, key=lambda recorded: str(recorded.video)):
         if last is None or last[0] != observation.video:
             last = observation.video, read_sound(observation.video, FEATURE_RATE)
         yield observation, last[1]

@@ -31,7 +31,7 @@ def fit_ridge(terms: Floats, targets: Floats, regularisations: Sequence[float] =
         _fit_and_cross_validate(centred, targets, normal + regularisation * np.eye(terms.shape[1]), right)
         for regularisation in regularisations
     ]
-    error, weights = min(found, key=lambda one: one[0])
+    error, weights = min(found, key=lambda fitted: fitted[0])
     return RidgeFit(mean, weights, error)
 
 

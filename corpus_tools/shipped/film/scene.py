@@ -178,7 +178,7 @@ class FilmScene:
     def mirrored_lamps(self) -> NDArray[np.float32]:
         """(L, 17) lamps that light the eyes, as `tts2face.models.baked_light` describes them; heads' own are last."""
         rows = []
-        for lamp in sorted(self.look.lamps.values(), key=lambda one: one.follows_head):
+        for lamp in sorted(self.look.lamps.values(), key=lambda light: light.follows_head):
             if lamp.parts and "cornea" not in lamp.parts:
                 continue
             place = np.array(_placed(lamp))

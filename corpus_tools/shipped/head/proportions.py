@@ -37,6 +37,6 @@ def _both_sides(name: str) -> list[str]:
     return [name.replace(BOTH_SIDES, side) for side in ("l", "r")] if BOTH_SIDES in name else [name]
 
 
-def add_targets(one: Mapping[str, float], other: Mapping[str, float]) -> dict[str, float]:
+def add_targets(own: Mapping[str, float], other: Mapping[str, float]) -> dict[str, float]:
     """Sums of the weights of two sets of targets."""
-    return {name: one.get(name, 0.0) + other.get(name, 0.0) for name in {**one, **other}}
+    return {name: own.get(name, 0.0) + other.get(name, 0.0) for name in {**own, **other}}

@@ -92,8 +92,8 @@ def babble(n: int, others: Sequence[NDArray[np.floating]], rng: np.random.Genera
     """Several people at once (n,), of unit power."""
     made = np.zeros(n)
     for _ in range(N_TALKERS):
-        one = others[int(rng.integers(len(others)))]
-        made += np.resize(np.roll(one / one.std(), int(rng.integers(len(one)))), n)
+        other = others[int(rng.integers(len(others)))]
+        made += np.resize(np.roll(other / other.std(), int(rng.integers(len(other)))), n)
     scaled: Floats = made / made.std()
     return scaled
 

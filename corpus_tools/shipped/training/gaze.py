@@ -121,8 +121,8 @@ def _directions(landed: FloatArray) -> dict[str, tuple[float, float]]:
     n = {"side": is_side.sum(), "up": (~is_side & (down < 0)).sum(), "down": (~is_side & (down >= 0)).sum()}
     n |= {"left": (is_side & (left > 0)).sum(), "right": (is_side & (left <= 0)).sum()}
 
-    def share(one: str, against: str) -> float:
-        return float(np.log((n[one] + PSEUDO_COUNT) / (n[against] + PSEUDO_COUNT)))
+    def share(side: str, against: str) -> float:
+        return float(np.log((n[side] + PSEUDO_COUNT) / (n[against] + PSEUDO_COUNT)))
 
     total = float(len(landed))
     against = {name: share(name, DIRECTIONS[0]) for name in DIRECTIONS[1:]}

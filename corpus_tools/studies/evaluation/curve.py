@@ -135,6 +135,6 @@ def compare_points(
     return LearningCurve(n_test, test_seconds, base, tuple(points), steps, gains)
 
 
-def _difference(one: CurvePoint, method: str, other: CurvePoint, minus: str) -> CurveDifference:
-    figures = {name: interval_of(one.samples[method][name] - other.samples[minus][name]) for name, _ in FIGURE_HEADS}
-    return CurveDifference(method, one.seconds, minus, other.seconds, figures)
+def _difference(point: CurvePoint, method: str, other: CurvePoint, minus: str) -> CurveDifference:
+    figures = {name: interval_of(point.samples[method][name] - other.samples[minus][name]) for name, _ in FIGURE_HEADS}
+    return CurveDifference(method, point.seconds, minus, other.seconds, figures)

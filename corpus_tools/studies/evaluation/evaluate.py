@@ -39,11 +39,11 @@ def standardise_reference(real: ReferenceUtterance, scale: CurveScale) -> Refere
 
 
 def compare_across_talkers(
-    one: ReferenceUtterance, synthesised: NDArray[np.float32], model: ShapeModel, scale: CurveScale
+    real: ReferenceUtterance, synthesised: NDArray[np.float32], model: ShapeModel, scale: CurveScale
 ) -> UtteranceComparison:
     """Comparison of synthesised parameters (T, S) of one talker with a real utterance of another, both z-scored."""
     curves = scale.z_score_lips(LipCurves.of(model.shapes(synthesised)))
-    return UtteranceComparison(one, curves.values(), curves, np.ones(2))
+    return UtteranceComparison(real, curves.values(), curves, np.ones(2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

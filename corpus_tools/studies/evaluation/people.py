@@ -173,10 +173,10 @@ def synthesise_people(
     """Curves (T, 2) of every method on the evaluated frames, z-scored by `scale`: by default its recordings."""
     scale = scale or CurveScale.of_talker(talker)
 
-    def curves(method: SynthesisMethod, one: TestUtterance) -> Floats:
-        seen = one.observation
+    def curves(method: SynthesisMethod, test: TestUtterance) -> Floats:
+        seen = test.observation
         motion = method(seen.phones, len(seen.landmarks), seen.fps)
-        return scale.z_score(LipCurves.of_parameters(talker.model, motion[one.evaluated]).values())
+        return scale.z_score(LipCurves.of_parameters(talker.model, motion[test.evaluated]).values())
 
     return {name: tuple(curves(method, test) for test in tests) for name, method in methods.items()}
 

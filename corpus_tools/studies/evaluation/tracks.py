@@ -77,9 +77,9 @@ def map_tracks(
     middle = targets.mean(axis=0)
     fit = fit_ridge(terms / spread, targets - middle)
 
-    def mapped_parameters(one: ReferenceUtterance) -> NDArray[np.float32]:
-        times = np.arange(len(one.parameters)) / one.observation.fps
-        seen = tracks[one.observation.name].at(times) / spread
+    def mapped_parameters(utterance: ReferenceUtterance) -> NDArray[np.float32]:
+        times = np.arange(len(utterance.parameters)) / utterance.observation.fps
+        seen = tracks[utterance.observation.name].at(times) / spread
         return np.asarray(middle + (seen - fit.mean) @ fit.weights, np.float32)
 
     return tuple(mapped_parameters(reference) for reference in real)

@@ -65,10 +65,10 @@ class GazeMeasures:
 
 
 TRAITS: Mapping[str, Callable[[GazeMeasures, GazeMeasures], float]] = {
-    "looks at the face": lambda one, other: _distance(one.face, other.face),
-    "looks away": lambda one, other: _distance(one.away, other.away),
-    "jumps": lambda one, other: _distance(one.jumps, other.jumps),
-    "share on the face": lambda one, other: abs(one.share - other.share),
+    "looks at the face": lambda person, other: _distance(person.face, other.face),
+    "looks away": lambda person, other: _distance(person.away, other.away),
+    "jumps": lambda person, other: _distance(person.jumps, other.jumps),
+    "share on the face": lambda person, other: abs(person.share - other.share),
 }
 
 
@@ -136,5 +136,5 @@ def _distribution(lengths: Lengths) -> Distribution | None:
     return survival(lengths) if lengths.is_complete.sum() >= FEWEST else None
 
 
-def _distance(one: Distribution | None, other: Distribution | None) -> float:
-    return float("nan") if one is None or other is None else one.distance(other)
+def _distance(own: Distribution | None, other: Distribution | None) -> float:
+    return float("nan") if own is None or other is None else own.distance(other)

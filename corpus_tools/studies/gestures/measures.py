@@ -24,9 +24,9 @@ def split_recordings(values: Motion, lengths: Lengths) -> list[Motion]:
     return np.split(values, np.cumsum(lengths)[:-1])
 
 
-def wasserstein(one: Motion, other: Motion) -> float:
+def wasserstein(motion: Motion, other: Motion) -> float:
     """Wasserstein distance of two sets of numbers, in their unit; NaN where one is empty."""
-    return float(wasserstein_distance(one, other)) if len(one) and len(other) else float("nan")
+    return float(wasserstein_distance(motion, other)) if len(motion) and len(other) else float("nan")
 
 
 def random_halves(n: int, n_times: int, generator: np.random.Generator) -> Iterator[tuple[NDArray[np.int64], ...]]:
@@ -67,9 +67,9 @@ def spectrum(values: Motion, lengths: Lengths, fps: float) -> Spectrum:
     return Spectrum(np.asarray(hz, np.float64), total / used)
 
 
-def ratio(one: float, other: float) -> float:
+def ratio(value: float, other: float) -> float:
     """The quotient; NaN where the divisor is 0."""
-    return one / other if other else float("nan")
+    return value / other if other else float("nan")
 
 
 def frame_midpoints(values: Motion, lengths: Lengths) -> Doubles:

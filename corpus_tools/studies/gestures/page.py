@@ -316,11 +316,11 @@ def _distances(style: StyleStudy) -> str:
     return scroll_box(table((*head, *distances, *ratios, "target"), rows, numbers=range(2, 14)))
 
 
-def target_result(style: StyleStudy, one: TraitComparison) -> str:
+def target_result(style: StyleStudy, compared: TraitComparison) -> str:
     """Whether a trait with a target meets it; empty without a target."""
-    if not one.trait.has_target or style.source is not None:
+    if not compared.trait.has_target or style.source is not None:
         return ""
-    return _met(one.is_met)
+    return _met(compared.is_met)
 
 
 def _met(is_met: bool) -> str:

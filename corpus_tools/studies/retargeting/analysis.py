@@ -197,10 +197,12 @@ def mouth_motion(mimicked: Sequence[MimickedRecording]) -> MouthMotion:
     return MouthMotion(float(means[0]), float(means[1]), float(means[2]), share, len(closed))
 
 
-def bilabial_gaps(one: MimickedRecording) -> list[float]:
+def bilabial_gaps(recording: MimickedRecording) -> list[float]:
     """Gap of the face's lips, mm, in each bilabial in the frame where the person's are nearest."""
-    phones, fps = one.observation.phones, one.observation.fps
-    person, face = (inner_lip_gaps(places)[:, MIDDLE_PAIR] for places in (one.observation.landmarks, one.landmarks))
+    phones, fps = recording.observation.phones, recording.observation.fps
+    person, face = (
+        inner_lip_gaps(places)[:, MIDDLE_PAIR] for places in (recording.observation.landmarks, recording.landmarks)
+    )
     found = []
     for phone, start, end in zip(phones.phones, phones.edges[:-1], phones.edges[1:], strict=True):
         first, last = int(np.floor(start * fps)), int(np.ceil(end * fps)) + 1

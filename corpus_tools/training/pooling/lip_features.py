@@ -31,8 +31,8 @@ def landmark_features(landmarks: NDArray[np.floating], neutral: NDArray[np.float
     eyes = float(np.sqrt(np.square(neutral[EYE_OUTER_RIGHT] - neutral[EYE_OUTER_LEFT], dtype=np.float64).sum()))
     y = -landmarks[..., 1].astype(np.float64) / eyes
 
-    def distance(one: int, other: int) -> Floats:
-        return np.asarray(np.linalg.norm(landmarks[:, one] - landmarks[:, other], axis=1) / eyes, np.float64)
+    def distance(first: int, other: int) -> Floats:
+        return np.asarray(np.linalg.norm(landmarks[:, first] - landmarks[:, other], axis=1) / eyes, np.float64)
 
     opening = (y[:, 14] - y[:, 13] + y[:, 87] - y[:, 82] + y[:, 317] - y[:, 312]) / 3
     corners = (y[:, 61] + y[:, 291]) / 2
