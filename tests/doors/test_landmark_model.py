@@ -4,6 +4,7 @@ import inspect
 import io
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 import numpy as np
@@ -85,8 +86,15 @@ def functions(commands: App) -> Iterator[Callable[..., object]]:
         yield commands.default_command
 
 
+def flags(command: Callable[..., object]) -> set[str]:
+    """Names of a command's parameters, and of those that it shares with others, which are fields of one."""
+    parameters = inspect.signature(command).parameters.values()
+    shared = [declared.name for each in parameters if is_dataclass(each.default) for declared in fields(each.default)]
+    return {each.name for each in parameters} | {*shared}
+
+
 def test_every_command_with_a_model_takes_a_yes() -> None:
-    with_model = [set(taken) for one in functions(app) if "model" in (taken := inspect.signature(one).parameters)]
+    with_model = [taken for command in functions(app) if "model" in (taken := flags(command))]
     assert len(with_model) > 10
     assert all("yes" in taken for taken in with_model)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.gestures import presentation, stream
+from tts2face.gestures import prosody, stream
 from tts2face.gestures.elements import ExpressionSpan, Gains, Nod, StyleSpan
 from tts2face.gestures.field import FieldOptions
 from tts2face.gestures.noise import NoiseStream, blink_closure, blinks_per_second, perlin_noise
@@ -100,7 +100,7 @@ def test_a_derived_style_is_its_source_changed_as_stated(fields, palette):
 def test_a_piece_measures_its_sound_once_and_no_median_again(fields, monkeypatch):
     _made(fields, style="double")
     heard = []
-    monkeypatch.setattr(presentation, "intensity_track", lambda sound: heard.append(sound) or intensity_track(sound))
+    monkeypatch.setattr(prosody, "intensity_track", lambda sound: heard.append(sound) or intensity_track(sound))
     monkeypatch.setattr(stream, "style_median", lambda style, feature: pytest.fail(f"median of {feature}"))
     _made(fields, style="double")  # some features have another tempo, so other times
     assert len(heard) == 1

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.sound import transcript as place
+from tts2face.sound import word_assignment as place
 from tts2face.sound.word_assignment import assign_words
 
 PHONES = "pbtdkgfvszmnlrwiuaeo"

@@ -127,7 +127,7 @@ def test_networks_take_over_where_contexts_are_far_and_phones_unrecorded(voice: 
 
     def farness(distance: float) -> np.ndarray:
         scores = np.full_like(recorded.found.scores, highest - distance)
-        return context_farness(replace(recorded, found=replace(recorded.found, scores=scores)))
+        return context_farness(replace(recorded, found=recorded.found._replace(scores=scores)))
 
     np.testing.assert_array_equal(farness(0.0), 0.0)
     np.testing.assert_allclose(farness(NEAR_CONTEXT), 0.0, atol=1e-12)
