@@ -62,7 +62,7 @@ def build_avatar(  # noqa: PLR0913 - one parameter an option
     consent, name, model, on_warning
         As for `tts2face.face_from_photo`.
     eye_color
-        Name of `tts2face.models.hair.EYE_COLOURS` or #rrggbb; that of the picture if omitted.
+        Name of `tts2face.models.named_colours.EYE_COLOURS` or #rrggbb; that of the picture if omitted.
     age_keep
         Keep the wrinkles of the skin, which are softened otherwise: as colours, they stay when the face moves.
 

@@ -72,7 +72,7 @@ def build_face(
         A folder of recordings, or one video; transcripts are not needed. A ``provenance.json`` in the folder states the
         licence of the person's likeness, which that of the mesh does not cover.
     consent
-        Consent of the person shown, from `tts2face.models.face_file.consent_record`; kept in the file.
+        Consent of the person shown, from `tts2face.models.consent.consent_record`; kept in the file.
     n_modes
         Modes of the talker's own dense shape model, added as the shapes denseMean, dense1, dense2, ...
     run_options
