@@ -265,13 +265,16 @@ class Host(SimpleNamespace):
         super().__init__(folder=folder, work=WorkList(folder), state=state, open_projects=lambda key: [])
 
 
-def serve_twice(folder: Path, begin: Callable[[Host], Awaitable[None]], go_on: Callable[[Host], Any]) -> list[Any]:
-    """Begin work on a server that ends, and let the next one do it; the works of the second."""
+def serve_twice(
+    folder: Path, tool: "Tool", begin: Callable[[Host], Awaitable[None]], go_on: Callable[[Host], Any]
+) -> list[Any]:
+    """Begin work on a server that ends once the tool has its order, and let the next one do it; the second's work."""
 
     async def first() -> None:
         host = Host(folder)
         await begin(host)
-        await until(lambda: any(one.state == RUNNING for one in host.work._all.values()))
+        await until(lambda: tool.orders)
+        assert any(work.state == RUNNING for work in host.work._all.values())
         await host.work.close()
 
     async def second() -> list[BackgroundWork]:
@@ -308,7 +311,7 @@ def test_a_report_goes_on(tmp_path, monkeypatch):
     async def begin(host: Host) -> None:
         await Reports(host.state, tmp_path, host.work).add(LOCAL_KEY, "similarity", "grid_s1")
 
-    (found,) = serve_twice(tmp_path, begin, lambda host: Reports(host.state, tmp_path, host.work))
+    (found,) = serve_twice(tmp_path, tool, begin, lambda host: Reports(host.state, tmp_path, host.work))
     assert (found.state, found.title) == (DONE, "Visual similarity of phones: grid_s1")
     assert [order[2]["model"] for order in tool.orders] == ["/models/grid_s1"] * 2
     entry = json.loads((found.files[0] / "report.json").read_text())
@@ -326,13 +329,14 @@ def make_take(folder: Path) -> Path:
 
 
 def test_the_check_of_a_take_for_a_style_goes_on(tmp_path, monkeypatch):
-    monkeypatch.setattr(decoders, "run_take_tool", Tool({"findings": [], "seconds": 20.0}))
+    tool = Tool({"findings": [], "seconds": 20.0})
+    monkeypatch.setattr(decoders, "run_take_tool", tool)
 
     async def begin(host: Host) -> None:
         await Styles(host).add_take(LOCAL_KEY, make_take(tmp_path), ".webm")
 
     made: list[Styles] = []
-    (found,) = serve_twice(tmp_path, begin, lambda host: made.append(Styles(host)))
+    (found,) = serve_twice(tmp_path, tool, begin, lambda host: made.append(Styles(host)))
     assert found.state == DONE
     state = made[0].take_state(LOCAL_KEY)
     assert (state.doing, state.state, state.advice) == ("", GOOD, "a good take of 20 s")
@@ -358,7 +362,7 @@ def test_the_making_of_a_style_goes_on(tmp_path, monkeypatch):
         assert made.take_state(LOCAL_KEY).doing == "making"
 
     made: list[Styles] = []
-    (found,) = serve_twice(tmp_path, begin, lambda host: made.append(Styles(host)))
+    (found,) = serve_twice(tmp_path, tool, begin, lambda host: made.append(Styles(host)))
     assert (found.state, found.message) == (DONE, "the style mine is made of 20 s; its take is deleted")
     assert [order[0] for order in tool.orders] == ["style"] * 2
     store = PaletteStore(tmp_path)
@@ -367,7 +371,8 @@ def test_the_making_of_a_style_goes_on(tmp_path, monkeypatch):
 
 
 def test_the_reading_of_a_take_goes_on_and_its_video_is_deleted(tmp_path, monkeypatch):
-    monkeypatch.setattr(decoders, "run_take_tool", Tool({"seconds": 3.0, "has_sound": True}))
+    tool = Tool({"seconds": 3.0, "has_sound": True})
+    monkeypatch.setattr(decoders, "run_take_tool", tool)
     checked = SimpleNamespace(check_scope=lambda key: None)
 
     async def begin(host: Host) -> None:
@@ -378,7 +383,7 @@ def test_the_reading_of_a_take_goes_on_and_its_video_is_deleted(tmp_path, monkey
         TakeStore(tmp_path).rename(OWNER, entry.id, "Two")
         Takes(host, checked)
 
-    (found,) = serve_twice(tmp_path, begin, go_on)
+    (found,) = serve_twice(tmp_path, tool, begin, go_on)
     (entry,) = TakeStore(tmp_path).entries(OWNER)
     assert (found.state, entry.state, entry.name, entry.seconds, entry.has_sound) == (DONE, READY, "Two", 3.0, True)
     assert sorted(path.name for path in found.order.parent.iterdir()) == ["owner", "take.json"]
@@ -420,7 +425,7 @@ def test_checks_of_recordings_go_on_and_a_take_that_ends_servers_is_refused(tmp_
         first.write_text(json.dumps(json.loads(first.read_text()) | {"tries": MAX_TRIES}))
         Recordings(tmp_path, host.work)
 
-    (found,) = serve_twice(tmp_path, begin, go_on)
+    (found,) = serve_twice(tmp_path, tool, begin, go_on)
     found_takes = store.takes(number)
     assert (found.content["at"], found.state) == (1, DONE)
     assert [found_takes[at].state for at in (0, 1)] == [REFUSED, GOOD]
@@ -448,7 +453,7 @@ def test_a_talker_and_its_first_sentence_go_on(tmp_path, monkeypatch, task):
         with pytest.raises(InputError, match="the last order still runs"):
             recordings._start(number, {})
 
-    (found,) = serve_twice(tmp_path, begin, lambda host: Recordings(tmp_path, host.work))
+    (found,) = serve_twice(tmp_path, tool, begin, lambda host: Recordings(tmp_path, host.work))
     assert found.state == DONE, found.message
     assert found.message.startswith("The talker Ada is made of 1 takes" if task == "build" else "The clip is ready.")
     assert len(tool.orders) == 2
