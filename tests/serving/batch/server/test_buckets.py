@@ -197,7 +197,7 @@ def test_a_killed_upload_leaves_nothing_visible(bucket: Bucket, tmp_path: Path) 
     movie = write_movie(tmp_path, os.urandom(9_000_000))
     upload = (
         "import sys; from pathlib import Path; from tts2face.serving.batch.store import open_store\n"
-        "from tts2face.serving.batch.segment import SegmentResult\n"
+        "from tts2face.serving.batch.segment_result import SegmentResult\n"
         "open_store(sys.argv[1]).put(sys.argv[2], Path(sys.argv[3]), SegmentResult(15, 10.0))"
     )
     bucket.relay.limit = 3_000_000
