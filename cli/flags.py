@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, Field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from cyclopts import App, Group, Parameter
 
@@ -16,6 +16,7 @@ from tts2face.request import option_fields
 if TYPE_CHECKING:
     from cyclopts import Token
 
+Number = TypeVar("Number", int, float)
 END_OF_OPTIONS = "--"  # everything after it is text or a path
 Out = Annotated[
     Path | None,
@@ -65,6 +66,14 @@ def parse_whole_number(_: Any, tokens: "Sequence[Token]") -> int:
 
 
 Jobs = Annotated[int | None, whole_number("Number of processes; by default one per core.")]
+
+
+def parse_numbers(flag: str, given: str, kind: Callable[[str], Number], expected: str) -> tuple[Number, ...]:
+    """Numbers of a flag that are separated by commas; an `InputError` says what is expected of it."""
+    try:
+        return tuple(kind(number) for number in given.split(","))
+    except ValueError as wrong:
+        raise InputError(f"{flag} must be {expected}, not {given!r}") from wrong
 
 
 def add_option_flags(

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from cli.evaluation_flags import ComparisonFlags, SplitFlags
+from cli.flags import parse_numbers
 from cli.process import write_message
 from cli.progress import progress_bar, stage_bar
 from cli.tool_flags import ToolFlags
-from lexicon.errors import InputError
 
 DEFAULT_BASE = "grid_s1"
 AUTOMATIC = "auto"
@@ -29,7 +29,13 @@ def run_learning_curve(
     from tts2face.models.talker_file import load_talker
     from tts2face.storage.files import write_atomically
 
-    amounts_s = DEFAULT_AMOUNTS_S if amounts == AUTOMATIC else _parse_seconds(amounts)
+    amounts_s = (
+        DEFAULT_AMOUNTS_S
+        if amounts == AUTOMATIC
+        else parse_numbers(
+            "--learning-curve", amounts, float, f"{AUTOMATIC} or seconds separated by commas, such as 10,20,40"
+        )
+    )
     writer = None if out is None else REPORT.writer(out)
     name = base or DEFAULT_BASE
     indexed = None if name == NO_BASE else Base.of(load_talker(name))
@@ -45,12 +51,3 @@ def run_learning_curve(
     if out is not None and writer is not None:
         write_atomically(out, writer(curve))
         write_message(f"wrote {out}: {len(curve.points)} amounts of material, {curve.n_test} utterances held out")
-
-
-def _parse_seconds(amounts: str) -> tuple[float, ...]:
-    try:
-        return tuple(float(amount) for amount in amounts.split(","))
-    except ValueError as wrong:
-        raise InputError(
-            f"--learning-curve must be {AUTOMATIC} or seconds separated by commas, such as 10,20,40, not {amounts!r}"
-        ) from wrong

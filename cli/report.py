@@ -5,12 +5,11 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from cli.flags import Face, whole_number
+from cli.flags import Face, parse_numbers, whole_number
 from cli.photo import Yes
 from cli.process import write_message
 from cli.progress import progress_bar, stage_bar
 from cli.tool_flags import DEFAULTS, ToolFlags
-from lexicon.errors import InputError
 from tts2face.storage.output_paths import refuse_overwriting
 
 report = App(
@@ -41,7 +40,9 @@ def similarity(  # noqa: PLR0913 - one parameter a flag
     from corpus_tools.studies.similarity.analysis import SimilarityOptions
     from corpus_tools.studies.similarity.write import write_similarity
 
-    options = SimilarityOptions(_parse_numbers(classes), halves, seed)
+    expected = "whole numbers separated by commas, such as 4,8,12"
+    counts = None if classes is None else parse_numbers("--classes", classes, int, expected)
+    options = SimilarityOptions(counts, halves, seed)
     with progress_bar("comparing halves") as on_progress:
         analysis = write_similarity(talker, out, options, other=compare, labels=labels, on_progress=on_progress)
     write_message(
@@ -133,14 +134,3 @@ def retarget(
         f"wrote {out}: {study.n_recordings} recordings, {study.n_missed} of {study.differences.size} scores differ by "
         "more than .06"
     )
-
-
-def _parse_numbers(classes: str | None) -> tuple[int, ...] | None:
-    if classes is None:
-        return None
-    try:
-        return tuple(int(number) for number in classes.split(","))
-    except ValueError as wrong:
-        raise InputError(
-            f"--classes must be whole numbers separated by commas, such as 4,8,12, not {classes!r}"
-        ) from wrong
