@@ -4,7 +4,7 @@ import threading
 from collections.abc import Mapping
 from pathlib import Path
 
-from tts2face.serving.batch.segment import SEGMENT_SUFFIX
+from tts2face.serving.batch.store import RESULT_SUFFIX
 from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import database_url
 
@@ -12,7 +12,9 @@ INTERVAL_S = 0.5
 
 
 class StoreWatch:
-    """Looks at the files of a store again and again; a segment that was rendered again is another file (inode).
+    """Looks at the results of a store again and again; that of a segment that was rendered again is another file (inode).
+
+    A process that is killed between a movie and its result leaves a movie that is not stored: it is rendered again.
 
     Parameters
     ----------
@@ -24,7 +26,7 @@ class StoreWatch:
         self._store = store
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run)
-        self.stored: dict[str, set[int]] = {}  # address -> the inodes of its files so far
+        self.stored: dict[str, set[int]] = {}  # address -> the inodes of its results so far
 
     @property
     def n_twice(self) -> int:
@@ -37,8 +39,8 @@ class StoreWatch:
         return len(list(folder.iterdir())) if folder.is_dir() else 0
 
     def look(self) -> None:
-        """Note the present files."""
-        for path in self._store.glob(f"??/*{SEGMENT_SUFFIX}"):
+        """Note the present results."""
+        for path in self._store.glob(f"??/*{RESULT_SUFFIX}"):
             try:
                 self.stored.setdefault(path.stem, set()).add(path.stat().st_ino)
             except FileNotFoundError:
