@@ -6,13 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER, N_MESH_LANDMARKS
-from tts2face.numeric.arrays import points_in_polygon
+from tts2face.numeric.arrays import FloatArray, points_in_polygon
 from tts2face.picture.kernels.warps import sample_triangles
 
 RING_SCALE = 1.35  # scale of the ring of skin around the face, relative to its oval
 MOUTH_LANDMARKS = (*INNER_LIP_UPPER, *INNER_LIP_LOWER[-2:0:-1])  # in order around the inner lips
 MARGIN_PX = 2.0  # between the mesh and the edge of the texture
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +56,7 @@ def build_reference_frame(shape: NDArray[np.floating], triangles: NDArray[np.int
 
 
 def rasterise_triangles(
-    points: Floats, triangles: NDArray[np.int32], size: tuple[int, int]
+    points: FloatArray, triangles: NDArray[np.int32], size: tuple[int, int]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Triangle over each pixel (-1: none) and the pixel's barycentric coordinates in it."""
     width, height = size
@@ -74,7 +73,7 @@ def rasterise_triangles(
     return owner, weights
 
 
-def barycentric_coordinates(places: NDArray[np.floating], corners: Floats) -> Floats:
+def barycentric_coordinates(places: NDArray[np.floating], corners: FloatArray) -> FloatArray:
     """(P, 3) barycentric coordinates of (P, 2) places in a triangle (3, 2); a degenerate triangle contains no point."""
     a, b, c = corners
     across, along, off = b - a, c - a, places - a

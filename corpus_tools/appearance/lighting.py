@@ -5,23 +5,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import Float32Array
+
 GAIN_LIMITS = (0.5, 2.0)  # beyond them it is another scene, not another light
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LightingCorrection:
     """``texture in the reference's light = gain * texture + offset``, each (3,)."""
 
-    gain: Floats
-    offset: Floats
+    gain: Float32Array
+    offset: Float32Array
 
-    def apply(self, texture: Floats) -> Floats:
+    def apply(self, texture: Float32Array) -> Float32Array:
         """(P, 3) a texture in the reference's light."""
         return self.gain * texture + self.offset
 
 
-def fit_lighting(texture: Floats, reference: Floats, still: NDArray[np.bool_]) -> LightingCorrection:
+def fit_lighting(texture: Float32Array, reference: Float32Array, still: NDArray[np.bool_]) -> LightingCorrection:
     """The light of a recording whose mean texture (P, 3) this is, by least squares on the pixels that speech leaves.
 
     Parameters

@@ -5,9 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.numeric.arrays import fix_signs
-
-Floats = NDArray[np.float32]
+from tts2face.numeric.arrays import Float32Array, fix_signs
 
 
 @dataclass(slots=True)
@@ -24,8 +22,8 @@ class IncrementalPca:
 
     n_kept: int
     n_rows: int = 0
-    mean: Floats = field(default_factory=lambda: np.zeros(0, np.float32))
-    basis: Floats = field(default_factory=lambda: np.zeros((0, 0), np.float32))
+    mean: Float32Array = field(default_factory=lambda: np.zeros(0, np.float32))
+    basis: Float32Array = field(default_factory=lambda: np.zeros((0, 0), np.float32))
     singular_values: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     total_variance: float = 0.0
 
@@ -64,7 +62,7 @@ class IncrementalPca:
         return shares
 
 
-def _truncated_svd(rows: Floats, n_kept: int) -> tuple[Floats, NDArray[np.float64]]:
+def _truncated_svd(rows: Float32Array, n_kept: int) -> tuple[Float32Array, NDArray[np.float64]]:
     """Leading right singular vectors (K, D) and singular values (K,) of (B, D) rows, by the smaller Gram matrix."""
     products = rows @ rows.T if len(rows) <= rows.shape[1] else rows.T @ rows
     values, vectors = np.linalg.eigh(products.astype(np.float64))

@@ -3,14 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.appearance.frame import Floats
+from tts2face.numeric.arrays import FloatArray
 
 N_ROUNDS = 5  # the mean changes by less than 1e-4 px after three
 
 
 def fit_similarities(
     shapes: NDArray[np.floating], target: NDArray[np.floating]
-) -> tuple[NDArray[np.complex128], Floats]:
+) -> tuple[NDArray[np.complex128], FloatArray]:
     """Least-squares similarity transforms from shapes to a target.
 
     Parameters
@@ -30,13 +30,13 @@ def fit_similarities(
     return turns, np.stack([offsets.real, offsets.imag], axis=-1)
 
 
-def apply_similarities(shapes: NDArray[np.floating], turns: NDArray[np.complex128], shifts: Floats) -> Floats:
+def apply_similarities(shapes: NDArray[np.floating], turns: NDArray[np.complex128], shifts: FloatArray) -> FloatArray:
     """(T, N, 2) shapes under similarity transforms."""
     there = turns[:, None] * to_complex(shapes)
     return np.stack([there.real, there.imag], axis=-1) + shifts[:, None]
 
 
-def align_shapes(shapes: NDArray[np.floating]) -> tuple[Floats, Floats]:
+def align_shapes(shapes: NDArray[np.floating]) -> tuple[FloatArray, FloatArray]:
     """(T, N, 2) shapes aligned with their mean, and the mean (N, 2), of the mean size of the shapes.
 
     Generalised Procrustes analysis (Goodall 1991); the mean keeps position, size and rotation of the arithmetic mean of

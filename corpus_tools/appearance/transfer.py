@@ -8,17 +8,16 @@ from numpy.typing import NDArray
 from corpus_tools.appearance.frame import rasterise_triangles
 from tts2face.lips.cloning import MAX_STANDARD_DEVIATIONS
 from tts2face.models.appearance import Appearance, TextureModel, nearest_pixels
+from tts2face.numeric.arrays import FloatArray
 from tts2face.picture.kernels.warps import sample_triangles
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AppearanceTransfer:
     """Linear map of appearance parameters: ``relation`` (A, B) from source to target; ``limits`` (A,) of the target."""
 
-    relation: Floats
-    limits: Floats
+    relation: FloatArray
+    limits: FloatArray
 
     def parameters(self, parameters: NDArray[np.floating], *, gain: float = 1.0) -> NDArray[np.float32]:
         """(T, A) appearance parameters of the target for (T, B) of the source."""
@@ -45,7 +44,7 @@ def build_appearance_transfer(source: Appearance, target: Appearance) -> Appeara
     return AppearanceTransfer(relation, MAX_STANDARD_DEVIATIONS * target.spread.astype(np.float64))
 
 
-def _basis_products(source: TextureModel, target: TextureModel) -> Floats:
+def _basis_products(source: TextureModel, target: TextureModel) -> FloatArray:
     """(A, B) inner products of the target's basis textures with the source's, warped to the target's frame."""
     owner, weights = rasterise_triangles(target.reference.astype(np.float64), target.triangles, target.size)
     corners = target.triangles[owner[target.pixels]].astype(np.int32)

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.decomposition.stills import NEUTRAL, Floats, Still, required_stills
+from corpus_tools.decomposition.stills import NEUTRAL, Still, required_stills
 from lexicon.errors import DataError, InputError
 from tts2face.models.landmarks import N_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.models.palette import EXPRESSIONS
+from tts2face.numeric.arrays import FloatArray
 
 MIN_EXPRESSION_MM = 0.3  # root mean square over landmarks; trackers differ by half of it from still to still
 
@@ -29,8 +30,8 @@ class ExpressionBasis:
         Displacement of each of `tts2face.models.palette.EXPRESSIONS` from rest, mm.
     """
 
-    rest: Floats
-    expressions: Floats
+    rest: FloatArray
+    expressions: FloatArray
 
 
 def transfer_basis(
@@ -66,7 +67,7 @@ def transfer_basis(
 
 
 def basis_from_stills(
-    stills: Mapping[str, Still], read: Callable[[Still], Floats], *, rest: NDArray[np.floating] | None = None
+    stills: Mapping[str, Still], read: Callable[[Still], FloatArray], *, rest: NDArray[np.floating] | None = None
 ) -> ExpressionBasis:
     """Captured expressions of a person.
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
+from tts2face.numeric.arrays import FloatArray
 from tts2face.numeric.least_squares import bounded_least_squares
 
 if TYPE_CHECKING:
@@ -24,13 +25,11 @@ MAX_SLACK = 1.0  # Ju and Lee 2008, section 4.1
 MIN_CONDITION = 1e-9  # of the largest singular value: below it the weights of expressions are not unique
 CHUNK_SIZE = 4096  # frames per query, to bound memory
 
-Floats = NDArray[np.float64]
-
 
 class Estimator(Protocol):
     """Estimator of weights (T, B) from displacements (T, ...)."""
 
-    def weights(self, displacements: NDArray[np.floating]) -> Floats:
+    def weights(self, displacements: NDArray[np.floating]) -> FloatArray:
         """Weights (T, B) of the basis expressions in displacements (T, ...) from the face at rest, in mm."""
 
 
@@ -48,11 +47,11 @@ class ReducedBasis:
         The paper's epsilon.
     """
 
-    axes: Floats
-    rows: Floats
+    axes: FloatArray
+    rows: FloatArray
     slack: float
 
-    def split(self, displacements: NDArray[np.floating]) -> tuple[Floats, Floats]:
+    def split(self, displacements: NDArray[np.floating]) -> tuple[FloatArray, FloatArray]:
         """(T, B) displacements within the span, and (T,) their squared distance from it."""
         flat = np.asarray(displacements, np.float64).reshape(len(displacements), -1)
         if flat.shape[1] != len(self.axes):
@@ -68,12 +67,12 @@ class LeastSquaresEstimator:
 
     basis: ReducedBasis
 
-    def weights(self, displacements: NDArray[np.floating]) -> Floats:
+    def weights(self, displacements: NDArray[np.floating]) -> FloatArray:
         """As `Estimator`; exact up to rounding."""
         within, _ = self.basis.split(displacements)
         rows, slack = self.basis.rows, self.basis.slack
         limits = np.tile([-slack, 1.0 + slack], (len(rows), 1))
-        solved: Floats = bounded_least_squares(rows @ rows.T, within @ rows.T, limits)
+        solved: FloatArray = bounded_least_squares(rows @ rows.T, within @ rows.T, limits)
         return solved
 
 
@@ -92,11 +91,11 @@ class NearestSamplesEstimator:
     """
 
     basis: ReducedBasis
-    samples: Floats
+    samples: FloatArray
     tree: "cKDTree[Any]"
     n_nearest: int
 
-    def weights(self, displacements: NDArray[np.floating]) -> Floats:
+    def weights(self, displacements: NDArray[np.floating]) -> FloatArray:
         """As `Estimator`.
 
         Notes
@@ -110,18 +109,18 @@ class NearestSamplesEstimator:
             found[span] = self._mix_samples(*self.basis.split(displacements[span]))
         return found
 
-    def _mix_samples(self, within: Floats, beyond: Floats) -> Floats:
+    def _mix_samples(self, within: FloatArray, beyond: FloatArray) -> FloatArray:
         near, at = self.tree.query(within, k=self.n_nearest)
         shape = (len(within), self.n_nearest)
         squares = np.reshape(near, shape) ** 2 + beyond[:, None]
         least = np.maximum(squares.min(axis=1, keepdims=True), np.finfo(np.float64).tiny)
         shares = np.sqrt(least / np.maximum(squares, least))  # relative to the nearest: no distance divides by 0
         shares /= shares.sum(axis=1, keepdims=True)
-        mixed: Floats = np.einsum("tk,tkb->tb", shares, self.samples[np.reshape(at, shape)])
+        mixed: FloatArray = np.einsum("tk,tkb->tb", shares, self.samples[np.reshape(at, shape)])
         return mixed
 
 
-def moving_average(motion: NDArray[np.floating]) -> Floats:
+def moving_average(motion: NDArray[np.floating]) -> FloatArray:
     """(T, ...) centred mean of the `N_AVERAGED` frames about each; beyond a recording's ends its motion is mirrored.
 
     With mirrored ends all windows have the same length; windows that shorten towards an end would leave the lips of the
@@ -129,7 +128,7 @@ def moving_average(motion: NDArray[np.floating]) -> Floats:
     """
     from scipy.ndimage import uniform_filter1d
 
-    mean: Floats = uniform_filter1d(np.asarray(motion, np.float64), N_AVERAGED, axis=0, mode="reflect")
+    mean: FloatArray = uniform_filter1d(np.asarray(motion, np.float64), N_AVERAGED, axis=0, mode="reflect")
     return mean
 
 

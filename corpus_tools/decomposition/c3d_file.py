@@ -14,6 +14,8 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import FloatArray
+
 BLOCK_BYTES = 512
 HEADER_KEY = 80  # second byte of a file, and of its parameters where a writer sets it
 DEC, BIG_ENDIAN = 85, 86  # of the processors; 84 is that of Intel
@@ -21,7 +23,6 @@ CHARACTERS, FLOATS = -1, 4  # types of parameters; 1 and 2 are whole numbers of 
 TRIAL_FIELDS = ("TRIAL:ACTUAL_START_FIELD", "TRIAL:ACTUAL_END_FIELD")  # of Vicon
 LARGEST_COUNT = 2**16 - 1  # of frames, in words of 16 bits; longer recordings say their number elsewhere
 
-Floats = NDArray[np.float64]
 Parameters = Mapping[str, Any]  # by names such as POINT:RATE: a list of texts, or an array of numbers
 
 
@@ -39,8 +40,8 @@ class C3dFile:
         Its parameters by group and name.
     """
 
-    points: Floats
-    channels: Floats
+    points: FloatArray
+    channels: FloatArray
     parameters: Parameters
 
     def labels(self, group: str) -> list[str]:

@@ -10,14 +10,13 @@ from corpus_tools.recordings.sound import SOUND_RATE
 from lexicon.errors import DataError, InputError
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.palette import FEATURES, GESTURE_FPS
+from tts2face.numeric.arrays import FloatArray
 from tts2face.types import HEAD_CHANNELS, Waveform
 from tts2face.video.media import read_sound
 
 SOUND_SUFFIXES = (".wav", ".flac", ".m4a", ".mp3", ".ogg", ".opus", ".mov", ".mp4")  # of sound files beside a capture
 CHUNK_SIZE = 128  # coordinates resampled at once, to bound memory
 RATE_TOLERANCE_FPS = 1e-6  # frames a second
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,7 +77,7 @@ def resample_to_gesture_rate(captured: FaceRecording) -> FaceRecording:
     )
 
 
-def resample(values: NDArray[np.floating], fps: float, target_fps: float) -> Floats:
+def resample(values: NDArray[np.floating], fps: float, target_fps: float) -> FloatArray:
     """Values (T, ...) at another frame rate, with the first frame at the same instant.
 
     Raises
@@ -102,7 +101,7 @@ def resample(values: NDArray[np.floating], fps: float, target_fps: float) -> Flo
     return read.reshape(n_frames, *values.shape[1:])
 
 
-def _interpolate_frames(values: Floats, fps: float, target_fps: float, n_frames: int) -> Floats:
+def _interpolate_frames(values: FloatArray, fps: float, target_fps: float, n_frames: int) -> FloatArray:
     from scipy.interpolate import make_interp_spline
 
     instants, end = np.arange(n_frames) / target_fps, (len(values) - 1) / fps

@@ -20,7 +20,7 @@ from tts2face.models.palette import (
     GESTURE_FPS,
     REGION_FEATURES,
 )
-from tts2face.numeric.arrays import interpolate_columns
+from tts2face.numeric.arrays import Float32Array, interpolate_columns
 
 TREMOR_SMOOTHING_S = 0.03  # standard deviation of the Gaussian that removes tracking noise from head, brows and cheeks
 # Of tracked lids that touch; first percentile of 40 minutes of one person (docs/gestures.md).
@@ -34,7 +34,6 @@ IRIS_SHIFT_PER_RAD = (-0.23, 0.33)
 # expression; without lips, smiles are hard to detect (docs/gestures.md).
 LIP_WEIGHT = 0.1
 MAX_GAZE_LID_CLOSURE = 0.35  # beyond this closure the lid hides the iris
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,10 +51,10 @@ class Decomposition:
     """
 
     name: str
-    motion: dict[str, Floats]
-    speech: Floats
-    intensity: Floats
-    pitch: Floats
+    motion: dict[str, Float32Array]
+    speech: Float32Array
+    intensity: Float32Array
+    pitch: Float32Array
 
 
 def decompose(captured: FaceRecording, basis: ExpressionBasis, estimator: Estimator) -> Decomposition:
@@ -105,7 +104,7 @@ def weight_displacements(displacements: NDArray[np.floating]) -> NDArray[np.floa
     return np.asarray(displacements, np.float64) * counts
 
 
-def lid_closure(landmarks: NDArray[np.floating], rest: NDArray[np.floating]) -> Floats:
+def lid_closure(landmarks: NDArray[np.floating], rest: NDArray[np.floating]) -> Float32Array:
     """(T, 2) closure of the left and the right lids in landmarks (T, 478, 3): 0 as at rest (478, 3), 1 fully closed."""
     columns = []
     for side in ("Left", "Right"):
@@ -126,7 +125,7 @@ def eye_angles(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
     return np.asarray(np.mean(turned, axis=0), np.float64)
 
 
-def gaze_angles(turned: NDArray[np.float64], head: NDArray[np.floating], shut: Floats) -> Floats:
+def gaze_angles(turned: NDArray[np.float64], head: NDArray[np.floating], shut: Float32Array) -> Float32Array:
     """(T, 2) gaze pitch and yaw relative to the recording's median, from the eyes' angles (T, 2) in the head.
 
     Frames in which lids hide the irises are interpolated linearly.
@@ -136,11 +135,11 @@ def gaze_angles(turned: NDArray[np.float64], head: NDArray[np.floating], shut: F
     if len(seen):
         frames = np.arange(len(gaze))
         gaze = interpolate_columns(gaze[seen], seen, frames)
-    centred: Floats = (gaze - np.median(gaze, axis=0)).astype(np.float32)
+    centred: Float32Array = (gaze - np.median(gaze, axis=0)).astype(np.float32)
     return centred
 
 
-def _smooth(values: NDArray[np.floating]) -> Floats:
+def _smooth(values: NDArray[np.floating]) -> Float32Array:
     from scipy.ndimage import gaussian_filter1d
 
     return np.asarray(gaussian_filter1d(values, TREMOR_SMOOTHING_S * GESTURE_FPS, axis=0), np.float32)

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from corpus_tools.decomposition.c3d_file import C3dFile, read_c3d_file
 from corpus_tools.recordings.sound import SOUND_RATE
 from lexicon.errors import DataError, InputError
 from lexicon.values.tables import read_table
 from tts2face.models.palette import GESTURE_FPS
+from tts2face.numeric.arrays import FloatArray
 from tts2face.types import Waveform
 
 MM_PER_UNIT = {"": 1.0, "mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "in": 25.4, "inch": 25.4, "ft": 304.8}
@@ -22,15 +22,13 @@ TIME_TOLERANCE_FRAMES = 0.25  # of a frame: times in a file are rounded, often t
 MIN_GAP_STEPS = 1.5  # of the usual step: a longer one is a gap of frames
 AXES = ("x", "y", "z")
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MarkerTake:
     """Contents of a file: `points` (T, M, 3) in mm of the markers `names`, NaN in gaps, and sound where it has some."""
 
     names: tuple[str, ...]
-    points: Floats
+    points: FloatArray
     fps: float
     sound: Waveform | None = None
 
@@ -129,7 +127,7 @@ def _parse_row(path: Path, number: int, row: list[str], n_columns: int) -> list[
 
 
 def _build_even_take(
-    path: Path, names: tuple[str, ...], points: Floats, counted: tuple[str, Floats], fps: float | None
+    path: Path, names: tuple[str, ...], points: FloatArray, counted: tuple[str, FloatArray], fps: float | None
 ) -> MarkerTake:
     """Frames at a constant rate; missing rows of a table are gaps."""
     what, at = counted

@@ -5,16 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.decomposition.marker_interpolation import Floats
 from lexicon.errors import DataError
-from tts2face.numeric.arrays import true_runs
+from tts2face.numeric.arrays import FloatArray, true_runs
 
 MAX_MARKER_GAP_S = 0.2  # motion in longer gaps cannot be interpolated reliably
 MARKER_SET_ADVICE = "give a marker set without it"
 MAX_QUOTED_MARKERS = 4  # markers quoted in a message
 
 
-def fill_marker_gaps(tracks: Floats, names: Sequence[str], fps: float) -> tuple[Floats, tuple[str, ...]]:
+def fill_marker_gaps(tracks: FloatArray, names: Sequence[str], fps: float) -> tuple[FloatArray, tuple[str, ...]]:
     """Tracks without gaps, and a note on the filled gaps.
 
     Parameters
@@ -53,7 +52,7 @@ def check_gap(what: str, is_missing: NDArray[np.bool_], fps: float) -> None:
         )
 
 
-def _interpolate_gaps(track: Floats, is_missing: NDArray[np.bool_]) -> Floats:
+def _interpolate_gaps(track: FloatArray, is_missing: NDArray[np.bool_]) -> FloatArray:
     """(G, 3) positions in the frames of gaps."""
     from scipy.interpolate import PchipInterpolator
 

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from tts2face.models.landmarks import (
@@ -15,6 +14,7 @@ from tts2face.models.landmarks import (
     OUTER_LIP_LOWER,
     OUTER_LIP_UPPER,
 )
+from tts2face.numeric.arrays import FloatArray
 from tts2face.numeric.splines import fit_interpolant
 from tts2face.video.pose import similarity_transforms
 
@@ -40,7 +40,6 @@ LOWER_LIDS = (
     (7, 163, 144, 145, 153, 154, 155, 25, 110, 24, 23, 22, 26, 112),
     (249, 390, 373, 374, 380, 381, 382, 255, 339, 254, 253, 252, 256, 341),
 )
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,19 +56,19 @@ class MarkerInterpolator:
         ``common / size = turn @ head + shift``, from the head's axes: (3, 3), (3,), and common over own size.
     """
 
-    rest: Floats
-    shares: Floats
-    rotation: Floats
-    translation: Floats
+    rest: FloatArray
+    shares: FloatArray
+    rotation: FloatArray
+    translation: FloatArray
     size: float
 
-    def landmarks(self, displacements: Floats) -> Floats:
+    def landmarks(self, displacements: FloatArray) -> FloatArray:
         """(T, 478, 3) landmarks for displacements (T, M, 3) of the markers in the head's axes, mm."""
-        moved: Floats = np.einsum("lm,tmi->tli", self.shares, displacements @ self.rotation.T, optimize=True)
+        moved: FloatArray = np.einsum("lm,tmi->tli", self.shares, displacements @ self.rotation.T, optimize=True)
         return self.rest + moved
 
 
-def build_marker_interpolator(markers: Floats, at: Sequence[int], common: Floats) -> MarkerInterpolator:
+def build_marker_interpolator(markers: FloatArray, at: Sequence[int], common: FloatArray) -> MarkerInterpolator:
     """The interpolator from a person's markers to landmarks.
 
     Parameters
@@ -110,7 +109,7 @@ def build_marker_interpolator(markers: Floats, at: Sequence[int], common: Floats
     return MarkerInterpolator(rest, shares, turn, shift, size)
 
 
-def _query_points(rest: Floats) -> Floats:
+def _query_points(rest: FloatArray) -> FloatArray:
     """(478, 3) positions at which the field is evaluated for each landmark: its own, or that of the outer lip line."""
     queries = rest.copy()
     for outer, lines in ((OUTER_LIP_UPPER, UPPER_LIP_LINES), (OUTER_LIP_LOWER, LOWER_LIP_LINES)):
@@ -119,7 +118,7 @@ def _query_points(rest: Floats) -> Floats:
     return queries
 
 
-def _landmark_groups(common: Floats) -> list[tuple[list[int], set[int]]]:
+def _landmark_groups(common: FloatArray) -> list[tuple[list[int], set[int]]]:
     """Groups of landmarks that depend on the same markers, each with the landmarks of the excluded markers."""
     corners = {landmark for line in (OUTER_LIP_UPPER, *UPPER_LIP_LINES) for landmark in (line[0], line[-1])}
     upper = {*OUTER_LIP_UPPER, *(landmark for line in UPPER_LIP_LINES for landmark in line)} - corners

@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.decomposition.marker_gaps import check_gap
-from corpus_tools.decomposition.marker_interpolation import Floats
 from lexicon.errors import DataError
-from tts2face.numeric.arrays import interpolate_columns
+from tts2face.numeric.arrays import FloatArray, interpolate_columns
 from tts2face.video.pose import similarity_transforms
 
 MIN_VISIBLE_MARKERS = 3  # markers that show a pose
@@ -31,18 +30,18 @@ class HeadPoses:
         ``world = rotations @ head + places``.
     """
 
-    reference: Floats
-    rotations: Floats
-    places: Floats
+    reference: FloatArray
+    rotations: FloatArray
+    places: FloatArray
 
-    def remove_from(self, points: Floats) -> Floats:
+    def remove_from(self, points: FloatArray) -> FloatArray:
         """(T, M, 3) points in the head's own axes."""
-        local: Floats = np.einsum("tij,tmi->tmj", self.rotations, points - self.places[:, None])
+        local: FloatArray = np.einsum("tij,tmi->tmj", self.rotations, points - self.places[:, None])
         return local
 
 
 def fit_head_poses(
-    points: Floats, names: Sequence[str], fps: float, *, reference: Floats | None = None
+    points: FloatArray, names: Sequence[str], fps: float, *, reference: FloatArray | None = None
 ) -> tuple[HeadPoses, tuple[str, ...]]:
     """Poses of the head, and a note on filled gaps.
 
@@ -83,7 +82,9 @@ def fit_head_poses(
     return HeadPoses(head, *_interpolate_poses(rotations, places, posed)), notes
 
 
-def _interpolate_poses(rotations: Floats, places: Floats, posed: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+def _interpolate_poses(
+    rotations: FloatArray, places: FloatArray, posed: NDArray[np.bool_]
+) -> tuple[FloatArray, FloatArray]:
     """Poses of all frames, interpolated from known ones: spherical for rotations, linear for positions."""
     from scipy.spatial.transform import Rotation, Slerp
 
@@ -96,15 +97,15 @@ def _interpolate_poses(rotations: Floats, places: Floats, posed: NDArray[np.bool
     return turned, interpolate_columns(places, there, frames)
 
 
-def _first_reference(points: Floats, is_visible: NDArray[np.bool_]) -> Floats:
+def _first_reference(points: FloatArray, is_visible: NDArray[np.bool_]) -> FloatArray:
     whole = np.flatnonzero(is_visible.all(axis=1))
     if not len(whole):
         raise DataError("no frame shows all markers of the head; remove rarely visible ones from the set")
-    head: Floats = points[whole[0]] - points[whole[0]].mean(axis=0)
+    head: FloatArray = points[whole[0]] - points[whole[0]].mean(axis=0)
     return head
 
 
-def _fit_poses(points: Floats, is_visible: NDArray[np.bool_], head: Floats) -> tuple[Floats, Floats]:
+def _fit_poses(points: FloatArray, is_visible: NDArray[np.bool_], head: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Rotations (T, 3, 3) and positions (T, 3) of the head, fitted jointly for frames with the same visible markers."""
     rotations, places = np.zeros((len(points), 3, 3)), np.zeros((len(points), 3))
     patterns, which = np.unique(is_visible, axis=0, return_inverse=True)

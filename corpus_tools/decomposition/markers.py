@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from corpus_tools.decomposition.capture import FaceRecording, read_capture_sound
 from corpus_tools.decomposition.marker_files import MarkerTake, read_markers
@@ -15,11 +14,10 @@ from corpus_tools.decomposition.marker_sets import MIN_FACE_MARKERS, MarkerSet
 from lexicon.errors import DataError
 from tts2face.face.landmarks import rest_landmarks
 from tts2face.models.face import Face
-from tts2face.numeric.arrays import nearest_rotation
+from tts2face.numeric.arrays import FloatArray, nearest_rotation
 from tts2face.video.pose import head_angles
 
 MAX_QUOTED_MARKERS = 6  # markers quoted in a message
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,8 +37,8 @@ class MarkerFace:
     marker_set: MarkerSet
     names: tuple[str, ...]
     head_names: tuple[str, ...]
-    head: Floats
-    rest: Floats
+    head: FloatArray
+    rest: FloatArray
     spread: MarkerInterpolator
 
 
@@ -95,10 +93,10 @@ def read_marker_face(path: Path, face: Face, marker_set: MarkerSet, *, fps: floa
     return MarkerFace(marker_set, names, head_names, poses.reference, rest, spread)
 
 
-def read_marker_still(path: Path, rest: MarkerFace) -> Floats:
+def read_marker_still(path: Path, rest: MarkerFace) -> FloatArray:
     """(478, 3) landmarks of a static capture, the median of its frames; errors as `read_marker_recording`."""
     points, _, _ = _face_in_head_axes(path, read_markers(path), rest.names, rest.head_names, rest.head)
-    found: Floats = rest.spread.landmarks(np.median(points, axis=0)[None] - rest.rest)[0]
+    found: FloatArray = rest.spread.landmarks(np.median(points, axis=0)[None] - rest.rest)[0]
     return found
 
 
@@ -126,8 +124,8 @@ def _absent_markers(take: MarkerTake, marker_set: MarkerSet) -> tuple[str, ...]:
 
 
 def _face_in_head_axes(
-    path: Path, take: MarkerTake, names: tuple[str, ...], head_names: tuple[str, ...], head: Floats | None
-) -> tuple[Floats, HeadPoses, tuple[str, ...]]:
+    path: Path, take: MarkerTake, names: tuple[str, ...], head_names: tuple[str, ...], head: FloatArray | None
+) -> tuple[FloatArray, HeadPoses, tuple[str, ...]]:
     """(T, M, 3) markers of the face in the head's axes without gaps, the head's poses, and notes on filled gaps."""
     at = {name: number for number, name in enumerate(take.names)}
     missing = [name for name in (*names, *head_names) if name not in at]
@@ -145,7 +143,7 @@ def _face_in_head_axes(
     return whole, poses, (*head_notes, *notes)
 
 
-def _head_motion(poses: HeadPoses, spread: MarkerInterpolator, face: Face) -> Floats:
+def _head_motion(poses: HeadPoses, spread: MarkerInterpolator, face: Face) -> FloatArray:
     """(T, 6) `HEAD_CHANNELS` in the face's axes: angles relative to the mean, pivot relative to the median."""
     turn = spread.rotation
     mean = nearest_rotation(poses.rotations.mean(axis=0))

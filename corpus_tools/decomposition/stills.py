@@ -11,6 +11,7 @@ from corpus_tools.decomposition.markers import MarkerFace, read_marker_still
 from corpus_tools.recordings.folder import VIDEO_SUFFIXES
 from lexicon.errors import DataError, InputError
 from tts2face.models.palette import EXPRESSIONS
+from tts2face.numeric.arrays import FloatArray
 from tts2face.storage.pictures import open_picture
 from tts2face.video.media import TimedFrame, read_frames
 from tts2face.video.pose import remove_pose
@@ -20,7 +21,6 @@ NEUTRAL = "neutral"
 PICTURE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"})
 MARKER_SUFFIXES = frozenset({".c3d", ".csv"})
 LAST_FRAME_S = 0.1  # how long a video's last frame is shown at most
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +92,7 @@ class PictureReader:
     def __init__(self, model: Path | None = None) -> None:
         self._tracker = FaceTracker(model)
 
-    def __call__(self, still: Still) -> Floats:
+    def __call__(self, still: Still) -> FloatArray:
         """(478, 3) landmarks without head pose.
 
         Raises
@@ -107,7 +107,7 @@ class PictureReader:
         return np.asarray(remove_pose(tracking.points, 1.0).landmarks[0], np.float64)
 
 
-def build_marker_reader(rest: MarkerFace) -> Callable[[Still], Floats]:
+def build_marker_reader(rest: MarkerFace) -> Callable[[Still], FloatArray]:
     """Reader of static marker captures of a person, in the person's own size."""
     return lambda still: read_marker_still(still.path, rest)
 

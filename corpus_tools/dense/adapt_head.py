@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.dense.mesh_fit import Floats, HeadWarp, eyes_from_right, fit_head_warp, part_vertices
+from corpus_tools.dense.mesh_fit import HeadWarp, eyes_from_right, fit_head_warp, part_vertices
 from tts2face.models.face import Eye, Face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.numeric.arrays import FloatArray
 from tts2face.processes.threads import available_cores
 from tts2face.video.pose import similarity_transforms
 
@@ -53,7 +54,7 @@ def adapt_head(face: Face, talker: NDArray[np.floating]) -> Face:
     )
 
 
-def _fit_similarity(before: Floats, after: Floats) -> tuple[Floats, Floats]:
+def _fit_similarity(before: FloatArray, after: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Scaled rotation (3, 3) and shift (3,) nearest to a motion of points (P, 3)."""
     turns, scales = similarity_transforms(before[None], after, np.full(len(before), 1.0 / len(before)))
     linear = scales[0] * turns[0]
@@ -67,7 +68,7 @@ def _lip_protrusion(warp: HeadWarp) -> float:
     return float(warp.field(centres)[:, 2].mean())
 
 
-def _place_eyes(face: Face, warp: HeadWarp, rest: Floats, moved: Floats) -> list[Eye]:
+def _place_eyes(face: Face, warp: HeadWarp, rest: FloatArray, moved: FloatArray) -> list[Eye]:
     """The eyes in their new sockets; writes their vertices into `moved`."""
     places = {}
     for eye, socket in zip(eyes_from_right(face), warp.sockets, strict=True):
@@ -77,7 +78,7 @@ def _place_eyes(face: Face, warp: HeadWarp, rest: Floats, moved: Floats) -> list
     return [replace(eye, centre=places[eye.first].astype(np.float32)) for eye in face.eyes]
 
 
-def _warp_shapes(face: Face, warp: HeadWarp, soft: NDArray[np.int64], moved: Floats) -> Floats:
+def _warp_shapes(face: Face, warp: HeadWarp, soft: NDArray[np.int64], moved: FloatArray) -> FloatArray:
     """(K, V, 3) shapes: the warped position of a displaced vertex minus its warped position at rest.
 
     mouthClose is warped relative to the open jaw, which it closes.
@@ -100,7 +101,7 @@ def _warp_shapes(face: Face, warp: HeadWarp, soft: NDArray[np.int64], moved: Flo
     return shapes
 
 
-def _warp_pivot(face: Face, warp: HeadWarp) -> Floats:
+def _warp_pivot(face: Face, warp: HeadWarp) -> FloatArray:
     place = face.pivot.astype(np.float64)[None]
-    turned: Floats = (place + warp.field(place))[0]
+    turned: FloatArray = (place + warp.field(place))[0]
     return turned

@@ -17,6 +17,7 @@ from tts2face.models.consent import PHOTO_TOOL, consent_record
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.landmarks import N_LANDMARKS, N_MESH_LANDMARKS
+from tts2face.numeric.arrays import FloatArray
 from tts2face.photo.found_face import PhotographedFace, PhotoReader, find_face
 from tts2face.photo.lines import find_lip_line
 from tts2face.photo.photograph import split_number
@@ -27,8 +28,6 @@ from tts2face.processes.threads import available_cores
 from tts2face.storage.shipped import find_file
 from tts2face.video.pose import remove_pose
 from tts2face.video.tracking import FaceTracker
-
-Floats = NDArray[np.float64]
 
 MIRRORED_WEIGHT = 0.03  # of a mirrored picture, which fills what a turned head hides
 OPENING_SCALE = np.array([1.02, 1.25])  # of the opening between lips, for its rim
@@ -101,7 +100,7 @@ def build_avatar(  # noqa: PLR0913 - one parameter an option
 
 def _read(
     photos: Sequence[str | Path], head: Face, model: Path | None, on_warning: Callable[[str], None]
-) -> tuple[list[TrackedPictures], list[Floats]]:
+) -> tuple[list[TrackedPictures], list[FloatArray]]:
     """The look that the pictures show, and the landmarks (478, 3) of each without its expression, mm."""
     reader = PhotoReader(model, on_warning)
     seen, neutral = [], []
@@ -116,14 +115,14 @@ def _read(
     return seen, neutral
 
 
-def widened(opening: Floats) -> Floats:
+def widened(opening: FloatArray) -> FloatArray:
     """An opening (N, 2) with the rim that its darkness colours."""
     middle = opening.mean(axis=0)
-    grown: Floats = middle + OPENING_SCALE * (opening - middle)
+    grown: FloatArray = middle + OPENING_SCALE * (opening - middle)
     return grown
 
 
-def person_landmarks(shown: PhotographedFace, head: Face, tracker: FaceTracker) -> Floats:
+def person_landmarks(shown: PhotographedFace, head: Face, tracker: FaceTracker) -> FloatArray:
     """Landmarks (468, 3) on a head, mm, of a photographed person without the expression.
 
     They are those of the head, moved by the difference between what the tracker reads in the photograph and in a

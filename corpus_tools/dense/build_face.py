@@ -31,13 +31,12 @@ from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.models.talker import NOT_STATED
+from tts2face.numeric.arrays import FloatArray
 from tts2face.picture.occlusion import bake_occlusion
 from tts2face.processes.threads import available_cores
 from tts2face.storage.shipped import find_file
 from tts2face.types import Progress
 from tts2face.video.networks import find_bundle
-
-Floats = NDArray[np.float64]
 
 AROUND_GLOSS = 30.0  # texels, Gaussian, about 5 mm, whose colours lie under gloss
 SOURCE_FACE = "head"  # the shipped face that is adapted
@@ -129,7 +128,7 @@ class FittedHead:
     """The head in the shape of a person with landmarks (468 or more, 3) at rest, and those that it was fitted to."""
 
     shaped: Face
-    person: Floats
+    person: FloatArray
     used: NDArray[np.int64]
 
     def error_mm(self) -> float:
@@ -139,7 +138,7 @@ class FittedHead:
         return float(np.linalg.norm(again - reached, axis=1)[self.used].mean())
 
 
-def fit_person(head: Face, person: Floats) -> FittedHead:
+def fit_person(head: Face, person: FloatArray) -> FittedHead:
     """The head in the shape of a person whose landmarks (468 or more, 3) at rest have any size."""
     rest = face_landmarks(head, head.vertices)[:N_MESH_LANDMARKS]
     target = correct_lips_and_lids(rest, align_to_head(person, rest))

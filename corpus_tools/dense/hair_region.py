@@ -3,14 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from corpus_tools.dense.light_colour import log_colour
 from corpus_tools.dense.skin_canvas import polygon_depth
 from tts2face.models.landmarks import CHIN, FACE_OVAL
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from tts2face.numeric.arrays import FloatArray, Mask
 
 CELL_MM = 3.0
 ACROSS_MM = np.arange(-165.0, 165.1, CELL_MM)  # of the picture, from between the eyes
@@ -55,8 +52,8 @@ class Portrait:
         The head's landmarks, mm.
     """
 
-    srgb: Floats
-    marks: Floats
+    srgb: FloatArray
+    marks: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,17 +63,17 @@ class SeenHair:
     length: str
     region: Mask
     other: Mask
-    colour: Floats
+    colour: FloatArray
 
 
-def portrait_grid(marks: Floats) -> Floats:
+def portrait_grid(marks: FloatArray) -> FloatArray:
     """(R * C, 3) places of a portrait's cells on the head, mm."""
     across, up = np.meshgrid(ACROSS_MM, UP_MM)
     depth = np.percentile(marks[list(FACE_OVAL), 2], DEPTH_PERCENTILE)
     return np.column_stack([across.ravel(), up.ravel(), np.full(across.size, depth)])
 
 
-def find_hair(portrait: Portrait, skin: Floats) -> SeenHair:
+def find_hair(portrait: Portrait, skin: FloatArray) -> SeenHair:
     """Hair in a portrait of a person with a skin colour (3,), `log_colour`.
 
     The crown, which is inside the skull, tells hair from skin; cells beside it that are nearer to hair already found
@@ -103,14 +100,14 @@ def find_hair(portrait: Portrait, skin: Floats) -> SeenHair:
     allowed = known & (unlike > IS_HAIR) & ~is_inside & ~throat & (off[..., 0] < most)
     space = _colour_space(colours, np.median(off[seed], axis=0))
     region = _grow(space, seed, background, (allowed, up < portrait.marks[CHIN, 1]))
-    colour: Floats = np.median(colours[region], axis=0)
+    colour: FloatArray = np.median(colours[region], axis=0)
     other = background | (known & (unlike < IS_HAIR))
     length = _length(region, portrait.marks, colour - skin)
     is_told = region.sum() > MIN_GROWTH * seed.sum()
     return SeenHair(length if is_told or length != "cropped" else "flat", region, other, colour)
 
 
-def _without_gloss(hair: Mask, light: Floats) -> Mask:
+def _without_gloss(hair: Mask, light: FloatArray) -> Mask:
     """Cells of a crown without those lighter than skin where others are darker: dark hair and gloss of the skin."""
     if not hair.any():
         return hair
@@ -118,9 +115,9 @@ def _without_gloss(hair: Mask, light: Floats) -> Mask:
     return hair & (light < 0) if low < -BESIDE_SKIN and high > BESIDE_SKIN else hair
 
 
-def difference_from_skin(off: Floats, darker: float | Floats) -> Floats:
+def difference_from_skin(off: FloatArray, darker: float | FloatArray) -> FloatArray:
     """(...) distance of colours from skin, of differences (..., 3) of `log_colour`; lighter ones may be shine."""
-    scaled: Floats = np.sqrt(
+    scaled: FloatArray = np.sqrt(
         (np.minimum(off[..., 0], 0.0) / darker) ** 2 + ((off[..., 1:] / OTHER_HUE) ** 2).sum(axis=-1)
     )
     return scaled
@@ -135,13 +132,13 @@ def _edge_cells(known: Mask) -> Mask:
     return edges
 
 
-def _oval_depth(marks: Floats, across: Floats, up: Floats) -> Floats:
+def _oval_depth(marks: FloatArray, across: FloatArray, up: FloatArray) -> FloatArray:
     places = np.column_stack([across.ravel(), up.ravel()])
     depth = np.asarray(polygon_depth(places, marks[list(FACE_OVAL), :2], 2 * INSIDE_MM), np.float64)
     return depth.reshape(across.shape)
 
 
-def _colour_space(colours: Floats, off: Floats) -> Floats:
+def _colour_space(colours: FloatArray, off: FloatArray) -> FloatArray:
     """(R, C, 3) colours in which distances of 1 are large, for hair that differs from skin by `off` (3,)."""
     light = np.exp(colours[..., :1])
     scale = max(CHROMA_SCALE, VIVID * float(np.linalg.norm(off[1:])))
@@ -150,7 +147,7 @@ def _colour_space(colours: Floats, off: Floats) -> Floats:
     )
 
 
-def _grow(space: Floats, seed: Mask, background: Mask, limits: tuple[Mask, Mask]) -> Mask:
+def _grow(space: FloatArray, seed: Mask, background: Mask, limits: tuple[Mask, Mask]) -> Mask:
     """Cells of hair, connected with `seed`; `limits`: where hair may be, and where it is told from clothes strictly."""
     from scipy.ndimage import label
     from scipy.spatial import cKDTree
@@ -168,7 +165,7 @@ def _grow(space: Floats, seed: Mask, background: Mask, limits: tuple[Mask, Mask]
     return region
 
 
-def _distance_to_edges(space: Floats, background: Mask) -> Floats:
+def _distance_to_edges(space: FloatArray, background: Mask) -> FloatArray:
     """(R, C) distance of colours from those at the picture's edge on the same side, at about the same height."""
     from scipy.spatial import cKDTree
 
@@ -182,7 +179,7 @@ def _distance_to_edges(space: Floats, background: Mask) -> Floats:
     return apart
 
 
-def _length(region: Mask, marks: Floats, off: Floats) -> str:
+def _length(region: Mask, marks: FloatArray, off: FloatArray) -> str:
     """Length class: cropped, flat, short, bob or long."""
     chin, forehead = marks[CHIN, 1], marks[FOREHEAD, 1]
     beside = [(region & (side * ACROSS_MM > TEMPLE_MM)).sum(axis=1) * CELL_MM for side in (-1, 1)]

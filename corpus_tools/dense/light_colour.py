@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.dense.skin_canvas import polygon_depth
-from corpus_tools.dense.skin_colour import Floats, sample_picture
+from corpus_tools.dense.skin_colour import sample_picture
 from tts2face.models.landmarks import LID_RINGS
 from tts2face.numeric.arrays import (
     LUMINANCE,
+    FloatArray,
     decode_srgb,
     encode_light,
     encode_srgb,
@@ -46,28 +47,28 @@ EYE_GRID = (41, 25)  # samples across and down an eye
 class EyeColours:
     """Colours (3,), `log_colour`, of skin, white of the eye and iris; those that are not seen are NaN; radius in px."""
 
-    skin: Floats
-    sclera: Floats
-    iris: Floats
+    skin: FloatArray
+    sclera: FloatArray
+    iris: FloatArray
     radius_px: float
 
 
-def log_colour(srgb: NDArray[np.floating]) -> Floats:
+def log_colour(srgb: NDArray[np.floating]) -> FloatArray:
     """(..., 3) logarithms of luminance, R/G and B/G in linear light, of colours (..., 3), sRGB 0..255."""
     light = decode_srgb(np.clip(srgb, 0.0, 255.0) / 255.0) + DARKEST
     green = light[..., 1]
-    found: Floats = np.log(np.stack([light @ LUMINANCE, light[..., 0] / green, light[..., 2] / green], axis=-1))
+    found: FloatArray = np.log(np.stack([light @ LUMINANCE, light[..., 0] / green, light[..., 2] / green], axis=-1))
     return found
 
 
-def linear_light(colour: Floats) -> Floats:
+def linear_light(colour: FloatArray) -> FloatArray:
     """Linear light (..., 3) of `log_colour` values."""
     ratio = np.exp(np.stack([colour[..., 1], np.zeros(colour.shape[:-1]), colour[..., 2]], axis=-1))
-    light: Floats = ratio * (np.exp(colour[..., 0]) / (ratio @ LUMINANCE))[..., None] - DARKEST
+    light: FloatArray = ratio * (np.exp(colour[..., 0]) / (ratio @ LUMINANCE))[..., None] - DARKEST
     return light
 
 
-def srgb_colour(colour: Floats) -> NDArray[np.uint8]:
+def srgb_colour(colour: FloatArray) -> NDArray[np.uint8]:
     """8-bit sRGB (..., 3) of `log_colour` values."""
     return encode_srgb(linear_light(colour))
 
@@ -93,15 +94,15 @@ def sample_eyes(picture: NDArray[np.uint8], points: NDArray[np.floating]) -> Eye
     return EyeColours(skin, _mean_known(whites), _mean_known(irises), float(np.mean(radii)))
 
 
-def _median_between(colours: Floats, quantiles: tuple[float, float]) -> Floats:
+def _median_between(colours: FloatArray, quantiles: tuple[float, float]) -> FloatArray:
     if len(colours) < MIN_PIXELS:
         return np.full(3, np.nan)
     low, high = np.quantile(colours[:, 0], quantiles)
-    middle: Floats = np.median(colours[(colours[:, 0] >= low) & (colours[:, 0] <= high)], axis=0)
+    middle: FloatArray = np.median(colours[(colours[:, 0] >= low) & (colours[:, 0] <= high)], axis=0)
     return middle
 
 
-def _mean_known(colours: list[Floats]) -> Floats:
+def _mean_known(colours: list[FloatArray]) -> FloatArray:
     known = [colour for colour in colours if np.isfinite(colour).all()]
     return np.asarray(np.mean(known, axis=0) if known else np.full(3, np.nan), np.float64)
 
@@ -114,7 +115,7 @@ def median_eyes(seen: list[EyeColours]) -> EyeColours:
     return EyeColours(skin, sclera, iris, float(np.median([observed.radius_px for observed in seen])))
 
 
-def clear_iris(eyes: EyeColours) -> Floats:
+def clear_iris(eyes: EyeColours) -> FloatArray:
     """Colour (3,), `log_colour`, of the iris without the light of skin and white that a small picture mixes into it."""
     share = IRIS_MIX_PX / eyes.radius_px
     around = linear_light(eyes.skin)
@@ -125,12 +126,12 @@ def clear_iris(eyes: EyeColours) -> Floats:
     return log_colour(255.0 * encode_light(own))
 
 
-def _median_known(colours: list[Floats]) -> Floats:
+def _median_known(colours: list[FloatArray]) -> FloatArray:
     known = [colour for colour in colours if np.isfinite(colour).all()]
     return np.asarray(np.median(known, axis=0) if known else np.full(3, np.nan), np.float64)
 
 
-def estimate_cast(eyes: EyeColours) -> Floats:
+def estimate_cast(eyes: EyeColours) -> FloatArray:
     """(2,) cast of the light: the logarithms by which it raises R/G and B/G.
 
     Skin and white of the eye each tell it, and each may err: a skin is ruddy or olive, a white is mixed with lids and
@@ -146,11 +147,11 @@ def estimate_cast(eyes: EyeColours) -> Floats:
     return np.where(of_skin * of_white > 0, agreed, 0.0)
 
 
-def _beyond(off: Floats, spread: Floats) -> Floats:
+def _beyond(off: FloatArray, spread: FloatArray) -> FloatArray:
     return np.sign(off) * np.maximum(np.abs(off) - spread, 0.0)
 
 
-def remove_cast(srgb: Floats, cast: Floats, skin: Floats) -> Floats:
+def remove_cast(srgb: FloatArray, cast: FloatArray, skin: FloatArray) -> FloatArray:
     """Colours (..., 3), sRGB 0..255, as in neutral light; the luminance of a `skin`, `log_colour`, stays the same."""
     gains = np.exp([-cast[0], 0.0, -cast[1]])
     before = np.exp([skin[1], 0.0, skin[2]])
@@ -158,7 +159,7 @@ def remove_cast(srgb: Floats, cast: Floats, skin: Floats) -> Floats:
     return 255.0 * encode_light(decode_srgb(np.clip(srgb, 0.0, 255.0) / 255.0) * gains)
 
 
-def skin_texture(srgb: Floats, blurred: Callable[[Floats], Floats]) -> Floats:
+def skin_texture(srgb: FloatArray, blurred: Callable[[FloatArray], FloatArray]) -> FloatArray:
     """Colours (N, 3) of a texture, sRGB 0..255, of a face whose skin looks so in the renderer's studio light.
 
     `blurred` gives means (N, D) of values (N, D) around each place: under gloss lies what lies around it. Hair,
@@ -176,7 +177,7 @@ def skin_texture(srgb: Floats, blurred: Callable[[Floats], Floats]) -> Floats:
     return 255.0 * encode_light(light * grey * (gains / grey) ** is_skin[:, None])
 
 
-def without_gloss(light: Floats, usual: Floats) -> Floats:
+def without_gloss(light: FloatArray, usual: FloatArray) -> FloatArray:
     """Linear light (N, 3) of skin without what is white in places lighter than the usual (3,) or (N, 3) skin.
 
     Shafer 1985, the dichromatic reflection model: light is a multiple of the skin's colour and a share of the lamp's,
@@ -184,5 +185,5 @@ def without_gloss(light: Floats, usual: Floats) -> Floats:
     """
     skin = np.maximum((light[:, 0] - light[:, 2]) / np.maximum(usual[..., 0] - usual[..., 2], DARKEST), GLOSSY[0])
     share = smoothstep(light @ LUMINANCE / (usual @ LUMINANCE), *GLOSSY)[:, None]
-    found: Floats = light + share * (np.minimum(light, skin[:, None] * usual) - light)
+    found: FloatArray = light + share * (np.minimum(light, skin[:, None] * usual) - light)
     return found

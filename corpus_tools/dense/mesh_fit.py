@@ -7,11 +7,10 @@ from numpy.typing import NDArray
 
 from tts2face.models.face import Eye, Face
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER, LID_RINGS, N_MESH_LANDMARKS
-from tts2face.numeric.arrays import smoothstep
+from tts2face.numeric.arrays import FloatArray, smoothstep
 from tts2face.numeric.splines import Interpolant, fit_interpolant
 from tts2face.video.pose import similarity_transforms
 
-Floats = NDArray[np.float64]
 OPEN_JAW_WEIGHT = 0.12  # weight of jawOpen at which the warp is fitted; with closed lips the mouth would tear
 EYE_CORNERS = ((33, 133), (263, 362))
 EYE_SCALE_LIMITS = (0.92, 1.08)  # eyeballs of adults differ in size by less than this
@@ -30,19 +29,19 @@ N_ROUNDS = 3  # landmarks lie inside triangles, so that residuals are fitted aga
 class EyeSocket:
     """An eyeball's centre (3,) and radius before, centre (3,) and scale after."""
 
-    before: Floats
+    before: FloatArray
     radius: float
-    after: Floats
+    after: FloatArray
     scale: float
 
-    def keep_distance(self, places: Floats, moved: Floats) -> Floats:
+    def keep_distance(self, places: FloatArray, moved: FloatArray) -> FloatArray:
         """(P, 3) moved positions with the scaled distance from the eyeball that positions (P, 3) near it had."""
         off = np.linalg.norm(places - self.before, axis=1)
         share = smoothstep((self.radius + FREE_SKIN_DISTANCE_MM - off) / (FREE_SKIN_DISTANCE_MM - FULL_EYE_DISTANCE_MM))
         towards = moved - self.after
         length = np.maximum(np.linalg.norm(towards, axis=1), 1e-9)
         wanted = self.scale * off / length
-        placed: Floats = self.after + towards * (1.0 + share * (wanted - 1.0))[:, None]
+        placed: FloatArray = self.after + towards * (1.0 + share * (wanted - 1.0))[:, None]
         return placed
 
 
@@ -56,11 +55,11 @@ class HeadWarp:
     """
 
     field: Interpolant
-    opened: Floats
+    opened: FloatArray
     sockets: tuple[EyeSocket, ...]
     landmarks: NDArray[np.int64]
 
-    def apply(self, places: Floats, rows: NDArray[np.int64]) -> Floats:
+    def apply(self, places: FloatArray, rows: NDArray[np.int64]) -> FloatArray:
         """(P, 3) warped positions of the vertices `rows` (P,) from positions (P, 3) on the head with closed lips."""
         moved = places + self.field(places + self.opened[rows])
         for socket in self.sockets:
@@ -86,7 +85,7 @@ def fit_head_warp(face: Face, talker: NDArray[np.floating]) -> HeadWarp:
     return warp
 
 
-def _joined_lips(vertices: Floats, opened: Floats) -> Floats:
+def _joined_lips(vertices: FloatArray, opened: FloatArray) -> FloatArray:
     """Displacements (V, 3) of vertices (V, 3), mm, with those of others close by."""
     from scipy.spatial import cKDTree
 
@@ -100,7 +99,7 @@ def _joined_lips(vertices: Floats, opened: Floats) -> Floats:
     return joined
 
 
-def face_landmarks(face: Face, vertices: NDArray[np.floating]) -> Floats:
+def face_landmarks(face: Face, vertices: NDArray[np.floating]) -> FloatArray:
     """(478, 3) landmarks, by number, of vertices (V, 3) in the face's topology."""
     found = np.zeros((int(face.landmarks.max()) + 1, 3))
     weights = face.landmark_weights.astype(np.float64)[..., None]
@@ -108,21 +107,21 @@ def face_landmarks(face: Face, vertices: NDArray[np.floating]) -> Floats:
     return found
 
 
-def face_width(landmarks: Floats) -> float:
+def face_width(landmarks: FloatArray) -> float:
     """Width of a face's oval in its own unit, which corresponds to 200 pixels in the paper."""
     return float(np.ptp(landmarks[list(FACE_OVAL), 0]))
 
 
-def align_to_head(talker: NDArray[np.floating], rest: Floats) -> Floats:
+def align_to_head(talker: NDArray[np.floating], rest: FloatArray) -> FloatArray:
     """(468, 3) landmarks of the talker aligned with the head's by a similarity; their size is unknown."""
     own = np.asarray(talker, np.float64)[:N_MESH_LANDMARKS]
     weights = np.full(N_MESH_LANDMARKS, 1.0 / N_MESH_LANDMARKS)
     turns, scales = similarity_transforms(own[None], rest, weights)
-    brought: Floats = scales[0] * (own - own.mean(axis=0)) @ turns[0].T + rest.mean(axis=0)
+    brought: FloatArray = scales[0] * (own - own.mean(axis=0)) @ turns[0].T + rest.mean(axis=0)
     return brought
 
 
-def correct_lips_and_lids(rest: Floats, target: Floats) -> Floats:
+def correct_lips_and_lids(rest: FloatArray, target: FloatArray) -> FloatArray:
     """(468, 3) landmarks of the talker with the lip contact of the head, and lids at the depth of the eyes."""
     placed = target.copy()
     upper, lower = list(INNER_LIP_UPPER[1:-1]), list(INNER_LIP_LOWER[1:-1])
@@ -135,7 +134,7 @@ def correct_lips_and_lids(rest: Floats, target: Floats) -> Floats:
     return placed
 
 
-def select_consistent_landmarks(rest: Floats, target: Floats) -> NDArray[np.bool_]:
+def select_consistent_landmarks(rest: FloatArray, target: FloatArray) -> NDArray[np.bool_]:
     """(468,) mask of landmarks whose motion agrees with that of their neighbours."""
     apart = np.linalg.norm(rest[:, None] - rest[None], axis=2)
     nearest = np.argsort(apart, axis=1)[:, : N_NEIGHBOURS + 1]
@@ -145,7 +144,7 @@ def select_consistent_landmarks(rest: Floats, target: Floats) -> NDArray[np.bool
     return fits
 
 
-def fit_eye_sockets(face: Face, rest: Floats, target: Floats) -> tuple[EyeSocket, ...]:
+def fit_eye_sockets(face: Face, rest: FloatArray, target: FloatArray) -> tuple[EyeSocket, ...]:
     """Eyeballs moved with the centres of their lids and scaled with the length of the eyes."""
     found = []
     for eye, lids, (outer, inner) in zip(eyes_from_right(face), LID_RINGS, EYE_CORNERS, strict=True):

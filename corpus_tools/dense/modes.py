@@ -22,7 +22,7 @@ from tts2face.face.mouth import CHIN_LANDMARKS
 from tts2face.face.shape_transfer import append_shapes
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
-from tts2face.numeric.arrays import principal_axes
+from tts2face.numeric.arrays import FloatArray, principal_axes
 from tts2face.video.pose import similarity_transforms
 
 OPEN_JAW = 0.6  # weight of jawOpen at which eq. 4 is evaluated; at 0.12 the lower lip is serrated between landmarks
@@ -32,8 +32,6 @@ LIMIT = 3.0  # standard deviations within which modes are plausible (Theobald et
 MEAN, MODE = "denseMean", "dense"  # names of the added shapes: denseMean, dense1, dense2, ...
 MOST_MODES = 100  # 30 hold 99.8 % of the variance of GRID s1
 HELD_OUT = 5  # one in so many videos is held out for validation
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,25 +50,25 @@ class Components:
         Of the parameters, falling; all of them, so that their sum is the whole variance.
     """
 
-    mean: Floats
-    modes: Floats
-    duals: Floats
-    variances: Floats
+    mean: FloatArray
+    modes: FloatArray
+    duals: FloatArray
+    variances: FloatArray
 
-    def shares(self) -> Floats:
+    def shares(self) -> FloatArray:
         """(K,) compactness: share of the variance in the first 1, 2, ... modes."""
-        shares: Floats = np.cumsum(self.variances) / self.variances.sum()
+        shares: FloatArray = np.cumsum(self.variances) / self.variances.sum()
         return shares
 
     def n_modes(self, share: float) -> int:
         """The smallest number of modes with a share of the variance."""
         return int(np.searchsorted(self.shares(), share - 1e-12)) + 1
 
-    def residual(self, displacements: Floats, n_modes: int) -> Floats:
+    def residual(self, displacements: FloatArray, n_modes: int) -> FloatArray:
         """(T, N, 3) residual of displacements (T, N, 3) after projection on the first modes."""
         centred = displacements - self.mean
         parameters = np.tensordot(centred, self.duals[:n_modes], axes=((1, 2), (1, 2)))
-        rest: Floats = centred - np.tensordot(parameters, self.modes[:n_modes], axes=1)
+        rest: FloatArray = centred - np.tensordot(parameters, self.modes[:n_modes], axes=1)
         return rest
 
 
@@ -105,8 +103,8 @@ class DenseModel:
 
     dense: Components
     sparse: Components
-    mean: Floats
-    modes: Floats
+    mean: FloatArray
+    modes: FloatArray
     n_frames: int
     n_landmarks: int
     held_out: HeldOut | None
@@ -171,7 +169,7 @@ def dense_model(
     )
 
 
-def displacements(fit: PictureFitter, landmarks: NDArray[np.floating], talker: NDArray[np.floating]) -> Floats:
+def displacements(fit: PictureFitter, landmarks: NDArray[np.floating], talker: NDArray[np.floating]) -> FloatArray:
     """(T', N, 3) u of eq. 3 in the head's size: the landmarks of each frame with a face, less the talker's at rest.
 
     Landmarks (T, 478, 3) are pose-free; frames without a face are NaN and are skipped.
@@ -179,11 +177,11 @@ def displacements(fit: PictureFitter, landmarks: NDArray[np.floating], talker: N
     rest = np.asarray(talker, np.float64)[:N_MESH_LANDMARKS]
     turns, scales = similarity_transforms(rest[None], fit.marks, np.full(N_MESH_LANDMARKS, 1.0 / N_MESH_LANDMARKS))
     known = landmarks[np.isfinite(landmarks[:, 0, 0])].astype(np.float64)
-    moved: Floats = (known[:, fit.used] - rest[fit.used]) @ (scales[0] * turns[0]).T
+    moved: FloatArray = (known[:, fit.used] - rest[fit.used]) @ (scales[0] * turns[0]).T
     return moved
 
 
-def components(frames: Floats, metric: Floats) -> Components:
+def components(frames: FloatArray, metric: FloatArray) -> Components:
     """Principal components of displacements (T, N, 3) under a metric (N, N), which is the same for each axis."""
     root = np.linalg.cholesky(metric).T
     mean = frames.mean(axis=0)
@@ -195,18 +193,18 @@ def components(frames: Floats, metric: Floats) -> Components:
     return Components(mean, down * modes, down * _times(root.T, columns), variances)
 
 
-def _times(matrix: NDArray[np.floating], frames: Floats) -> Floats:
+def _times(matrix: NDArray[np.floating], frames: FloatArray) -> FloatArray:
     """(T, M, 3) a matrix (M, N) times each of the frames (T, N, 3), as one product."""
-    product: Floats = np.einsum("mn,tnc->tmc", matrix, frames, optimize=True)
+    product: FloatArray = np.einsum("mn,tnc->tmc", matrix, frames, optimize=True)
     return product
 
 
-def spread_shapes(face: Face, fit: PictureFitter, moved: Floats) -> Floats:
+def spread_shapes(face: Face, fit: PictureFitter, moved: FloatArray) -> FloatArray:
     """(K, V, 3) displacement of every vertex for displacements (K, N, 3) of the landmarks.
 
     Eyeballs do not move; lower teeth and tongue, which are hidden, follow the jaw estimated from the chin.
     """
-    shapes: Floats = _times(fit.spread, moved)
+    shapes: FloatArray = _times(fit.spread, moved)
     shapes[:, part_vertices(face, EYE_PARTS)] = 0.0
     numbers = [face.shape_names.index(name) for name in JAW]
     chin = [row for row, landmark in enumerate(fit.used) if landmark in CHIN_LANDMARKS]
@@ -225,7 +223,7 @@ def add_modes(face: Face, model: DenseModel) -> Face:
     return append_shapes(face, names, shapes, limits)
 
 
-def _held_out(videos: Sequence[Floats], metric: Floats, n_vertices: int, n_modes: int) -> HeldOut | None:
+def _held_out(videos: Sequence[FloatArray], metric: FloatArray, n_vertices: int, n_modes: int) -> HeldOut | None:
     held = [video for number, video in enumerate(videos) if number % HELD_OUT == HELD_OUT - 1]
     if not held:
         return None

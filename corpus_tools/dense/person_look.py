@@ -34,8 +34,7 @@ from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_tint import tint_parts
 from tts2face.models.landmarks import CHIN
 from tts2face.models.named_colours import EYE_COLOURS, HAIR_COLOURS, parse_eye_colour, parse_hair_colour
-
-Floats = NDArray[np.float64]
+from tts2face.numeric.arrays import FloatArray
 
 HAIRCUTS: Mapping[str, str] = {  # by length class
     "bald": "bald", "cropped": "cropped", "flat": "short01", "short": "short02", "bob": "bob02", "long": "long01",
@@ -70,8 +69,8 @@ TINT_LIMITS = (0.25, 4.0)
 class PersonLook:
     """Cast of the light (2,), colour of the skin in it (3,), and colours, sRGB (3,), of iris, brows and shirt."""
 
-    cast: Floats
-    skin: Floats
+    cast: FloatArray
+    skin: FloatArray
     hairdo: Hairdo
     length: str
     iris: NDArray[np.uint8]
@@ -158,13 +157,13 @@ class LookSampler:
         )  # fmt: skip
 
 
-def neutral(colour: Floats, cast: Floats) -> Floats:
+def neutral(colour: FloatArray, cast: FloatArray) -> FloatArray:
     """A colour (..., 3), `log_colour`, without a cast of the light."""
-    clean: Floats = colour - np.concatenate([[0.0], cast])
+    clean: FloatArray = colour - np.concatenate([[0.0], cast])
     return clean
 
 
-def hair_colour(seen: Floats, most: float = 0.0) -> Floats:
+def hair_colour(seen: FloatArray, most: float = 0.0) -> FloatArray:
     """Colour of hair (3,), `log_colour`, that looks as `seen` in neutral light: natural colours are kept natural.
 
     `most` limits the logarithm of its luminance.
@@ -177,7 +176,7 @@ def hair_colour(seen: Floats, most: float = 0.0) -> Floats:
     return np.array([light, *(along + kept * away)])
 
 
-def iris_colour(eyes: EyeColours, cast: Floats) -> Floats:
+def iris_colour(eyes: EyeColours, cast: FloatArray) -> FloatArray:
     """Colour of the iris (3,), `log_colour`, in neutral light: the mean by the cast and by the white of the eye."""
     clear = clear_iris(eyes)
     by_cast = neutral(clear, cast)
@@ -192,7 +191,7 @@ def iris_colour(eyes: EyeColours, cast: Floats) -> Floats:
     return np.array([light, red, blue])
 
 
-def shirt_colour(portrait: Portrait, hair: SeenHair, cast: Floats) -> NDArray[np.uint8]:
+def shirt_colour(portrait: Portrait, hair: SeenHair, cast: FloatArray) -> NDArray[np.uint8]:
     """Muted colour of the clothes below the neck, sRGB; a neutral grey where they are not clearly seen."""
     from scipy.spatial import cKDTree
 
@@ -236,7 +235,7 @@ def shorten_lashes(face: Face, length: float) -> Face:
     return replace(face, vertices=vertices, shapes=shapes)
 
 
-def part_colour(face: Face, name: str) -> Floats:
+def part_colour(face: Face, name: str) -> FloatArray:
     """Mean colour (3,) of a part, sRGB 0..255: of the brighter half of its texels, or of its vertices."""
     part = next(part for part in face.parts if part.name == name)
     triangles = face.triangles[part.first : part.first + part.count].astype(np.int64)
@@ -259,7 +258,7 @@ def _hair_word(colour: str) -> str:
     return _nearest(found, HAIR_COLOURS).replace("-", " ")
 
 
-def _nearest(colour: Floats, names: Mapping[str, str]) -> str:
+def _nearest(colour: FloatArray, names: Mapping[str, str]) -> str:
     """The name whose colour, rrggbb, is nearest."""
 
     def distance(name: str) -> float:

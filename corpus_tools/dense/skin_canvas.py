@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.dense.mesh_fit import OPEN_JAW_WEIGHT, face_landmarks
-from corpus_tools.dense.texels import ISLANDS_TOP, Floats, Texels, find_texels
+from corpus_tools.dense.texels import ISLANDS_TOP, Texels, find_texels
 from lexicon.errors import DataError
 from tts2face.models.face import Face
 from tts2face.models.landmarks import (
@@ -16,7 +16,7 @@ from tts2face.models.landmarks import (
     LID_RINGS,
     N_MESH_LANDMARKS,
 )
-from tts2face.numeric.arrays import smoothstep
+from tts2face.numeric.arrays import FloatArray, smoothstep
 from tts2face.numeric.kernels import kernel
 
 INNER_LIPS = (*INNER_LIP_UPPER, *INNER_LIP_LOWER[-2:0:-1])
@@ -48,8 +48,8 @@ class SkinCanvas:
 
     texture: NDArray[np.uint8]
     texels: Texels
-    opened: Floats
-    share: Floats
+    opened: FloatArray
+    share: FloatArray
     in_mouth: NDArray[np.bool_]
 
 
@@ -71,7 +71,7 @@ def build_canvas(face: Face) -> SkinCanvas:
     return SkinCanvas(skin, texels, opened, soften_edges(share, texels, side), in_mouth)
 
 
-def _front_share(face: Face, texels: Texels, opened: Floats) -> Floats:
+def _front_share(face: Face, texels: Texels, opened: FloatArray) -> FloatArray:
     place = texels.interpolate(opened)
     marks = face_landmarks(face, opened)[:N_MESH_LANDMARKS]
     share = smoothstep(polygon_depth(place[:, :2], marks[list(FACE_OVAL), :2], RIM_MM[1] + 1), *RIM_MM)
@@ -84,7 +84,7 @@ def _front_share(face: Face, texels: Texels, opened: Floats) -> Floats:
     return share
 
 
-def _is_hidden(place: Floats) -> NDArray[np.bool_]:
+def _is_hidden(place: FloatArray) -> NDArray[np.bool_]:
     """(P,) whether a texel is hidden by another."""
     cells = np.floor(place[:, :2] / CELL_MM).astype(np.int64)
     cells -= cells.min(axis=0)
@@ -94,7 +94,7 @@ def _is_hidden(place: Floats) -> NDArray[np.bool_]:
     return hidden
 
 
-def polygon_depth(places: Floats, polygon: Floats, most: float) -> Floats:
+def polygon_depth(places: FloatArray, polygon: FloatArray, most: float) -> FloatArray:
     """(P,) signed distance of points (P, 2) from a polygon's edge, positive inside, limited to `most`."""
     low, high = polygon.min(axis=0) - most, polygon.max(axis=0) + most
     near = np.flatnonzero(((places > low) & (places < high)).all(axis=1))
@@ -102,7 +102,7 @@ def polygon_depth(places: Floats, polygon: Floats, most: float) -> Floats:
     found = np.zeros(len(near))
     _polygon_depths(places[near], polygon, found)
     depth[near] = found
-    clipped: Floats = np.clip(depth, -most, most)
+    clipped: FloatArray = np.clip(depth, -most, most)
     return clipped
 
 
@@ -125,6 +125,6 @@ def _polygon_depths(places, polygon, depths):  # type: ignore[no-untyped-def]
         depths[number] = least if is_inside else -least
 
 
-def soften_edges(share: Floats, texels: Texels, side: int) -> Floats:
+def soften_edges(share: FloatArray, texels: Texels, side: int) -> FloatArray:
     """Blurred shares (P,) that do not exceed the original ones."""
     return np.minimum(share, texels.blurred(share[:, None], side, MASK_BLUR)[:, 0])

@@ -13,6 +13,7 @@ from lexicon.errors import DataError
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.numeric.arrays import (
+    FloatArray,
     points_in_polygon,
     smoothstep,
     unit_vectors,
@@ -22,7 +23,6 @@ from tts2face.numeric.splines import DECAY_LENGTH, FACE_WIDTH, rbf_values
 from tts2face.types import Progress
 from tts2face.video.pose import similarity_transforms
 
-Floats = NDArray[np.float64]
 OnFrame = Callable[[NDArray[np.uint8], NDArray[np.float32]], None]
 N_FRAMES = 160  # averaged; a few dozen remove the noise of the pictures
 FACING_COSINES = (0.15, 0.75)  # cosine between normal and camera at which the weight of a texel starts and is full
@@ -35,8 +35,8 @@ class SkinColours:
     """Numbers (R,) of texels of a canvas that show the talker, their colours (R, 3), sRGB 0..255, and weights (R,)."""
 
     rows: NDArray[np.int64]
-    colour: Floats
-    weight: Floats
+    colour: FloatArray
+    weight: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,31 +47,31 @@ class PictureFitter:
     """
 
     rows: NDArray[np.int64]
-    vertices: Floats
-    marks: Floats
+    vertices: FloatArray
+    marks: FloatArray
     used: NDArray[np.int64]
-    spread: Floats
+    spread: FloatArray
 
-    def fit(self, points: NDArray[np.floating]) -> tuple[Floats, Floats]:
+    def fit(self, points: NDArray[np.floating]) -> tuple[FloatArray, FloatArray]:
         """(V, 3) vertices, x right, y up, z towards the camera in pixels, and the (3, 3) rotation, for (478, 3)."""
         linear, shift, turn = self.pose(points)
         left = self._wanted(points) - (self.marks[self.used] @ linear.T + shift)
-        placed: Floats = self.vertices @ linear.T + shift + self.spread @ left
+        placed: FloatArray = self.vertices @ linear.T + shift + self.spread @ left
         return placed, turn
 
-    def pose(self, points: NDArray[np.floating]) -> tuple[Floats, Floats, Floats]:
+    def pose(self, points: NDArray[np.floating]) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Scaled rotation (3, 3) and shift (3,) from the head to such pixels, and the rotation, for (478, 3)."""
         wanted, own = self._wanted(points), self.marks[self.used]
         turns, scales = similarity_transforms(own[None], wanted, np.full(len(own), 1.0 / len(own)))
         linear = scales[0] * turns[0]
         return linear, wanted.mean(axis=0) - linear @ own.mean(axis=0), turns[0]
 
-    def _wanted(self, points: NDArray[np.floating]) -> Floats:
+    def _wanted(self, points: NDArray[np.floating]) -> FloatArray:
         return np.asarray(points[self.used], np.float64) * (1.0, -1.0, -1.0)
 
 
 def build_picture_fitter(
-    face: Face, opened: Floats, used: NDArray[np.int64], rows: NDArray[np.int64] | None = None
+    face: Face, opened: FloatArray, used: NDArray[np.int64], rows: NDArray[np.int64] | None = None
 ) -> PictureFitter:
     """The fitter of all vertices of a face, or of `rows`; at `opened` (V, 3), the lips apart, is interpolated."""
     from scipy.linalg import solve
@@ -132,7 +132,7 @@ def select_frames(
         on_progress(number + 1, len(videos))
 
 
-def sample_picture(picture: NDArray[np.uint8], places: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+def sample_picture(picture: NDArray[np.uint8], places: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Colours (P, 3) of a picture (H, W, 3) at positions (P, 2), and a mask of those inside it; cubic interpolation."""
     import cv2
 
@@ -145,7 +145,7 @@ def sample_picture(picture: NDArray[np.uint8], places: Floats) -> tuple[Floats, 
     return found.reshape(-1, 3)[:n].astype(np.float64), inside
 
 
-def welded_normals(face: Face) -> Floats:
+def welded_normals(face: Face) -> FloatArray:
     """(V, 3) outward unit normals of the face at rest; vertices at one position share one normal."""
     places, shared = np.unique(face.vertices, axis=0, return_inverse=True)
     shared = shared.reshape(-1)

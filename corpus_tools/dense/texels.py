@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import FloatArray
 from tts2face.numeric.kernels import kernel
 
-Floats = NDArray[np.float64]
 LEAST_SPREAD = 6.0  # of a blur in pixels of a reduced picture, at which it differs by less than .001 of the values
 ISLANDS_TOP = 0.815  # v at which the layout of the shipped heads has mouth, neck and eye sockets, below the head
 
@@ -19,26 +19,26 @@ class Texels:
     rows: NDArray[np.int64]
     columns: NDArray[np.int64]
     corners: NDArray[np.int64]
-    weights: Floats
+    weights: FloatArray
 
     def at(self, numbers: NDArray[np.int64]) -> "Texels":
         """The texels of these numbers."""
         return Texels(self.rows[numbers], self.columns[numbers], self.corners[numbers], self.weights[numbers])
 
-    def interpolate(self, values: Floats) -> Floats:
+    def interpolate(self, values: FloatArray) -> FloatArray:
         """(P, D) values at the texels, interpolated from vertex values (N, D)."""
         interpolated = np.zeros((len(self.rows), values.shape[1]))
         _interpolate(self.corners, self.weights, values, interpolated)
         return interpolated
 
-    def block_means(self, side: int, *values: Floats) -> list[Floats]:
+    def block_means(self, side: int, *values: FloatArray) -> list[FloatArray]:
         """Means (B, D) of values (P, D) over the squares of `side` texels that hold any."""
         squares = np.column_stack([self.rows // side, self.columns // side])
         _, square, count = np.unique(squares, axis=0, return_inverse=True, return_counts=True)
         sums = [[np.bincount(square.ravel(), column) / count for column in own.T] for own in values]
         return [np.column_stack(columns) for columns in sums]
 
-    def blurred(self, values: Floats, side: int, spread: float) -> Floats:
+    def blurred(self, values: FloatArray, side: int, spread: float) -> FloatArray:
         """(P, D) values (P, D) in a picture that is 0 elsewhere, blurred by a Gaussian of `spread` texels."""
         found = np.zeros_like(values)
         for channel, own in enumerate(values.T):
@@ -58,7 +58,7 @@ def blur(picture: NDArray[np.float32], spread: float) -> NDArray[np.float32]:
     return np.asarray(cv2.resize(soft, picture.shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
 
 
-def find_texels(uv: Floats, triangles: NDArray[np.int64], side: int) -> Texels:
+def find_texels(uv: FloatArray, triangles: NDArray[np.int64], side: int) -> Texels:
     """The texels whose centres lie in a triangle; where triangles overlap, in the last one."""
     places = uv * side - 0.5
     owner, weights = np.full((side, side), -1), np.zeros((side, side, 3))

@@ -13,9 +13,7 @@ from corpus_tools.dense.skin_colour import SkinColours, welded_normals
 from corpus_tools.dense.texels import Texels, blur
 from tts2face.models.face import Face, Texture
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT
-from tts2face.numeric.arrays import encode_light, smoothstep
-
-Floats = NDArray[np.float64]
+from tts2face.numeric.arrays import FloatArray, encode_light, smoothstep
 
 LUMA = np.array([0.299, 0.587, 0.114])  # ITU-R BT.601
 SKIN_LUMA = 0.72  # of the head's median skin; darker texels are brows, lashes, nostrils or hair
@@ -59,7 +57,7 @@ def paint_skin(face: Face, canvas: SkinCanvas, skin: SkinColours, *, keeps_lines
     return replace(face, textures=(Texture(_fill_texture(canvas.texture, canvas.texels, colour)), *face.textures[1:]))
 
 
-def _remove_shading(normals: Floats, colour: Floats, share: Floats) -> Floats:
+def _remove_shading(normals: FloatArray, colour: FloatArray, share: FloatArray) -> FloatArray:
     """Colours (P, 3) without the shading that depends on the surface normal.
 
     Source: the shading of a matt surface under distant light is nearly a quadratic function of its normal (Ramamoorthi
@@ -71,11 +69,11 @@ def _remove_shading(normals: Floats, colour: Floats, share: Floats) -> Floats:
     terms = np.column_stack([_shading_terms(normals), np.ones(len(normals))])
     slopes = np.linalg.lstsq(terms[lit], np.log(np.maximum(colour[lit], 1.0)), rcond=None)[0]
     shade = np.exp((terms - terms[lit].mean(axis=0)) @ slopes)
-    flat: Floats = colour / np.clip(shade, *SHADE_BOUNDS)
+    flat: FloatArray = colour / np.clip(shade, *SHADE_BOUNDS)
     return flat
 
 
-def _even_yellow(texels: Texels, side: int, own: Floats, share: Floats) -> Floats:
+def _even_yellow(texels: Texels, side: int, own: FloatArray, share: FloatArray) -> FloatArray:
     """Colours (P, 3) with less of the yellow and blue that vary slowly over skin: light of lamps and walls.
 
     Redness, which varies over a face by nature, and luminance stay.
@@ -90,12 +88,12 @@ def _even_yellow(texels: Texels, side: int, own: Floats, share: Floats) -> Float
     return 255.0 * encode_light(linear_light(colours))
 
 
-def _shading_terms(normals: Floats) -> Floats:
+def _shading_terms(normals: FloatArray) -> FloatArray:
     x, y, z = normals.T
     return np.column_stack([x, y, z, x * y, x * z, y * z, x * x - y * y])
 
 
-def _remove_fringe(face: Face, skin: tuple[Texels, int], own: Floats, share: Floats) -> Floats:
+def _remove_fringe(face: Face, skin: tuple[Texels, int], own: FloatArray, share: FloatArray) -> FloatArray:
     """Shares (P,) without the strands of hair over the forehead and beside the eyes."""
     from scipy.ndimage import minimum_filter
 
@@ -117,7 +115,9 @@ def _remove_fringe(face: Face, skin: tuple[Texels, int], own: Floats, share: Flo
     return np.asarray(share * grown[texels.rows, texels.columns])
 
 
-def _skin_tint(face: Face, texels: Texels, ratio: Floats, share_and_luma: tuple[Floats, Floats]) -> Floats:
+def _skin_tint(
+    face: Face, texels: Texels, ratio: FloatArray, share_and_luma: tuple[FloatArray, FloatArray]
+) -> FloatArray:
     """(V, 3) tint factors for the head's skin: those of the nearest seen texels, blended with the median."""
     from scipy.spatial.distance import cdist
 
@@ -137,7 +137,7 @@ def _skin_tint(face: Face, texels: Texels, ratio: Floats, share_and_luma: tuple[
     return factors
 
 
-def soften_lines(colour: Floats, share: Floats, texels: Texels, side: int) -> Floats:
+def soften_lines(colour: FloatArray, share: FloatArray, texels: Texels, side: int) -> FloatArray:
     """Colours (P, 3) whose skin has fainter lines: what is darker than skin around it, but not as dark as a brow."""
     light = np.log(np.maximum(colour @ LUMA, 1.0))
     around = _mean_around(light[:, None], share, texels, side, LINE_TEXELS)[:, 0]
@@ -147,20 +147,20 @@ def soften_lines(colour: Floats, share: Floats, texels: Texels, side: int) -> Fl
     return np.asarray(colour * np.exp((1.0 - kept) * depth)[:, None])
 
 
-def sharpen(colour: Floats, share: Floats, texels: Texels, side: int) -> Floats:
+def sharpen(colour: FloatArray, share: FloatArray, texels: Texels, side: int) -> FloatArray:
     """Sharpened colours (P, 3), which compensate the blur of averaging over frames with tracking noise."""
     smooth = _mean_around(colour, share, texels, side, SHARP_TEXELS)
     return np.asarray(colour + SHARP_GAIN * share[:, None] * (colour - smooth))
 
 
-def _mean_around(values: Floats, share: Floats, texels: Texels, side: int, spread: float) -> Floats:
+def _mean_around(values: FloatArray, share: FloatArray, texels: Texels, side: int, spread: float) -> FloatArray:
     """Means (P, D) of values (P, D) over the texels around each, weighted by a share (P,)."""
     sums = texels.blurred(np.column_stack([share, share[:, None] * values]), side, spread)
-    mean: Floats = sums[:, 1:] / np.maximum(sums[:, :1], 1e-3)
+    mean: FloatArray = sums[:, 1:] / np.maximum(sums[:, :1], 1e-3)
     return mean
 
 
-def _fill_texture(texture: NDArray[np.uint8], texels: Texels, colour: Floats) -> NDArray[np.uint8]:
+def _fill_texture(texture: NDArray[np.uint8], texels: Texels, colour: FloatArray) -> NDArray[np.uint8]:
     """The texture with new texels; those off the surface take the nearest colour on it."""
     from scipy.ndimage import distance_transform_edt
 

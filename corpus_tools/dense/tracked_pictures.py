@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.dense.texels import Floats
 from corpus_tools.recordings.folder import VIDEO_SUFFIXES, find_recordings
 from corpus_tools.recordings.video import CachedTracker
 from lexicon.errors import DataError, InputError
 from tts2face.models.landmarks import (
     lip_opening,
 )
+from tts2face.numeric.arrays import FloatArray
 from tts2face.types import Progress
 from tts2face.video.media import read_frames
 from tts2face.video.pose import remove_pose
@@ -38,7 +38,7 @@ class TrackedPictures:
     landmarks: NDArray[np.float32]
     pictures: tuple[NDArray[np.uint8], ...] = ()
     weight: float = 1.0
-    opening: Floats | None = None
+    opening: FloatArray | None = None
 
     def frames(self) -> Iterator[NDArray[np.uint8]]:
         """The frames (H, W, 3) in their order.
@@ -78,7 +78,7 @@ def track_videos(videos: Sequence[Path], eyes: CachedTracker, on_progress: Progr
     return tuple(kept)
 
 
-def resting_landmarks(videos: Sequence[TrackedPictures]) -> Floats:
+def resting_landmarks(videos: Sequence[TrackedPictures]) -> FloatArray:
     """(478, 3) mean landmarks in mm of the frames with closed lips and open eyes."""
     landmarks = np.concatenate([video.landmarks for video in videos])
     landmarks = landmarks[np.isfinite(landmarks[:, 0, 0])].astype(np.float64)
@@ -87,11 +87,11 @@ def resting_landmarks(videos: Sequence[TrackedPictures]) -> Floats:
     open_eyes = eye_opening(landmarks)
     still = gaps <= limit
     wide = still & (open_eyes >= np.percentile(open_eyes[still], OPEN_EYES_PERCENTILE))
-    mean: Floats = landmarks[wide].mean(axis=0)
+    mean: FloatArray = landmarks[wide].mean(axis=0)
     return mean
 
 
-def eye_opening(landmarks: NDArray[np.floating]) -> Floats:
+def eye_opening(landmarks: NDArray[np.floating]) -> FloatArray:
     """(T,) mean height of the two eye openings of (T, 478, 3) landmarks."""
     heights = [np.linalg.norm(landmarks[:, up] - landmarks[:, low], axis=1) for up, low in (RIGHT_LIDS, LEFT_LIDS)]
     return np.asarray(np.mean(heights, axis=0), np.float64)

@@ -19,7 +19,7 @@ from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.models.talker import Talker
 from tts2face.models.talker_file import load_talker
-from tts2face.numeric.arrays import interpolate_columns
+from tts2face.numeric.arrays import Float32Array, interpolate_columns
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 
@@ -39,7 +39,6 @@ MIN_PHONES = 8  # whose durations tell recordings apart
 MAX_LISTED = 5  # names in a warning
 BLOCK = 64  # recordings compared at once with all others, which bounds the memory
 TINY = 1e-9  # in place of 0, where a curve is constant
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,8 +46,8 @@ class Fingerprint:
     """Changes of bands of the ``sound`` (T, 12), or None, and of the ``motion`` (T, 15), and the ``phones``."""
 
     name: str
-    sound: Floats | None
-    motion: Floats
+    sound: Float32Array | None
+    motion: Float32Array
     phones: PhoneSequence
 
 
@@ -126,7 +125,7 @@ def same_name_warnings(known: Iterable[str], tested: Iterable[str], places: str)
     return (f"{count} in both {places}, though the contents differ ({listed}); check that none is a copy",)
 
 
-def similarities(ones: Sequence[Floats], others: Sequence[Floats]) -> NDArray[np.float64]:
+def similarities(ones: Sequence[Float32Array], others: Sequence[Float32Array]) -> NDArray[np.float64]:
     """Highest correlation of changes over lags.
 
     Parameters
@@ -167,11 +166,11 @@ class _Table:
     """Changes (N, L, C) continued by zeros, and running sums (N, L + 1) of their squares."""
 
     lengths: NDArray[np.int64]
-    values: Floats
+    values: Float32Array
     squares: NDArray[np.float64]
 
     @classmethod
-    def of(cls, changes: Sequence[Floats]) -> "_Table":
+    def of(cls, changes: Sequence[Float32Array]) -> "_Table":
         lengths = np.array([len(change) for change in changes])
         values = np.zeros((len(changes), int(lengths.max()), changes[0].shape[1]), np.float32)
         for at, change in enumerate(changes):
@@ -228,7 +227,7 @@ def _read_sound(path: Path) -> Waveform:
     return read_sound(path, SOUND_RATE)
 
 
-def sound_changes(sound: Waveform) -> Floats:
+def sound_changes(sound: Waveform) -> Float32Array:
     """(T, 12) changes of the amplitudes of frequency bands, each of unit variance, of a sound at `SOUND_RATE`."""
     frames = np.lib.stride_tricks.sliding_window_view(sound.samples, WINDOW_SAMPLES)[::STEP_SAMPLES]
     power = np.square(np.abs(np.fft.rfft(frames * np.hanning(WINDOW_SAMPLES), axis=1)))
@@ -237,7 +236,7 @@ def sound_changes(sound: Waveform) -> Floats:
     return _unit_changes(np.sqrt(bands))
 
 
-def face_modes(landmarks: NDArray[np.floating]) -> Floats:
+def face_modes(landmarks: NDArray[np.floating]) -> Float32Array:
     """(T, 8) parameters of landmarks (T, 478, 3) in the shipped talker's shape model: mouth, and rest of the face."""
     mean, modes = _shipped_modes()
     return np.asarray((landmarks - mean).reshape(len(landmarks), -1) @ modes, np.float32)
@@ -245,7 +244,7 @@ def face_modes(landmarks: NDArray[np.floating]) -> Floats:
 
 def motion_changes(
     modes: NDArray[np.floating], head: NDArray[np.floating], intensity: NDArray[np.floating], fps: float
-) -> Floats:
+) -> Float32Array:
     """(T, 15) changes of `face_modes`, head pose and loudness, each of unit variance."""
     loudness = np.maximum(intensity, intensity.max() - LOUDNESS_RANGE_DB)
     curves = np.column_stack([modes, head, loudness]).astype(np.float64)
@@ -256,14 +255,14 @@ def motion_changes(
     return _unit_changes(np.lib.stride_tricks.sliding_window_view(padded, len(SMOOTHING), axis=0) @ SMOOTHING)
 
 
-def _unit_changes(curves: NDArray[np.float64]) -> Floats:
+def _unit_changes(curves: NDArray[np.float64]) -> Float32Array:
     """Differences (T, C) of curves divided by their deviation; 0 for a constant curve."""
     changes = np.diff(curves, axis=0)
     return np.asarray(changes / np.maximum(np.sqrt(np.square(changes).mean(axis=0)), TINY), np.float32)
 
 
 @lru_cache(maxsize=1)
-def _shipped_modes() -> tuple[Floats, Floats]:
+def _shipped_modes() -> tuple[Float32Array, Float32Array]:
     """Mean (478, 3) and modes (1434, 8) of the shipped talker."""
     model = load_talker("grid_s1").model
     chosen = [*range(N_MOUTH_MODES), *range(model.n_speech, model.n_speech + N_OTHER_MODES)]

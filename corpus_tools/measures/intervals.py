@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
+from tts2face.numeric.arrays import FloatArray
 
 CONFIDENCE = 0.95
-Floats = NDArray[np.float64]
 N_PAIRED_DRAWS = 2000  # resamples of utterances with replacement (Efron 1979)
 ROUNDING = 1e-12  # spread of a constant curve in parts of its sum of squares: what float32 values and sums leave
 
@@ -23,7 +23,7 @@ class IntervalEstimate:
     high: float
 
 
-def curve_moments(a: Floats, b: Floats) -> Floats:
+def curve_moments(a: FloatArray, b: FloatArray) -> FloatArray:
     """(6,) number of frames, sums, and sums of products of a real curve a and a synthesised one b."""
     return np.array([len(a), a.sum(), b.sum(), a @ a, b @ b, a @ b])
 
@@ -36,8 +36,8 @@ class PairedCurves:
     Pearson's r of pooled frames follows.
     """
 
-    moments: Floats
-    costs: Floats
+    moments: FloatArray
+    costs: FloatArray
 
     @classmethod
     def of(
@@ -50,12 +50,12 @@ class PairedCurves:
         ]
         return cls(np.array(moments), np.asarray(costs, np.float64))
 
-    def figures(self, weights: Floats) -> Mapping[str, Floats]:
+    def figures(self, weights: FloatArray) -> Mapping[str, FloatArray]:
         """Correlations of opening and width, pooled and within, and mean cost for each row of weights (W, U)."""
         return {**correlations(weights, self.moments), "dtw_cost": weights @ self.costs / weights.sum(axis=1)}
 
 
-def draw_weights(n_utterances: int) -> Floats:
+def draw_weights(n_utterances: int) -> FloatArray:
     """(N_DRAWS + 1, U) number of times each utterance is drawn; every utterance once in the first row."""
     draws = np.random.default_rng(0).multinomial(n_utterances, np.full(n_utterances, 1 / n_utterances), N_PAIRED_DRAWS)
     return np.concatenate([np.ones((1, n_utterances)), draws])
@@ -82,13 +82,13 @@ def estimate_difference(one: PairedCurves, other: PairedCurves) -> Mapping[str, 
     return {name: interval_of(ours[name] - theirs[name]) for name in ours}
 
 
-def interval_of(values: Floats) -> IntervalEstimate:
+def interval_of(values: FloatArray) -> IntervalEstimate:
     """The first of (W,) values, with the interval that holds `CONFIDENCE` of the others."""
     low, high = np.quantile(values[1:], (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2))
     return IntervalEstimate(float(values[0]), float(low), float(high))
 
 
-def correlations(weights: Floats, moments: Floats) -> dict[str, Floats]:
+def correlations(weights: FloatArray, moments: FloatArray) -> dict[str, FloatArray]:
     """Correlations of opening and width by name, pooled and within utterances, for moments (U, 2, 6)."""
     n, a, b, aa, bb, ab = np.moveaxis(moments, -1, 0)
     left, zero = [(aa - a * a / n, aa), (bb - b * b / n, bb)], np.zeros_like(n)
@@ -102,7 +102,7 @@ def correlations(weights: Floats, moments: Floats) -> dict[str, Floats]:
     }
 
 
-def _pooled_correlation(moments: Floats) -> Floats:
+def _pooled_correlation(moments: FloatArray) -> FloatArray:
     """(W,) Pearson's r for moments (W, 6); 0 where a curve is constant but for rounding."""
     n, a, b, aa, bb, ab = moments.T
     spread_a, spread_b = aa - a * a / n, bb - b * b / n

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lexicon.phones import look_up_phone, vowel_symbols
 from lexicon.sequence import PhoneSequence
+from tts2face.numeric.arrays import RealArray
 
 CLOSURE_MARGIN_S = 0.03  # a closure may lie this far outside its phone: frames are 40 ms, edges accurate to 10 ms
 CLOSURE_QUANTILE = 0.9  # quantile of the minimum openings of real closures that is the threshold of a closure
@@ -17,16 +18,15 @@ N_DTW_PARAMETERS = 6  # shape parameters that the warping cost compares: 95 % of
 PEAK_MARGIN_S = 0.06  # the maximum opening of a vowel may lie this far outside its edges
 BILABIALS = ("p", "b", "m")
 OPEN_HEIGHTS = ("open", "near-open", "open-mid")
-Values = NDArray[np.floating]
 
 
-def rmse_z(real: Values, synthesised: Values, spread: Values) -> float:
+def rmse_z(real: RealArray, synthesised: RealArray, spread: RealArray) -> float:
     """Root mean square difference of (T, D) parameters in units of their training spread (D,)."""
     return float(np.sqrt(np.mean(np.square((real - synthesised) / spread))))
 
 
 def min_openings(
-    opening: Values, phones: PhoneSequence, fps: float, labels: Collection[str] = BILABIALS
+    opening: RealArray, phones: PhoneSequence, fps: float, labels: Collection[str] = BILABIALS
 ) -> NDArray[np.float64]:
     """Minimum opening within each phone with one of the labels, extended by `CLOSURE_MARGIN_S` on both sides."""
     times = np.arange(len(opening)) / fps
@@ -39,7 +39,7 @@ def min_openings(
     return np.array(least, np.float64)
 
 
-def midpoint_openings(opening: Values, phones: PhoneSequence, fps: float) -> NDArray[np.float64]:
+def midpoint_openings(opening: RealArray, phones: PhoneSequence, fps: float) -> NDArray[np.float64]:
     """Opening in the middle of each open vowel."""
     labels = open_vowels()
     middles = (phones.edges[:-1] + phones.edges[1:]) / 2
@@ -54,12 +54,12 @@ def open_vowels() -> frozenset[str]:
     return frozenset(label for label, phone in heights.items() if phone.height in OPEN_HEIGHTS and not phone.nasality)
 
 
-def closure_threshold(real_least: Values) -> float:
+def closure_threshold(real_least: RealArray) -> float:
     """Opening below which `CLOSURE_QUANTILE` of the real closures lie."""
     return float(np.quantile(real_least, CLOSURE_QUANTILE)) if len(real_least) else 0.0
 
 
-def peak_times(opening: Values, phones: PhoneSequence, fps: float) -> NDArray[np.float64]:
+def peak_times(opening: RealArray, phones: PhoneSequence, fps: float) -> NDArray[np.float64]:
     """Instant of the maximum opening in each open vowel, extended by `PEAK_MARGIN_S` on both sides, in seconds.
 
     Vertex of the parabola through the highest frame and its neighbours; NaN if the maximum is at the border.
@@ -73,7 +73,7 @@ def peak_times(opening: Values, phones: PhoneSequence, fps: float) -> NDArray[np
     return np.array(peaks, np.float64)
 
 
-def _peak_position(curve: Values, low: int, high: int) -> float:
+def _peak_position(curve: RealArray, low: int, high: int) -> float:
     top = low + int(np.argmax(curve[low : high + 1]))
     before, here, behind = (float(value) for value in curve[top - 1 : top + 2])
     if not (here >= before and here >= behind and here > min(before, behind)):

@@ -4,25 +4,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from corpus_tools.measures.reference import LipCurves
 from corpus_tools.recordings.observation import Observation
 from tts2face.lips.motion_measures import speech_frames
 from tts2face.models.talker import Talker
-
-Floats = NDArray[np.float64]
+from tts2face.numeric.arrays import FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CurveScale:
     """Mean and standard deviation (2,) of a person's lip opening and width during speech."""
 
-    mean: Floats
-    spread: Floats
+    mean: FloatArray
+    spread: FloatArray
 
     @classmethod
-    def of(cls, speech: Sequence[Floats]) -> "CurveScale":
+    def of(cls, speech: Sequence[FloatArray]) -> "CurveScale":
         """Statistics of curves (T, 2) in speech."""
         frames = np.concatenate(speech)
         return cls(frames.mean(axis=0), np.maximum(frames.std(axis=0), 1e-9))
@@ -41,7 +39,7 @@ class CurveScale:
         spoken_shapes = (spoken.shape[span] for spoken, span in zip(talker.utterances, spans, strict=True))
         return cls.of([LipCurves.of_parameters(talker.model, shape).values() for shape in spoken_shapes])
 
-    def z_score(self, curves: Floats) -> Floats:
+    def z_score(self, curves: FloatArray) -> FloatArray:
         """z-scored curves (T, 2)."""
         return (curves - self.mean) / self.spread
 

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from corpus_tools.measures import lip_measures
 from corpus_tools.measures.intervals import (
-    Floats,
     IntervalEstimate,
     correlations,
     curve_moments,
@@ -18,6 +17,7 @@ from corpus_tools.measures.reference import OTHER_CLASS, PHONE_CLASSES, LipCurve
 from lexicon.sequence import PhoneSequence
 from tts2face.lips import motion_measures
 from tts2face.models.talker import ShapeModel
+from tts2face.numeric.arrays import FloatArray
 
 N_DRAWS = 1000  # of utterances, with replacement (Efron 1979)
 # In the order of tables: name, its head, digits.
@@ -92,13 +92,13 @@ class UtteranceStatistics:
     opportunities: closures, false closures, labiodental contacts, roundings; ``offsets`` seconds between peaks.
     """
 
-    opening: Floats
-    width: Floats
+    opening: FloatArray
+    width: FloatArray
     rmse_z: float
     dtw_cost: float
     free_cost: float | None
-    counts: Floats
-    offsets: Floats
+    counts: FloatArray
+    offsets: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -191,7 +191,7 @@ def _free_cost(comparison: UtteranceComparison) -> float | None:
     )
 
 
-def _event_counts(comparison: UtteranceComparison, limits: Thresholds) -> Floats:
+def _event_counts(comparison: UtteranceComparison, limits: Thresholds) -> FloatArray:
     """(4, 2) numbers of events and of opportunities, in the phones of the time axis of the synthesis."""
     own, fps = comparison.own, comparison.real.observation.fps
     phones, curves = (own.phones, own.curves) if own else (comparison.real.observation.phones, comparison.curves)
@@ -231,13 +231,13 @@ def _estimate_figures(tallies: Sequence[UtteranceStatistics]) -> dict[str, Inter
     return {name: interval_of(rows[name]) for name, _, _ in FIGURES if name in rows}
 
 
-def _range_ratio(moments: Floats) -> Floats:
+def _range_ratio(moments: FloatArray) -> FloatArray:
     """(W,) ratio of the synthesised spread to the real one for moments (W, 6)."""
     n, a, b, aa, bb, _ = moments.T
     return np.asarray(np.sqrt(np.maximum(bb - b * b / n, 0.0) / np.maximum(aa - a * a / n, 1e-12)))
 
 
-def _weighted_medians(weights: Floats, offsets: Sequence[Floats]) -> Floats:
+def _weighted_medians(weights: FloatArray, offsets: Sequence[FloatArray]) -> FloatArray:
     """Weighted median of all offsets for each row of weights (W, U); 0 where there is none."""
     values = np.concatenate(offsets)
     if not len(values):
@@ -259,7 +259,7 @@ def _class_scores(comparisons: Sequence[UtteranceComparison]) -> list[ClassScore
     return _score_classes(np.concatenate(classes), np.concatenate(errors), np.concatenate(opening))
 
 
-def _score_classes(classes: NDArray[np.str_], errors: NDArray[np.float32], opening: Floats) -> list[ClassScore]:
+def _score_classes(classes: NDArray[np.str_], errors: NDArray[np.float32], opening: FloatArray) -> list[ClassScore]:
     found = []
     for name in (*PHONE_CLASSES, OTHER_CLASS):
         here = classes == name

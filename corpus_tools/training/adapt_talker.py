@@ -26,14 +26,12 @@ from tts2face.models.landmarks import (
     UPPER_LIP_INNER_MID,
 )
 from tts2face.models.talker import ShapeModel, Talker, Utterance
-from tts2face.numeric.arrays import fix_signs, interpolate_columns, principal_axes
+from tts2face.numeric.arrays import FloatArray, fix_signs, interpolate_columns, principal_axes
 
 PRIOR_FRAMES = 500.0  # of the base's motion that the shape model counts beside the person's own frames
 NO_CHANGE = 1e12  # penalty with which the articulation of the base does not change
 SPEECH_MARGIN_S = 0.2  # of silence around speech in the frames on which the map is fitted
 REFERENCE_FPS = 25.0  # frame rate to which the penalty refers
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +137,7 @@ def learn_base_map(
     )
 
 
-def lip_gain(model: ShapeModel, gain: tuple[float, float]) -> Floats:
+def lip_gain(model: ShapeModel, gain: tuple[float, float]) -> FloatArray:
     """(D, D) matrix by which opening and width in speech parameters are multiplied, by the least motion.
 
     Motion is measured in units of its spread; what changes neither of the two remains.
@@ -167,7 +165,7 @@ def base_lips(base: Base, observation: Observation) -> NDArray[np.float32]:
 
 def _own_frames(
     observation: Observation, lips: NDArray[np.float32], model: ShapeModel, inventory: tuple[str, ...]
-) -> tuple[FrameTerms, Floats]:
+) -> tuple[FrameTerms, FloatArray]:
     """Frames of an utterance around its speech: what the base does, and the person's speech parameters."""
     phones = observation.phones
     times = np.arange(len(observation.landmarks)) / observation.fps
@@ -235,7 +233,7 @@ def _carry_utterance(utterance: Utterance, base: Talker, model: ShapeModel, mapp
     )
 
 
-def separate_lips(parameters: Floats, model: ShapeModel) -> Floats:
+def separate_lips(parameters: FloatArray, model: ShapeModel) -> FloatArray:
     """Speech parameters (T, D); frames in which the lips would cross are replaced by the nearest without."""
     gaps = facing_gaps(model)
     n_speech = model.n_speech

@@ -16,14 +16,13 @@ from lexicon.phones import nearest_phones, phone_features
 from lexicon.sequence import PhoneSequence
 from tts2face.models.audio_map import AudioMap
 from tts2face.models.phone_network import N_PLACE, PHONE_WINDOW_S, STEP_S, PhoneNetwork, window_features
+from tts2face.numeric.arrays import FloatArray
 
 N_OFFSETS = 2 * round(PHONE_WINDOW_S / STEP_S) + 1  # leading columns of `window_features`
 KERNEL_CENTRES_S = (-0.08, 0.0, 0.08)  # of the Gaussian windows through which phones are seen
 KERNEL_S = 0.06  # their standard deviation
 # Scales of the terms before the ridge penalty; larger terms are penalised less (docs/decisions/131-base.md).
 LABEL_SCALE, BASE_SCALE = 2.5, 0.5
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,7 +33,7 @@ class FrameTerms:
     """
 
     labels: NDArray[np.int64]
-    base: Floats
+    base: FloatArray
     utterance: NDArray[np.int64]
 
     @classmethod
@@ -52,22 +51,22 @@ class BaseMap:
     """Map from B parameters of the base to D of the new person; `window` is (`N_OFFSETS`, P, D) for P phones."""
 
     inventory: tuple[str, ...]
-    matrix: Floats
-    offset: Floats
-    window: Floats
+    matrix: FloatArray
+    offset: FloatArray
+    window: FloatArray
 
-    def parameters(self, terms: FrameTerms) -> Floats:
+    def parameters(self, terms: FrameTerms) -> FloatArray:
         """(T, D) parameters of the new person."""
         return np.asarray(terms.base @ self.matrix.T + self.offset + self.phone_part(terms))
 
-    def phone_part(self, terms: FrameTerms) -> Floats:
+    def phone_part(self, terms: FrameTerms) -> FloatArray:
         """(T, D) part of the parameters that depends on the phones."""
         part = np.zeros((len(terms.labels), len(self.offset)))
         for offset in range(N_OFFSETS):
             part += self.window[offset, terms.labels[:, offset]]
         return part
 
-    def amplified(self, gain: Floats, about: Floats) -> "BaseMap":
+    def amplified(self, gain: FloatArray, about: FloatArray) -> "BaseMap":
         """The map with its motion about a pose (D,) multiplied by a matrix (D, D)."""
         offset = gain @ (self.offset - about) + about
         return BaseMap(self.inventory, gain @ self.matrix, offset, self.window @ gain.T)
@@ -117,7 +116,7 @@ class BaseMap:
 
 
 def frame_terms(
-    phones: PhoneSequence, times: Floats, inventory: Sequence[str], base: NDArray[np.floating]
+    phones: PhoneSequence, times: FloatArray, inventory: Sequence[str], base: NDArray[np.floating]
 ) -> FrameTerms:
     """Terms of frames at `times` (T,) in seconds, for the base's parameters (T, B)."""
     labels = window_features(phones, times, inventory)[0][:, :N_OFFSETS]
@@ -125,7 +124,13 @@ def frame_terms(
 
 
 def fit_base_map(
-    terms: FrameTerms, targets: Floats, prior: BaseMap, scales: tuple[Floats, Floats], *, trust: float, penalty: float
+    terms: FrameTerms,
+    targets: FloatArray,
+    prior: BaseMap,
+    scales: tuple[FloatArray, FloatArray],
+    *,
+    trust: float,
+    penalty: float,
 ) -> BaseMap:
     """Map fitted on frames of the new person.
 
@@ -163,14 +168,14 @@ def fit_base_map(
     )
 
 
-def _without_means(values: Floats, utterance: NDArray[np.int64]) -> Floats:
+def _without_means(values: FloatArray, utterance: NDArray[np.int64]) -> FloatArray:
     """Values (T, K) without the mean of their utterance: people begin sentences with the mouth in other positions."""
     sums = np.zeros((int(utterance.max()) + 1, values.shape[1]))
     np.add.at(sums, utterance, values)
     return np.asarray(values - (sums / np.bincount(utterance)[:, None])[utterance])
 
 
-def _window_codes(inventory: Sequence[str]) -> Floats:
+def _window_codes(inventory: Sequence[str]) -> FloatArray:
     """(`N_OFFSETS`, P, K) terms of each phone at each offset: its label, and its features in all Gaussian windows."""
     times = (np.arange(N_OFFSETS) - N_OFFSETS // 2) * STEP_S
     kernels = np.exp(-0.5 * ((times[:, None] - np.array(KERNEL_CENTRES_S)) / KERNEL_S) ** 2)

@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from corpus_tools.training.score_map import clipped_logits, fit_score_map, read_mouth_scores
 from lexicon.errors import DataError
@@ -19,6 +18,7 @@ from tts2face.models.face import Face
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.score_map import SCORE_SHAPES, ScoreMap, mouth_scores
 from tts2face.models.talker import Talker
+from tts2face.numeric.arrays import FloatArray
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
 from tts2face.types import Progress, Trajectory
@@ -41,7 +41,6 @@ ADDED = (
 )  # fmt: skip
 JAW_SHARE, MAX_JAW = 0.6, 0.5  # share of poses with the jaw dropped further, by up to this weight
 GAINS, GAIN_SPREAD = (0.0, 1.4), 0.4  # of a pose, and of each shape in it (standard deviation of its logarithm)
-FloatArray = NDArray[np.float64]
 
 
 def calibrate_face(

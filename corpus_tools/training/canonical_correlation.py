@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
+from tts2face.numeric.arrays import RealArray
 
-Values = NDArray[np.floating]
 RANK_TOLERANCE = 1e-10  # singular values below this share of the largest count as zero
 
 
@@ -32,7 +32,7 @@ class CanonicalFactors:
     mean_b: NDArray[np.float64]
 
 
-def canonical_correlation(a: Values, b: Values) -> CanonicalFactors:
+def canonical_correlation(a: RealArray, b: RealArray) -> CanonicalFactors:
     """Canonical correlations of paired measurements (T, D) and (T, E).
 
     Notes

@@ -22,6 +22,7 @@ from corpus_tools.training.base_map import frame_terms
 from corpus_tools.training.train_talker import learn_talker
 from tts2face.lips.motion_measures import DTW_BAND_S, correlation, range_ratio, speech_frames, warping_cost
 from tts2face.models.talker import ShapeModel, Talker
+from tts2face.numeric.arrays import FloatArray
 from tts2face.types import Progress
 
 MAX_FOLDS = 5
@@ -41,7 +42,6 @@ ADAPTATIONS = (
     Adaptation(trust=0.3, penalty=30.0),
 )
 OWN_METHODS = {"mean face": "mean face", "mean pose": "mean phone pose", "own examples": "exemplar"}
-Floats = NDArray[np.float64]
 Landmarks = NDArray[np.floating]
 Synthesis = Callable[[Observation], Landmarks]  # landmarks (T, 478, 3) for the phones of an utterance
 Learner = Callable[[Sequence[Observation]], Synthesis]
@@ -128,7 +128,7 @@ def _base_in_range(base: Base, observations: Sequence[Observation]) -> Adaptatio
     return replace(BASE_ONLY, gain=_limited_gain(ratios))
 
 
-def _limited_gain(ratios: Floats) -> tuple[float, float]:
+def _limited_gain(ratios: FloatArray) -> tuple[float, float]:
     opening, width = np.clip(ratios, *GAIN_LIMITS) ** GAIN_POWER
     return float(opening), float(width)
 

@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError, InputError
 from tts2face.gestures.gaze import LEAST_JUMP_DEG, Fixation
 from tts2face.models.gaze import FACE_DEG, LISTENING, SPEAKING
+from tts2face.numeric.arrays import FloatArray
 
 PX_PER_DEG = np.array([40.3, 41.6])  # down and across, at the middle of the screen
 CONDITIONS: Mapping[str, str] = {SPEAKING: "SPEAK", LISTENING: "LISTEN"}
 LONGEST_GAP_S = 1.0  # of a chain of fixations; longer gaps may hide a look
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import Float32Array
 from tts2face.numeric.kernels import kernel
 
 BATCH = 128  # samples per step
@@ -20,8 +21,7 @@ FINAL_RATE = 0.02
 MOMENTS = (0.9, 0.999)  # decay of the moments of the gradient (Kingma and Ba 2015)
 EPSILON = 1e-8
 POSITION_SPREAD = 0.3  # of the initial weights of the position within the phone: seconds and a share, all below 1
-Floats = NDArray[np.float32]
-Weights = tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats]
+Weights = tuple[Float32Array, Float32Array, Float32Array, Float32Array, Float32Array, Float32Array, Float32Array]
 """First layer of phones (C, K, H), of positions (Q, H), biases by speaker (G, H); second layer; output layer."""
 
 
@@ -30,8 +30,8 @@ class WindowSamples:
     """N samples: phones seen (N, C), position (N, Q), targets (N, D), and the speaker (N,) of each."""
 
     shown: NDArray[np.int32]
-    position: Floats
-    targets: Floats
+    position: Float32Array
+    targets: Float32Array
     speaker: NDArray[np.int64]
 
 
@@ -46,8 +46,8 @@ class TrainingOptions:
 
 def train_network(
     samples: WindowSamples,
-    table: Floats,
-    importance: Floats,
+    table: Float32Array,
+    importance: Float32Array,
     *,
     options: TrainingOptions,
     seed: int,
@@ -79,8 +79,8 @@ def train_network(
 
 
 def network_outputs(
-    weights: Weights, table: Floats, shown: NDArray[np.int32], position: Floats, speaker: int
-) -> Floats:
+    weights: Weights, table: Float32Array, shown: NDArray[np.int32], position: Float32Array, speaker: int
+) -> Float32Array:
     """Outputs (N, D) for samples of one speaker."""
     phone_rows = phone_layer(weights, table)
     outputs = np.zeros((len(shown), weights[5].shape[1]), np.float32)
@@ -88,7 +88,7 @@ def network_outputs(
     return outputs
 
 
-def phone_layer(weights: Weights, table: Floats) -> Floats:
+def phone_layer(weights: Weights, table: Float32Array) -> Float32Array:
     """(C, P, H) first layer for one-hot codes of the phones."""
     phone_rows = np.zeros((len(weights[0]), len(table), weights[0].shape[2]), np.float32)
     _code_phones(table, weights[0], phone_rows)
@@ -97,7 +97,7 @@ def phone_layer(weights: Weights, table: Floats) -> Floats:
 
 def _initial_weights(
     samples: WindowSamples,
-    table: Floats,
+    table: Float32Array,
     shape: tuple[int, ...],
     options: TrainingOptions,
     stream: np.random.Generator,
@@ -106,7 +106,7 @@ def _initial_weights(
     n_codes, (first, second) = table.shape[1], options.hidden
     fan_in = n_shown * max(1.0, float(np.abs(table).sum(axis=1).mean()))
 
-    def normal(deviation: float, *size: int) -> Floats:
+    def normal(deviation: float, *size: int) -> Float32Array:
         return stream.normal(0.0, deviation, size).astype(np.float32)
 
     return (

@@ -22,6 +22,7 @@ from lexicon.sequence import SILENCE
 from tts2face.lips.motion_measures import speech_frames
 from tts2face.models.phone_network import PhoneNetwork, window_features
 from tts2face.models.talker import Talker
+from tts2face.numeric.arrays import Float32Array
 from tts2face.types import Progress
 
 SILENCE_MARGIN_S = 0.2  # of silence around speech in the training data
@@ -32,7 +33,6 @@ N_FOLLOWED = 2  # features that the parameters follow: opening and width; all ei
 FEATURE_NOISE = 0.1  # variance of the error of a predicted feature, of z-scored ones; .03 and 1 are similar
 LEAST_VARIANCE = 1e-9  # of the largest; a parameter that hardly varies explains no feature
 MIN_FRAMES = 3000  # two minutes; networks from less are no better than exemplars
-Floats = NDArray[np.float32]
 
 
 def add_phone_network(
@@ -64,8 +64,8 @@ def add_phone_network(
 
 
 def _talker_samples(
-    talker: Talker, inventory: Sequence[str], spread: Floats, *, with_features: bool
-) -> tuple[NDArray[np.int64], Floats, Floats]:
+    talker: Talker, inventory: Sequence[str], spread: Float32Array, *, with_features: bool
+) -> tuple[NDArray[np.int64], Float32Array, Float32Array]:
     """Phones (N, C), positions (N, Q) and targets (N, D): parameters in units of the spread, then lip features."""
     n_speech, parts = talker.model.n_speech, []
     features = [talker_features(talker, at) for at in range(len(talker.utterances))] if with_features else []
@@ -92,7 +92,7 @@ def _speech_statistics(
 
 def _pooled_samples(
     pooled: Sequence[PooledSpeech], inventory: Sequence[str], n_speech: int
-) -> tuple[NDArray[np.int64], Floats, Floats] | None:
+) -> tuple[NDArray[np.int64], Float32Array, Float32Array] | None:
     if not pooled:
         return None
     parts = []
@@ -106,10 +106,10 @@ def _pooled_samples(
 
 
 def _join(
-    own: tuple[NDArray[np.int64], Floats, Floats],
-    pooled: tuple[NDArray[np.int64], Floats, Floats] | None,
+    own: tuple[NDArray[np.int64], Float32Array, Float32Array],
+    pooled: tuple[NDArray[np.int64], Float32Array, Float32Array] | None,
     n_speech: int,
-) -> tuple[WindowSamples, Floats]:
+) -> tuple[WindowSamples, Float32Array]:
     """Samples of both speakers, and the importance (G, D) of each output."""
     groups = [own] if pooled is None else [own, pooled]
     importance = np.ones((len(groups), own[2].shape[1]), np.float32)
@@ -119,7 +119,7 @@ def _join(
     return WindowSamples(shown.astype(np.int32), position, targets, speaker), importance
 
 
-def follow_features(weights: Weights, targets: Floats, n_speech: int) -> Weights:
+def follow_features(weights: Weights, targets: Float32Array, n_speech: int) -> Weights:
     """Weights of a network whose speech parameters show the opening and width that it predicts for the talker.
 
     Parameters
@@ -148,8 +148,8 @@ def follow_features(weights: Weights, targets: Floats, n_speech: int) -> Weights
 
 
 def expand_to_phones(
-    weights: Weights, table: Floats, n_speech: int, spread: Floats
-) -> tuple[list[Floats], list[Floats]]:
+    weights: Weights, table: Float32Array, n_speech: int, spread: Float32Array
+) -> tuple[list[Float32Array], list[Float32Array]]:
     """Layers and biases of the talker's network for one-hot phones, with its parameters in mm."""
     _, place, biases, inner, inner_biases, outer, outer_biases = weights
     first = np.concatenate([*phone_layer(weights, table), place])

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from corpus_tools.training.ridge import fit_ridge
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.numeric.arrays import FloatArray
 
 CHUNK_S = 3.0  # about a sentence, so that speech averages out
 MIN_CHUNKS = 12  # with fewer there is no correction
-Floats = NDArray[np.float64]
 
 
 class PosedLandmarks(Protocol):
@@ -43,9 +43,9 @@ AnyPosedLandmarks = TypeVar("AnyPosedLandmarks", bound=PosedLandmarks)
 class PoseCorrection:
     """Displacements (K, L, 3) of landmarks in mm for terms of the head's angles about ``centre`` over ``scale``."""
 
-    centre: Floats
-    scale: Floats
-    offsets: Floats
+    centre: FloatArray
+    scale: FloatArray
+    offsets: FloatArray
 
     def apply(self, observation: AnyPosedLandmarks) -> AnyPosedLandmarks:
         """The observation with landmarks corrected to the pose ``centre``."""
@@ -71,7 +71,7 @@ def fit_pose_correction(observations: Sequence[PosedLandmarks]) -> PoseCorrectio
     return PoseCorrection(centre, scale, _keep_lip_contact(offsets.reshape(terms.shape[1], *landmarks.shape[1:])))
 
 
-def _keep_lip_contact(offsets: Floats) -> Floats:
+def _keep_lip_contact(offsets: FloatArray) -> FloatArray:
     """Offsets averaged over opposite points of the inner lips, so that lip contact does not depend on the pose."""
     kept = offsets.copy()
     upper, lower = list(INNER_LIP_UPPER), list(INNER_LIP_LOWER)
@@ -85,13 +85,13 @@ def correct_pose(observations: Sequence[AnyPosedLandmarks]) -> tuple[AnyPosedLan
     return tuple(leak.apply(observation) for observation in observations) if leak else ()
 
 
-def angle_terms(angles: NDArray[np.floating]) -> Floats:
+def angle_terms(angles: NDArray[np.floating]) -> FloatArray:
     """(T, 9) angles (T, 3), their squares and their products."""
     pitch, yaw, roll = np.asarray(angles, np.float64).T
     return np.column_stack([pitch, yaw, roll, pitch**2, yaw**2, roll**2, pitch * yaw, pitch * roll, yaw * roll])
 
 
-def _chunk_means(observations: Sequence[PosedLandmarks]) -> tuple[Floats, Floats]:
+def _chunk_means(observations: Sequence[PosedLandmarks]) -> tuple[FloatArray, FloatArray]:
     """Mean angles (C, 3) and landmarks (C, L, 3) of every chunk."""
     angles, landmarks = [], []
     for observation in observations:

@@ -4,22 +4,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tts2face.numeric.arrays import FloatArray
 
 REGULARISATIONS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  # for terms of unit spread
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RidgeFit:
     """Weights (K, V) of terms about their ``mean`` (K,), and the leave-one-out sum of squared errors."""
 
-    mean: Floats
-    weights: Floats
+    mean: FloatArray
+    weights: FloatArray
     left_out_error: float
 
 
-def fit_ridge(terms: Floats, targets: Floats, regularisations: Sequence[float] = REGULARISATIONS) -> RidgeFit:
+def fit_ridge(terms: FloatArray, targets: FloatArray, regularisations: Sequence[float] = REGULARISATIONS) -> RidgeFit:
     """The best regression of (R, V) values, whose mean is 0, on (R, K) terms.
 
     Each row's error when it is left out follows from its leverage. Source: Allen 1974 (PRESS).
@@ -35,9 +35,11 @@ def fit_ridge(terms: Floats, targets: Floats, regularisations: Sequence[float] =
     return RidgeFit(mean, weights, error)
 
 
-def _fit_and_cross_validate(centred: Floats, targets: Floats, normal: Floats, right: Floats) -> tuple[float, Floats]:
+def _fit_and_cross_validate(
+    centred: FloatArray, targets: FloatArray, normal: FloatArray, right: FloatArray
+) -> tuple[float, FloatArray]:
     inverse = np.linalg.inv(normal)
-    weights: Floats = inverse @ right
+    weights: FloatArray = inverse @ right
     leverage = np.einsum("rk,kj,rj->r", centred, inverse, centred) + 1.0 / len(centred)
     errors = (targets - centred @ weights) / (1.0 - leverage)[:, None]
     return float(np.square(errors).sum()), weights

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from tts2face.models.score_map import N_SCORES, ScoreMap, logistic, mouth_scores
 from tts2face.models.talker import Talker, speech_channels
+from tts2face.numeric.arrays import FloatArray
 from tts2face.types import Trajectory
 from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 
@@ -20,8 +21,6 @@ MAX_LOGIT = 6.0  # larger logits are scores of 0 or 1
 LOGIT_SHARE = 0.02  # of the squared error of logits in the loss; the other part is that of scores
 MAX_FRAMES = 4000  # of a talker's recordings
 PX_PER_MM, MIDDLE_PX = 2.0, 300.0  # of the pictures that the landmarks stand for; the network is invariant to both
-
-FloatArray = NDArray[np.float64]
 
 
 def add_score_map(talker: Talker, reader: BlendshapeReader) -> Talker:

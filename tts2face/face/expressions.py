@@ -10,7 +10,6 @@ from functools import cache
 from importlib.resources import files
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from tts2face.face.eyelids import BLINK_SHAPES, WIDE_SHAPES, build_eyelid_model
@@ -20,8 +19,8 @@ from tts2face.face.shape_transfer import add_missing_shapes
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.models.palette import EXPRESSIONS
+from tts2face.numeric.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
 EXPRESSION_TABLE = "expressions.tsv"
 BOTH_SIDES = "*"  # suffix of a name: both the left and the right shape
 GAZE_SHAPES = tuple(

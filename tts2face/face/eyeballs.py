@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.models.face import Eye, Face, FacePart
+from tts2face.numeric.arrays import Float32Array
 from tts2face.numeric.kernels import kernel
 
 MARGIN_MM = 0.3  # between skin and eyeball: edges of 2 mm lie below a surface of 14 mm radius by a tenth of it
@@ -23,8 +24,6 @@ FOLLOWER_PARTS = ("lashes", "wet")
 FOLLOWER_REACH_MM = 15.0  # length of lashes; those of other people, hidden in the skull, are further away
 N_ROOTS = 3
 N_ANGLES = 64  # of an eyeball's profile
-
-Float32Array = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from tts2face.face.landmarks import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.models.face import Face
-from tts2face.numeric.arrays import ordered_product
+from tts2face.numeric.arrays import FloatArray, ordered_product
 
 SIDES = ("Left", "Right")  # of the face itself, in the order of `tts2face.models.palette.EYE_CHANNELS`
 # Upper and lower lid of each eye, at the middle and halfway to the nose: where they meet last.
@@ -20,8 +20,6 @@ LID_LANDMARK_PAIRS = (((386, 385), (374, 380)), ((159, 158), (145, 153)))
 BLINK_SHAPES, WIDE_SHAPES = ("eyeBlinkLeft", "eyeBlinkRight"), ("eyeWideLeft", "eyeWideRight")
 NARROWING_SHAPES = (("eyeSquintLeft", "cheekSquintLeft"), ("eyeSquintRight", "cheekSquintRight"))
 MAX_NARROWING = 0.6  # largest share of the opening that squinting may close
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

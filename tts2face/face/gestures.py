@@ -21,7 +21,7 @@ from tts2face.face.shape_transfer import SCALE_LIMITS, append_shapes, spread_lan
 from tts2face.models.face import Face
 from tts2face.models.landmarks import LID_RINGS, LIP_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.models.palette import FEATURES, FIXED_CHANNELS, REGION_FEATURES, FaceRegion, Palette
-from tts2face.numeric.arrays import ordered_product
+from tts2face.numeric.arrays import Float32Array, FloatArray, ordered_product
 from tts2face.processes.shared import shared
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
@@ -37,8 +37,6 @@ LID_LANDMARKS = (*LID_RINGS[0], *LID_RINGS[1])
 FIT_LANDMARKS = (33, 133, 362, 263, 168, 6, 2)
 DEFAULT_GAZE_TURN = 0.4  # rad per weight of a gaze shape on a face whose eyes are part of its shapes
 
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
 NO_GAINS: Mapping[str, float] = MappingProxyType({})
 
 

@@ -8,12 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tts2face.models.lit_hair import SWING_SHAPES
+from tts2face.numeric.arrays import FloatArray
 from tts2face.types import Trajectory
 
-FloatArray = NDArray[np.float64]
 FREQUENCY_HZ, DAMPING = 1.9, 0.32  # of loose ends: they come to rest in about half a second
 LIMIT_RAD = 0.15  # of a lag, towards which larger ones bend
 

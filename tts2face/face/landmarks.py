@@ -6,11 +6,10 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_LANDMARKS
-from tts2face.numeric.arrays import nearest_rotation
+from tts2face.numeric.arrays import FloatArray, nearest_rotation
 from tts2face.processes.shared import shared
 from tts2face.types import Trajectory
 
-FloatArray = NDArray[np.float64]
 DIGITS = 9  # decimals kept: the last bits of LAPACK's results depend on its threads
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.face.landmarks import landmark_motion, scatter_landmarks
-from tts2face.face.mouth import FloatArray, mouth_curvature, require_lips
+from tts2face.face.mouth import mouth_curvature, require_lips
 from tts2face.models.face import Face
 from tts2face.models.landmarks import (
     INNER_LIP_LOWER,
@@ -20,7 +20,7 @@ from tts2face.models.landmarks import (
     MOUTH_REGION,
     UPPER_LIP_INNER_MID,
 )
-from tts2face.numeric.arrays import ordered_product, smoothstep
+from tts2face.numeric.arrays import FloatArray, ordered_product, smoothstep
 from tts2face.numeric.least_squares import bounded_least_squares
 
 SPEECH_SHAPE_PREFIXES = ("jaw", "mouth")  # name prefixes of the shapes that speech moves

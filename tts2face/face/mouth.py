@@ -14,9 +14,8 @@ from tts2face.models.landmarks import (
     OUTER_LIP_LOWER,
     OUTER_LIP_UPPER,
 )
-from tts2face.numeric.arrays import ordered_product
+from tts2face.numeric.arrays import FloatArray, ordered_product
 
-FloatArray = NDArray[np.float64]
 CORNERS_LEFT, CORNERS_RIGHT = (OUTER_LIP_UPPER[-1], INNER_LIP_UPPER[-1]), (OUTER_LIP_UPPER[0], INNER_LIP_UPPER[0])
 CHIN_LANDMARKS = (175, 199, 171, 396, 208, 428)  # skin over the bone of the jaw
 LIP_WEIGHT = 10.0  # of a lip landmark, relative to one of the jaw or cheek

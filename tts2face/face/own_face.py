@@ -25,7 +25,7 @@ from tts2face.models.landmarks import (
 )
 from tts2face.models.palette import EXPRESSIONS, REGION_FEATURES, Palette
 from tts2face.models.talker import ShapeModel, Talker, require_appearance
-from tts2face.numeric.arrays import ordered_product, smoothstep
+from tts2face.numeric.arrays import Float32Array, FloatArray, ordered_product, smoothstep
 from tts2face.numeric.local_splines import fit_local_interpolant
 from tts2face.types import Trajectory
 
@@ -36,8 +36,6 @@ MIN_LID_CLOSURE = -0.3  # closure of lids opened wide
 GESTURE_RIDGE = 1e-5
 LID_INNER_RADIUS, LID_OUTER_RADIUS = 0.7, 1.1  # relative to the eye width: lid texture changes in full, and ends
 EXPRESSION_SHARE = 0.6  # of an expression that is applied: its folds and teeth do not occur in recorded speech
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

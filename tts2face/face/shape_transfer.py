@@ -12,7 +12,7 @@ from tts2face.face.landmarks import axis_scales, landmark_motion, landmark_posit
 from tts2face.models.face import Eye, Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS, N_MESH_LANDMARKS
-from tts2face.numeric.arrays import append_rows
+from tts2face.numeric.arrays import Float32Array, FloatArray, append_rows
 from tts2face.numeric.local_splines import fit_local_interpolant
 from tts2face.storage.array_cache import computed_once
 
@@ -26,9 +26,6 @@ DIGITS = 5  # decimals of a displacement in mm; the last bits of a solver depend
 MAX_CARRIED_WEIGHT = 1.5  # upper limit of transferred shapes, whose effect may be smaller than on the default head
 EYEBALL_RETRACTION_FACTOR = 1.5  # relative to the default head: transferred lids follow the eyeball less closely
 SCALE_LIMITS = (0.4, 2.5)  # of facial features between two faces, per axis; beyond them the landmarks are wrong
-
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
 
 
 def eye_distance(face: Face) -> float:

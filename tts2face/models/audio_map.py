@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
+from tts2face.numeric.arrays import Float32Array, RealArray
 
 # Number of values per frame of each kind of feature of `tts2face.sound.features`.
 FEATURE_SIZES: Mapping[str, int] = MappingProxyType(
@@ -22,8 +23,6 @@ MAX_CONTEXT = 1000  # frames of context on either side
 MAX_GAIN_DB = 40.0  # fainter recordings contain more noise than speech
 ACTIVATIONS = ("linear", "tanh", "rectified")  # by their numbers in a file
 N_AT_ONCE = 1000  # frames, whose windows take 5 MB
-Values = NDArray[np.floating]
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,10 +53,10 @@ class AudioMap:
     feature: str
     before: int
     after: int
-    mean: Floats
-    spread: Floats
-    weights: tuple[Floats, ...]
-    biases: tuple[Floats, ...]
+    mean: Float32Array
+    spread: Float32Array
+    weights: tuple[Float32Array, ...]
+    biases: tuple[Float32Array, ...]
     activation: str
     loudness: float = math.nan
     fps: float = 25.0
@@ -75,7 +74,7 @@ class AudioMap:
         missing = self.loudness - loudness
         return 1.0 if math.isnan(missing) else float(10.0 ** (min(max(missing, -MAX_GAIN_DB), MAX_GAIN_DB) / 20.0))
 
-    def parameters(self, features: Values) -> NDArray[np.float32]:
+    def parameters(self, features: RealArray) -> NDArray[np.float32]:
         """Shape parameters (T, S) of features (T, D); the first and the last frame are repeated beyond the ends.
 
         Raises
@@ -93,20 +92,20 @@ class AudioMap:
             [self.inside(padded[at : at + N_AT_ONCE + context]) for at in range(0, max(len(features), 1), N_AT_ONCE)]
         )
 
-    def inside(self, features: Values) -> NDArray[np.float32]:
+    def inside(self, features: RealArray) -> NDArray[np.float32]:
         """Shape parameters (T - before - after, S) of the frames of features (T, D) that have full context."""
         values = context_windows((features - self.mean) / self.spread, self.before, self.after).astype(np.float32)
         for weights, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
             values = self._activated(_layer(values, weights, bias))
         return _layer(values, self.weights[-1], self.biases[-1])
 
-    def _activated(self, units: Floats) -> Floats:
+    def _activated(self, units: Float32Array) -> Float32Array:
         if self.activation == "linear":
             return units
         return np.tanh(units) if self.activation == "tanh" else np.maximum(units, np.float32(0.0))
 
 
-def _layer(values: Floats, weights: Floats, bias: Floats) -> Floats:
+def _layer(values: Float32Array, weights: Float32Array, bias: Float32Array) -> Float32Array:
     """Units (T, H) of values (T, K); one at a time, so that they do not depend on the number of frames."""
     units = np.zeros((len(values), len(bias)), np.float32) + bias
     for unit, row in enumerate(weights):
@@ -114,7 +113,7 @@ def _layer(values: Floats, weights: Floats, bias: Floats) -> Floats:
     return units
 
 
-def context_windows(features: Values, before: int, after: int) -> Values:
+def context_windows(features: RealArray, before: int, after: int) -> RealArray:
     """Frames of (T, D) with their neighbours, earliest first: (T - before - after, (before + 1 + after) D)."""
     width = before + 1 + after
     n_frames = max(len(features) - width + 1, 0)

@@ -18,6 +18,7 @@ from tts2face.models.codec import (
     stored_arrays,
     stored_tensors,
 )
+from tts2face.numeric.arrays import Float32Array
 from tts2face.storage.schema import Contents, Tensor
 
 DRIVE = "drive"  # name before those of the maps
@@ -28,8 +29,6 @@ WEIGHTS = ("inner", "middle", "outer")  # names of the layers; those of two have
 BIASES = ("bias", "middle_bias", "offset")
 INNER = Stored(Tensor("float32", ("{prefix} units {at}", "{prefix} units {last}"), -MAX_WEIGHT, MAX_WEIGHT))
 OUTER = Stored(Tensor("float32", ("{prefix} units {at}",), -MAX_WEIGHT, MAX_WEIGHT))
-
-Floats = NDArray[np.float32]
 
 
 def _n_layers(arrays: Arrays, prefix: str) -> int:
@@ -60,13 +59,13 @@ def _bytes_of(text: str) -> NDArray[np.uint8]:
 class StoredAudioMap(StoredModel):
     """An audio map as a file holds it: its attributes, of which ``context`` (3,) is before, after and activation."""
 
-    mean: Annotated[Floats, Tensor("float32", ("{prefix} features",), -MAX_WEIGHT, MAX_WEIGHT)]
-    spread: Annotated[Floats, Tensor("float32", ("{prefix} features",), 0.0, MAX_WEIGHT)]
+    mean: Annotated[Float32Array, Tensor("float32", ("{prefix} features",), -MAX_WEIGHT, MAX_WEIGHT)]
+    spread: Annotated[Float32Array, Tensor("float32", ("{prefix} features",), 0.0, MAX_WEIGHT)]
     fps: Annotated[NDArray[np.float64], Tensor("float64", (1,), *FPS_LIMITS)]
-    weights: Annotated[tuple[Floats, ...], Numbered((INNER,), _n_layers, _weight_names)]
-    biases: Annotated[tuple[Floats, ...], Numbered((OUTER,), _n_layers, _bias_names)]
+    weights: Annotated[tuple[Float32Array, ...], Numbered((INNER,), _n_layers, _weight_names)]
+    biases: Annotated[tuple[Float32Array, ...], Numbered((OUTER,), _n_layers, _bias_names)]
     context: Annotated[NDArray[np.int32], Tensor("int32", (3,), 0, MAX_CONTEXT)]
-    loudness: Annotated[Floats, Tensor("float32", (1,), -1000.0, 1000.0, may_be_nan=True)]
+    loudness: Annotated[Float32Array, Tensor("float32", (1,), -1000.0, 1000.0, may_be_nan=True)]
     feature: Annotated[str, Stored(Tensor("uint8", ("{prefix} text",), 43, 122), encode=_bytes_of, decode=_text_of)]
 
     @classmethod

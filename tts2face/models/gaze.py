@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from lexicon.values.checks import free, list_of, text
 from tts2face.models.codec import InHeader, Stored, StoredModel, in_64_bits, read_model, stored_arrays, stored_header
+from tts2face.numeric.arrays import FloatArray
 from tts2face.storage.schema import Contents, Tensor
 from tts2face.storage.shipped import find_file
 from tts2face.storage.tensors import write_tensors
@@ -35,8 +35,6 @@ OF_BOTH_STATES = ("left", "spot")  # places that a person prefers whether speaki
 MOST_SPREADS = 2.0  # beyond which no person is drawn: fifteen people tell nothing of rarer ones
 MAX_VALUE = 20.0  # of a logarithm
 OF_STATES = (len(STATES), len(PARAMETERS))  # shape
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

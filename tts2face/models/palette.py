@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError, InputError
 from tts2face.models.codec import StoredModel
 from tts2face.models.landmarks import N_LANDMARKS
+from tts2face.numeric.arrays import Float32Array
 from tts2face.storage.schema import Contents, Tensor
 from tts2face.types import HEAD_CHANNELS
 
@@ -32,8 +33,6 @@ FIXED_CHANNELS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 REGION_FEATURES = ("brows", "cheeks")
 MEASURED_STYLE = "measured"  # the recorded motion from which the default style is derived, unchanged
 FEATURES = ("expression", "brows", "blink", "cheeks", "gaze", "head")
-
-Float32Array = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -24,14 +24,13 @@ from tts2face.models.codec import (
     stored_arrays,
     stored_header,
 )
-from tts2face.numeric.arrays import ordered_product
+from tts2face.numeric.arrays import Float32Array, ordered_product
 from tts2face.storage.schema import Contents, Tensor
 from tts2face.storage.shipped import find_file
 from tts2face.storage.tensors import write_tensors
 
 KIND, VERSION = "phones", 1
 MAX_VALUE, MAX_DELAY_S = 1e4, 1.0
-Floats = NDArray[np.float32]
 WEIGHTS = (
     half("features", "units", low=-MAX_VALUE, high=MAX_VALUE),
     half("units", "phones", low=-MAX_VALUE, high=MAX_VALUE),
@@ -60,12 +59,12 @@ class PhoneClassifier(StoredModel):
     """
 
     inventory: Annotated[tuple[str, ...], InHeader(list_of(text), encode=list, decode=tuple)]
-    mean: Annotated[Floats, Tensor("float32", ("features",), -MAX_VALUE, MAX_VALUE)]
-    scale: Annotated[Floats, Tensor("float32", ("features",), 0.0, MAX_VALUE)]
-    weights: Annotated[tuple[Floats, Floats], Numbered(WEIGHTS, 2)]
-    biases: Annotated[tuple[Floats, Floats], Numbered(BIASES, 2)]
-    durations: Annotated[Floats, Tensor("float32", ("phones", 2), -MAX_VALUE, MAX_VALUE)]
-    delays: Annotated[Floats, Tensor("float32", ("phones",), -MAX_DELAY_S, MAX_DELAY_S)]
+    mean: Annotated[Float32Array, Tensor("float32", ("features",), -MAX_VALUE, MAX_VALUE)]
+    scale: Annotated[Float32Array, Tensor("float32", ("features",), 0.0, MAX_VALUE)]
+    weights: Annotated[tuple[Float32Array, Float32Array], Numbered(WEIGHTS, 2)]
+    biases: Annotated[tuple[Float32Array, Float32Array], Numbered(BIASES, 2)]
+    durations: Annotated[Float32Array, Tensor("float32", ("phones", 2), -MAX_VALUE, MAX_VALUE)]
+    delays: Annotated[Float32Array, Tensor("float32", ("phones",), -MAX_DELAY_S, MAX_DELAY_S)]
 
     @classmethod
     def prepare_check(cls, contents: Contents, prefix: str) -> None:
@@ -78,7 +77,7 @@ class PhoneClassifier(StoredModel):
         if len(set(contents.header["inventory"])) < contents.sizes["phones"]:
             raise DataError(f"{contents.path}: a phone is listed twice; train the file again")
 
-    def log_probabilities(self, features: Floats) -> NDArray[np.float64]:
+    def log_probabilities(self, features: Float32Array) -> NDArray[np.float64]:
         """Log probabilities (T, P) of the phones in frames with features (T, K)."""
         hidden = ordered_product((features - self.mean) * self.scale, self.weights[0]) + self.biases[0]
         logits = ordered_product(np.maximum(hidden, 0.0, dtype=np.float32), self.weights[1]) + self.biases[1]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from tts2face.models.codec import StoredModel, check_model, has_part, model_of
-from tts2face.numeric.arrays import make_read_only, ordered_product
+from tts2face.numeric.arrays import FloatArray, make_read_only, ordered_product
 from tts2face.storage.schema import Contents, Tensor
 from tts2face.types import Trajectory
 
@@ -34,7 +34,6 @@ SCORE_SHAPES: Mapping[str, tuple[str, ...]] = MappingProxyType(
 N_SCORES = len(SCORE_SHAPES)
 SCORES = "scores"  # name of the map before those of its arrays
 MAX_WEIGHT = 1e6
-FloatArray = NDArray[np.float64]
 
 
 def _weights(*shape: int | str) -> Tensor:

@@ -26,6 +26,7 @@ from tts2face.models.codec import (
 from tts2face.models.phone_network import INVENTORY, NETWORK, PhoneNetwork
 from tts2face.models.score_map import SCORES, check_score_map, score_map_of
 from tts2face.models.talker import ShapeModel, Talker, Utterance, speech_channels
+from tts2face.numeric.arrays import Float32Array
 from tts2face.processes.shared import Shared, file_state
 from tts2face.storage.schema import MAX_MM, Contents, Tensor, refuse
 from tts2face.storage.shipped import find_file
@@ -51,7 +52,6 @@ OPTIONAL_METADATA: Mapping[str, Check] = {
 }
 OF_FORMAT = {*METADATA, "utterances", INVENTORY}  # metadata that are no statement about the talker
 
-Floats = NDArray[np.float32]
 _TALKERS: Shared[Talker] = Shared()
 
 
@@ -72,15 +72,15 @@ class Recordings(StoredModel):
     """
 
     shape: Annotated[NDArray[np.int16], Tensor("int16", ("frames", "modes"))]
-    head: Annotated[Floats, half("frames", len(HEAD_CHANNELS), low=-MAX_MM, high=MAX_MM)]
-    intensity: Annotated[Floats, half("frames", low=-1000.0, high=1000.0)]
+    head: Annotated[Float32Array, half("frames", len(HEAD_CHANNELS), low=-MAX_MM, high=MAX_MM)]
+    intensity: Annotated[Float32Array, half("frames", low=-1000.0, high=1000.0)]
     n_frames: Annotated[NDArray[np.int32], Tensor("int32", ("utterances",), 1)]
     n_phones: Annotated[NDArray[np.int32], Tensor("int32", ("utterances",), 1)]
     phones: Annotated[NDArray[np.int16], Tensor("int16", ("phones",))]
     edges: Annotated[NDArray[np.float64], Tensor("float64", ("edges",), -ROUNDING_S, 1e6)]
 
     @classmethod
-    def of(cls, utterances: Sequence[Utterance], spread: Floats, inventory: Sequence[str]) -> "Recordings":
+    def of(cls, utterances: Sequence[Utterance], spread: Float32Array, inventory: Sequence[str]) -> "Recordings":
         """Utterances of a talker with parameters of this spread (M,)."""
         numbers = {phone: number for number, phone in enumerate(inventory)}
         spoken = [numbers[phone] for utterance in utterances for phone in utterance.phones.phones]
@@ -122,7 +122,11 @@ class Recordings(StoredModel):
             contents.fail(f"a word of the utterance {utterances[beyond[0]][0]!r} reaches beyond its phones")
 
     def utterances(
-        self, named: Sequence[tuple[str, Any]], inventory: Sequence[str], spread: Floats, looks: Floats | None
+        self,
+        named: Sequence[tuple[str, Any]],
+        inventory: Sequence[str],
+        spread: Float32Array,
+        looks: Float32Array | None,
     ) -> Iterator[Utterance]:
         """The utterances, with their names and words, and appearance parameters (N, A)."""
         frames = np.concatenate([[0], np.cumsum(self.n_frames)])
@@ -137,7 +141,7 @@ class Recordings(StoredModel):
             yield Utterance(name, sequence, spans, shape[span], self.head[span], self.intensity[span], own)
 
 
-def _steps(values: Sequence[Floats], step: Floats) -> NDArray[np.int16]:
+def _steps(values: Sequence[Float32Array], step: Float32Array) -> NDArray[np.int16]:
     """Values (T, D) of utterances, one after the other, in whole steps (D,)."""
     steps: NDArray[np.int16] = np.clip(np.rint(np.concatenate(values) / step), -32768, 32767).astype(np.int16)
     return steps

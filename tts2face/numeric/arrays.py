@@ -1,4 +1,4 @@
-"""Numerical functions shared by several packages.
+"""Types of arrays, and numerical functions, shared by several packages.
 
 sRGB values and linear light (IEC 61966-2-1).
 """
@@ -13,7 +13,11 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
+RealArray = NDArray[np.floating]  # float32 or float64
 IntArray = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+Pixels = NDArray[np.uint8]
+Array = NDArray[Any]
 AnyFloat = TypeVar("AnyFloat", np.float32, np.float64)
 _N_USED: dict[int, int] = {}  # rows that arrays of `zeros_with_room` have given away, by their numbers
 _LOCK = threading.Lock()

@@ -6,23 +6,23 @@ Importing `scipy.ndimage` takes longer than all filters of a clip.
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import FloatArray
+
 TRUNCATED_AT = 4.0  # standard deviations, as `scipy.ndimage.gaussian_filter1d`
 
-Floats = NDArray[np.float64]
 
-
-def moving_mean(values: Floats, width: int) -> Floats:
+def moving_mean(values: FloatArray, width: int) -> FloatArray:
     """(n,) means of an odd number of values around each of (n,) values, one at least.
 
     Each sum is the one before it and its change, as `scipy.ndimage.uniform_filter1d` adds them up.
     """
     held = np.pad(values, width // 2, mode="edge")
     first = np.cumsum(held[:width])[-1:]
-    means: Floats = np.cumsum(np.concatenate([first, held[width:] - held[:-width]])) / width
+    means: FloatArray = np.cumsum(np.concatenate([first, held[width:] - held[:-width]])) / width
     return means
 
 
-def moving_minimum(values: Floats, width: int, beyond: float) -> Floats:
+def moving_minimum(values: FloatArray, width: int, beyond: float) -> FloatArray:
     """(n,) least of an odd number of values around each of (n,) values, with `beyond` before and after them."""
     padded = np.pad(values, width // 2, constant_values=beyond)
     covered = 1

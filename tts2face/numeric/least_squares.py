@@ -3,12 +3,10 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lexicon.errors import DataError
+from tts2face.numeric.arrays import FloatArray
 from tts2face.numeric.kernels import kernel
-
-FloatArray = NDArray[np.float64]
 
 MAX_ROUNDS = 10_000  # pivoting rounds; a frame of speech takes about four
 MAX_STALLED_ROUNDS = 3  # rounds without progress before single pivoting

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
+from tts2face.numeric.arrays import FloatArray
 from tts2face.numeric.kernels import kernel
-from tts2face.numeric.splines import FloatArray, Interpolant, check_centres
+from tts2face.numeric.splines import Interpolant, check_centres
 
 # Of the interpolation matrix; beyond it, half of the digits of the coefficients are rounding errors.
 MAX_CONDITION = 1e9

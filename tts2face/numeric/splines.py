@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-
-FloatArray = NDArray[np.float64]
+from tts2face.numeric.arrays import FloatArray
 
 DECAY_LENGTH = 64.0  # the basis function is exp(-r / 64) (eq. 4)
 FACE_WIDTH = 200.0  # width of the face in the unit of `DECAY_LENGTH`: pixels in the paper

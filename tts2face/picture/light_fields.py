@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.models.face import Face
+from tts2face.numeric.arrays import Float32Array
 from tts2face.picture.light import HIDDEN_EYE_LIGHT, HIDDEN_TOOTH_LIGHT, N_SMOOTHING_PASSES, smooth_values
 from tts2face.picture.occlusion import occlusion_of, occlusion_poses, pose_normals, sphere_directions
 from tts2face.picture.surface import Surface
 
-FloatArray = NDArray[np.float32]
 N_HARMONICS = 9
 
 
@@ -23,7 +23,7 @@ def harmonics(directions: NDArray[np.floating]) -> NDArray[np.float64]:
     return np.column_stack([np.ones(len(x)), x, y, z, x * y, y * z, z * x, x * x - y * y, 3 * z * z - 1])
 
 
-def light_fields(face: Face, surface: Surface, threads: int) -> FloatArray:
+def light_fields(face: Face, surface: Surface, threads: int) -> Float32Array:
     """Visibility (V, 20): share of the sky and nine coefficients of `harmonics`, and how they grow as the mouth opens.
 
     The last ten are added with the square root of the lip opening, as in `tts2face.picture.light`.
@@ -39,7 +39,7 @@ def light_fields(face: Face, surface: Surface, threads: int) -> FloatArray:
     return np.concatenate([poses[0], poses[-1] - poses[0]], axis=1)
 
 
-def _pose_field(surface: Surface, normals: FloatArray, bits: NDArray[np.uint8]) -> FloatArray:
+def _pose_field(surface: Surface, normals: Float32Array, bits: NDArray[np.uint8]) -> Float32Array:
     directions = sphere_directions(8 * bits.shape[1])
     seen = (1 - np.unpackbits(bits, axis=1)).astype(np.float32)
     facing = np.maximum(normals @ directions.T.astype(np.float32), np.float32(0.02))
@@ -54,7 +54,7 @@ def _pose_field(surface: Surface, normals: FloatArray, bits: NDArray[np.uint8]) 
     return field
 
 
-def _raise(field: FloatArray, rows: NDArray[np.integer], share: float, percentile: float) -> None:
+def _raise(field: Float32Array, rows: NDArray[np.integer], share: float, percentile: float) -> None:
     """Give some vertices at least a share of the mean light of the brightest of them, in place."""
     if not len(rows):
         return

@@ -18,6 +18,7 @@ from tts2face.models.appearance import Appearance, nearest_pixels
 from tts2face.models.face import SYNTHETIC_NOTICE
 from tts2face.models.landmarks import FACE_OVAL
 from tts2face.models.talker import ShapeModel, Talker
+from tts2face.numeric.arrays import Float32Array
 from tts2face.picture.kernels.warps import warp_image
 from tts2face.picture.options import AUTO_SIZE, Picture
 from tts2face.picture.plate import (
@@ -32,7 +33,6 @@ from tts2face.types import Clip
 
 MOUTH_SUPERSAMPLING = 3  # samples along a pixel's side around the mouth, where the edge of the lips is drawn
 MOUTH_MARGIN_PX = 3  # margin of the supersampled box around the mouth
-Float32Array = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

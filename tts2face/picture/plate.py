@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from tts2face.models.appearance import Appearance, Plate, TextureModel
+from tts2face.numeric.arrays import Float32Array
 from tts2face.picture.options import SIDE_LIMITS_PX, Picture
 from tts2face.video.media import metadata_options
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 MAX_RAW_BYTES = 400_000_000  # of frames kept uncompressed: 250 of 720 x 740
 FRAME_JPEG_QUALITY = 95
 MAX_VIDEO_SIDE_PX = 8192  # a picture of 200 MB
-Float32Array = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

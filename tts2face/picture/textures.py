@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.models.face import Texture
+from tts2face.numeric.arrays import Array
 from tts2face.numeric.kernels import kernel
-
-Array = NDArray[Any]
 
 N_LEVELS = 8  # a texture of 2048 pixels down to 16
 SHARP_TEXELS = np.float32(2.2)  # texels under a pixel up to which the finer level is read

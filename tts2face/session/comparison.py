@@ -10,14 +10,13 @@ from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.lips.motion_measures import DTW_BAND_S, pearson, speech_frames, warping_cost
 from tts2face.models.landmarks import lip_opening, lip_width
+from tts2face.numeric.arrays import RealArray
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.types import Trajectory
 
 LIPS = ("opening", "width")
 LEAST_SPREAD = 1e-3  # standard deviation below which a channel counts as still: a thousandth of its range
 LIP_SPREAD = 1e-4  # the same for opening and width, over the distance of the eyes
-
-Values = NDArray[np.floating]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,8 +26,8 @@ class MotionPart:
     ``phones`` are those of the second; with `is_same_time` frame i of both is the same instant, and T is U.
     """
 
-    reference: Values
-    motion: Values
+    reference: RealArray
+    motion: RealArray
     phones: PhoneSequence
     is_same_time: bool = True
 
@@ -121,7 +120,7 @@ def map_channels(motion: Trajectory, channels: Sequence[str]) -> NDArray[np.floa
     return values
 
 
-def _lips(face: AnimatedFace, names: tuple[str, ...], motion: Values, fps: float) -> NDArray[np.float64]:
+def _lips(face: AnimatedFace, names: tuple[str, ...], motion: RealArray, fps: float) -> NDArray[np.float64]:
     """(T, 2) opening and width."""
     landmarks = face.landmarks(Trajectory(names, motion[:, : len(names)].astype(np.float32), fps))
     return np.stack([lip_opening(landmarks), lip_width(landmarks)], axis=1)
@@ -133,19 +132,21 @@ def _speech(part: MotionPart, fps: float) -> slice:
     return speech_frames(part.phones, len(part.motion), fps)
 
 
-def _series(name: str, reference: Values, other: Values, least: float, is_same_time: bool) -> SeriesMeasure:
+def _series(name: str, reference: RealArray, other: RealArray, least: float, is_same_time: bool) -> SeriesMeasure:
     moves = reference.std() > least and other.std() > least
     r = pearson(reference.astype(np.float64), other.astype(np.float64)) if moves and is_same_time else None
     return SeriesMeasure(name, r, float(other.std() / reference.std()) if reference.std() > least else None)
 
 
-def _moving(whole: tuple[Values, Values], channels: Sequence[str], is_same_time: bool) -> tuple[SeriesMeasure, ...]:
+def _moving(
+    whole: tuple[RealArray, RealArray], channels: Sequence[str], is_same_time: bool
+) -> tuple[SeriesMeasure, ...]:
     spread = np.maximum(*(values.std(axis=0) for values in whole))
     order = [int(k) for k in np.argsort(-spread, kind="stable") if spread[k] > LEAST_SPREAD]
     return tuple(_series(channels[k], whole[0][:, k], whole[1][:, k], LEAST_SPREAD, is_same_time) for k in order)
 
 
-def _dtw_cost(pairs: Sequence[tuple[Values, Values]], spread: Values, band: int | None) -> float | None:
+def _dtw_cost(pairs: Sequence[tuple[RealArray, RealArray]], spread: RealArray, band: int | None) -> float | None:
     """Mean over the frames of the second motion."""
     pairs = [(a, b) for a, b in pairs if len(a) and len(b)]
     if not pairs or (spread < LIP_SPREAD).any():

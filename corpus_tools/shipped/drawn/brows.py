@@ -6,12 +6,11 @@ from scipy.spatial import cKDTree
 
 from corpus_tools.shipped.drawn.character import Brow, Colour
 from corpus_tools.shipped.drawn.fields import profile, smooth_line, smooth_rows
-from corpus_tools.shipped.drawn.lids import Floats
 from corpus_tools.shipped.head.correspondence import nearest_surface_points
 from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
 from corpus_tools.shipped.head.skin import HeadSkin, vertex_normals
 from corpus_tools.shipped.head.subdivision import grid_triangles, triangulate
-from tts2face.numeric.arrays import unit_vectors
+from tts2face.numeric.arrays import FloatArray, unit_vectors
 
 N_ALONG_BROW, N_ACROSS = 96, 7
 LIFT_MM, RIM_SINK_MM = 0.9, 1.6  # of the ribbon above the skin, and of its rims into it
@@ -48,10 +47,10 @@ def brow_piece(skin: HeadSkin, brow: Brow, colour: Colour) -> HeadPart:
     return HeadPart(vertices, (span,), np.array(colour) * np.tile(bright, 2)[:, None], shapes)
 
 
-def _between_hairs() -> Floats:
+def _between_hairs() -> FloatArray:
     """(`N_ALONG`, `N_ACROSS`) 0 on the hairs to 1 between them; they grow upwards and lean outwards."""
     along, place = np.linspace(0, 1, N_ALONG_BROW)[:, None], np.linspace(-1, 1, N_ACROSS)
-    between: Floats = 0.5 - 0.5 * np.cos(2 * np.pi * (N_HAIRS * along - SLANT * place))
+    between: FloatArray = 0.5 - 0.5 * np.cos(2 * np.pi * (N_HAIRS * along - SLANT * place))
     return between
 
 
@@ -62,7 +61,7 @@ def _forehead(skin: HeadSkin) -> NDArray[np.int64]:
     return np.asarray(triangles[(places[:, 2] > -20) & (places[:, 1] > 2) & (places[:, 1] < 70)])
 
 
-def _ribbon(skin: HeadSkin, triangles: NDArray[np.int64], brow: Brow, sign: float) -> Floats:
+def _ribbon(skin: HeadSkin, triangles: NDArray[np.int64], brow: Brow, sign: float) -> FloatArray:
     """(`N_ALONG` x `N_ACROSS`, 3) points of the brow on the side of x with a sign."""
     places, normals = skin.vertices[triangles].mean(axis=1), vertex_normals(skin.vertices, skin.quads, skin.base)
     along = np.linspace(0, 1, N_ALONG_BROW)

@@ -10,9 +10,8 @@ from corpus_tools.shipped.drawn.tiles import COLLAR, SHIRT, cut_seam, in_tile
 from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
 from corpus_tools.shipped.head.skin import HeadSkin
 from corpus_tools.shipped.head.subdivision import grid_triangles
-from tts2face.numeric.arrays import smoothstep, unit_vectors
+from tts2face.numeric.arrays import FloatArray, smoothstep, unit_vectors
 
-Floats = NDArray[np.float64]
 MATERIAL = {"specular": 0.02, "shininess": 6.0, "wrap": 0.6}
 ROLL_SHADE = 0.97  # of the shirt's colour
 N_KNOTS, N_AROUND, N_SECTION = 12, 96, 16
@@ -44,7 +43,7 @@ def sweater_piece(shirt: HeadPart, collar: Collar | None, colour: Colour) -> Hea
     return HeadPart(vertices, (MaterialSpan("shirt", faces, MATERIAL),), colours, uv=uv)
 
 
-def _roll(collar: Collar) -> tuple[Floats, NDArray[np.int64], Floats]:
+def _roll(collar: Collar) -> tuple[FloatArray, NDArray[np.int64], FloatArray]:
     """Points, triangles, and places (N, 2) around the neck and around the roll, of a closed tube around the neck."""
     turn = np.linspace(0, 2 * np.pi, N_KNOTS, endpoint=False)
     forward = np.cos(turn)
@@ -72,7 +71,7 @@ def _roll(collar: Collar) -> tuple[Floats, NDArray[np.int64], Floats]:
     return points, wind_outward(points, triangles, path.mean(axis=0)), places
 
 
-def breath(vertices: Floats) -> Floats:
+def breath(vertices: FloatArray) -> FloatArray:
     """Motion (N, 3) of a full breath: shoulders and chest rise, the neck hardly moves."""
     share = smoothstep(-vertices[:, 1], *BREATH_FROM_MM)[:, None]
     return np.asarray(share * (BREATH_MM + vertices * BREATH_GAIN))

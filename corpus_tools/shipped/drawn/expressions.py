@@ -10,13 +10,12 @@ from scipy.spatial import cKDTree
 
 from corpus_tools.shipped.drawn.fields import bump
 from corpus_tools.shipped.drawn.lids import keep_outside
-from corpus_tools.shipped.drawn.sculpt import Floats
 from corpus_tools.shipped.head.lid_edges import LidEdge
 from corpus_tools.shipped.head.lips import find_lip_line, ring_arcs
 from corpus_tools.shipped.head.parts import Eyeball
 from corpus_tools.shipped.head.shapes import neighbour_means, smoothed
 from corpus_tools.shipped.head.skin import HeadSkin
-from tts2face.numeric.arrays import smoothstep
+from tts2face.numeric.arrays import FloatArray, smoothstep
 
 MOUTH_SIDES = (("Left", 1.0), ("Right", -1.0))
 SMILES, N_SMILE_MEANS = ("mouthSmile", "mouthDimple", "mouthStretch", "noseSneer", "mouthUpperUp"), 120
@@ -104,19 +103,19 @@ def close_jaw(skin: HeadSkin, ring: NDArray[np.int64]) -> HeadSkin:
     return replace(skin, shapes={**skin.shapes, "mouthClose": gain * close})
 
 
-def _lip_middle(skin: HeadSkin, ring: NDArray[np.int64]) -> Floats:
+def _lip_middle(skin: HeadSkin, ring: NDArray[np.int64]) -> FloatArray:
     """(3,) middle of the line where lips meet, mm."""
     places = skin.vertices[ring]
     return np.asarray(places[np.abs(places[:, 0]) < LIP_MIDDLE_MM].mean(axis=0))
 
 
-def _overlap(vertices: Floats, upper: NDArray[np.int64], lower: NDArray[np.int64]) -> Floats:
+def _overlap(vertices: FloatArray, upper: NDArray[np.int64], lower: NDArray[np.int64]) -> FloatArray:
     """Height in mm by which the lower lip's edge lies above the upper one's, at `COLUMNS_MM`."""
     heights = []
     for arc in (upper, lower):
         order = np.argsort(vertices[arc, 0])
         heights.append(np.interp(COLUMNS_MM, vertices[arc][order, 0], vertices[arc][order, 1]))
-    smooth: Floats = gaussian_filter1d(heights[1] - heights[0], 2.0)
+    smooth: FloatArray = gaussian_filter1d(heights[1] - heights[0], 2.0)
     return smooth
 
 

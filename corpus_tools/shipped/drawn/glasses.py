@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.shipped.drawn.character import Colour
-from corpus_tools.shipped.drawn.clothes import Floats
 from corpus_tools.shipped.drawn.fields import smooth_line, wind_outward
 from corpus_tools.shipped.head.parts import Eyeball, HeadPart, MaterialSpan
 from corpus_tools.shipped.head.subdivision import grid_triangles
-from tts2face.numeric.arrays import unit_vectors
+from tts2face.numeric.arrays import FloatArray, unit_vectors
 
 WIRE_MM, N_RIM_SECTION = 1.5, 8
 RIM_MM = np.array([28.5, 26.0])  # half sizes of a rim, which bends back by `WRAP_MM` at its outer side
@@ -46,7 +45,7 @@ def glasses_piece(balls: Sequence[Eyeball], colour: Colour) -> HeadPart:
     return HeadPart(points, (MaterialSpan("glasses", faces, GLASSES_MATERIAL),), np.tile(colour, (len(points), 1)))
 
 
-def _tube(path: Floats, *, is_closed: bool = False) -> tuple[Floats, NDArray[np.int64]]:
+def _tube(path: FloatArray, *, is_closed: bool = False) -> tuple[FloatArray, NDArray[np.int64]]:
     """Points and triangles of a wire along a path (N, 3)."""
     around = np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0) if is_closed else np.gradient(path, axis=0)
     along = unit_vectors(around)

@@ -15,10 +15,7 @@ from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
 from corpus_tools.shipped.head.skin import HeadSkin, vertex_normals
 from corpus_tools.shipped.head.subdivision import grid_triangles, triangulate
 from tts2face.models.lit_hair import swing_shapes
-from tts2face.numeric.arrays import smoothstep, unit_vectors
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tts2face.numeric.arrays import FloatArray, IntArray, smoothstep, unit_vectors
 
 # The volume of the hair: an ellipsoid, and below its middle a drop; half sizes in mm.
 MIDDLE = np.array([0.0, 30.0, -58.0])
@@ -122,12 +119,12 @@ def other_palettes(palette: CharacterColours) -> tuple[CharacterColours, ...]:
     return tuple(replace(palette, hair=other, hair_tip=tuple((np.array(other) * to_tip).tolist())) for other in others)
 
 
-def hair_cover(skin: HeadSkin, style: Hairstyle) -> Floats:
+def hair_cover(skin: HeadSkin, style: Hairstyle) -> FloatArray:
     """(N,) share of the skin that hair covers, painted in its colour."""
     return smoothstep(height_over_hairline(skin.vertices, style), -1.0, 2.0)
 
 
-def on_volume(azimuth: float, elevation: float, lift: float) -> Floats:
+def on_volume(azimuth: float, elevation: float, lift: float) -> FloatArray:
     """Point (3,) over the volume of the hair at an azimuth and elevation in degrees."""
     turn = np.radians(azimuth)
     half = np.array([ACROSS, UP, AHEAD if np.cos(turn) > 0 else BEHIND])
@@ -143,14 +140,14 @@ def on_volume(azimuth: float, elevation: float, lift: float) -> Floats:
     return np.asarray(MIDDLE + place + lift * normal / np.linalg.norm(normal))
 
 
-def height_over_hairline(points: Floats, style: Hairstyle) -> Floats:
+def height_over_hairline(points: FloatArray, style: Hairstyle) -> FloatArray:
     """(N,) height over the edge of the hair in about degrees, below 0 where none grows: also around the ears."""
     off = (points - MIDDLE) / [ACROSS, UP, DEPTH]
     azimuth = np.degrees(np.arctan2(points[:, 0], points[:, 2] - MIDDLE[2]))
     elevation = np.degrees(np.arctan2(off[:, 1], np.hypot(off[:, 0], off[:, 2])))
     mirrored = np.column_stack([np.abs(points[:, 0]), points[:, 1:]])
     off_ear = np.linalg.norm((mirrored - EAR_MM) / EAR_HALF_MM, axis=1)
-    height: Floats = np.minimum(
+    height: FloatArray = np.minimum(
         elevation - np.interp(azimuth, *np.array(style.hairline).T), (off_ear - EAR_MARGIN) * EAR_DEG
     )
     return np.where(points[:, 1] < NAPE_Y, BELOW_NAPE_DEG, height)
@@ -172,12 +169,12 @@ class Tube:
         Unit vectors along the hair.
     """
 
-    points: Floats
-    triangles: Ints
-    shade: Floats
-    along: Floats
-    places: Floats
-    tangents: Floats
+    points: FloatArray
+    triangles: IntArray
+    shade: FloatArray
+    along: FloatArray
+    places: FloatArray
+    tangents: FloatArray
 
 
 class Scalp:
@@ -195,17 +192,17 @@ class Scalp:
         self._used, packed = np.unique(triangles[self._height[triangles].max(axis=1) > -1], return_inverse=True)
         self._triangles = packed.reshape(-1, 3).astype(np.int64)
 
-    def keep_outside(self, points: Floats, clearance: float) -> Floats:
+    def keep_outside(self, points: FloatArray, clearance: float) -> FloatArray:
         """Points (N, 3) at least `clearance` mm above the skin near them."""
         distance, near = (np.asarray(found) for found in self._places.query(points, N_NEAR_SKIN))
         places, normals = self._skin.vertices[self._rows[near]], self._normals[self._rows[near]]
         heights = np.einsum("pkd,pkd->pk", points[:, None] - places, normals)
         lowest, row = heights.argmin(axis=1), np.arange(len(points))
         lack = np.maximum(clearance - heights[row, lowest], 0) * (distance[:, 0] < NEAR_SKIN_MM)
-        moved: Floats = points + lack[:, None] * normals[row, lowest]
+        moved: FloatArray = points + lack[:, None] * normals[row, lowest]
         return moved
 
-    def hairline(self, azimuth: Floats) -> Floats:
+    def hairline(self, azimuth: FloatArray) -> FloatArray:
         """(N,) elevation of the edge of curls at azimuths (N,) all around, in degrees; it runs above the ears."""
         low = np.interp(azimuth, *np.array(self._style.hairline).T)
         low = np.maximum(low, np.interp(np.abs(azimuth), *np.array(ABOVE_EAR).T))
@@ -226,7 +223,7 @@ class Scalp:
         shade, tangents = np.full(n, SHELL_SHADE), unit_vectors(down + 1e-9)
         return Tube(points, self._triangles, shade, np.zeros(n), flat, tangents)
 
-    def fade(self) -> Floats:
+    def fade(self) -> FloatArray:
         """(N,) share of its own colour that cropped hair has at the points of the shell."""
         return smoothstep(self._height[self._used], -1.0, self._style.fade)
 
@@ -302,7 +299,7 @@ def curled_tube(curls: Curls, scalp: "Scalp") -> Tube:
     )
 
 
-def _spread(points: Floats, apart: float) -> Floats:
+def _spread(points: FloatArray, apart: float) -> FloatArray:
     """Some of points (N, 3) that are at least so far from each other, in random order (seeded)."""
     order = np.random.default_rng(0).permutation(len(points))
     tree, is_free, kept = cKDTree(points), np.ones(len(points), bool), []
@@ -313,7 +310,7 @@ def _spread(points: Floats, apart: float) -> Floats:
     return points[kept]
 
 
-def _curled(rings: Floats, middle: Floats, height: float) -> Floats:
+def _curled(rings: FloatArray, middle: FloatArray, height: float) -> FloatArray:
     """Rings (n, k, 3) around a middle line (n, 3) with round curls, each in the gap between those of the row before."""
     off = rings - middle[:, None]
     far = np.linalg.norm(off, axis=2, keepdims=True)
@@ -330,7 +327,7 @@ def _curled(rings: Floats, middle: Floats, height: float) -> Floats:
     )
 
 
-def _sizes(lock: Lock, at: Floats) -> tuple[Floats, Floats]:
+def _sizes(lock: Lock, at: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Half width and thickness (n,) of a lock along it, mm; both run out at the tip."""
     if lock.is_ball:
         ball = np.sqrt(np.clip(1 - (2 * at - 1) ** 2, 0, 1))
@@ -344,7 +341,7 @@ def _sizes(lock: Lock, at: Floats) -> tuple[Floats, Floats]:
     return np.maximum(half, LEAST_HALF_MM), np.maximum(thick, LEAST_THICK_MM)
 
 
-def _capped(rings: Floats) -> tuple[Floats, Ints]:
+def _capped(rings: FloatArray) -> tuple[FloatArray, IntArray]:
     """Points and triangles of a tube of rings (n, k, 3), whose last column is the first, with a fan at either end."""
     n, k = rings.shape[:2]
     column = np.arange(k - 1)
@@ -356,9 +353,9 @@ def _capped(rings: Floats) -> tuple[Floats, Ints]:
     return points, np.concatenate([grid_triangles(n, k), *fans])
 
 
-def _colours(tube: Tube, palette: CharacterColours) -> Floats:
+def _colours(tube: Tube, palette: CharacterColours) -> FloatArray:
     """(N, 3) colours of a lock: lighter tips, slightly darker rims; highlights are left to the light."""
     own, tip = np.array(palette.hair), np.array(palette.hair_tip)
     shade = 1 - PAINTED_SHADE * (1 - tube.shade[:, None])
-    mixed: Floats = (own + TIP_SHARE * (tip - own) * tube.along[:, None] ** TIP_EXPONENT) * shade
+    mixed: FloatArray = (own + TIP_SHARE * (tip - own) * tube.along[:, None] ** TIP_EXPONENT) * shade
     return mixed

@@ -7,12 +7,11 @@ from numpy.typing import NDArray
 
 from corpus_tools.shipped.drawn.character import Colour, Profile
 from corpus_tools.shipped.drawn.fields import Front, arc_length, profile
-from corpus_tools.shipped.drawn.lids import Floats
 from corpus_tools.shipped.head.lid_edges import LidEdge
 from corpus_tools.shipped.head.parts import Eyeball, HeadPart, MaterialSpan
 from corpus_tools.shipped.head.skin import HeadSkin
 from corpus_tools.shipped.head.subdivision import grid_triangles
-from tts2face.numeric.arrays import smoothstep, unit_vectors
+from tts2face.numeric.arrays import FloatArray, smoothstep, unit_vectors
 
 N_ALONG, N_ROWS = 72, 4
 EDGE_SPREAD = 0.030  # of the lid's length, over which a lash follows its edge; the vertices of the edge zigzag
@@ -31,7 +30,7 @@ def lash_piece(
     """The lashes of both eyes; `length` in mm by share of the lid from the inner corner."""
     rows = np.flatnonzero((skin.vertices[:, 2] > -25) & (np.abs(skin.vertices[:, 1]) < 34))
     points, faces = [], []
-    shapes: dict[str, list[Floats]] = {name: [] for name in skin.shapes}
+    shapes: dict[str, list[FloatArray]] = {name: [] for name in skin.shapes}
     for number, (edge, ball, side) in enumerate(zip(lids, balls, ("Left", "Right"), strict=True)):
         line = edge.upper if side == "Left" else edge.upper[::-1]
         band = _Band(skin, line, ball, 1.0 if side == "Left" else -1.0, length)
@@ -64,8 +63,8 @@ class _Band:
         along /= along[-1]
         at = np.linspace(0.0, 1.0, N_ALONG)
         share = np.exp(-(((at[:, None] - along) / EDGE_SPREAD) ** 2)) * np.gradient(along)
-        self.share: Floats = share / share.sum(axis=1, keepdims=True)
-        self.root: Floats = self.share @ edge
+        self.share: FloatArray = share / share.sum(axis=1, keepdims=True)
+        self.root: FloatArray = self.share @ edge
         outward = unit_vectors(self.root - ball.centre)
         long = profile(length, at)[:, None]
         thick, lean = np.minimum(long, 1.7), smoothstep(at, 0.30, 1.0)
@@ -76,7 +75,7 @@ class _Band:
             self.root + 1.5 * thick * outward + 0.5 * long * up,
             self.root + thick * outward + long * unit_vectors(up + np.array([0, 0.22, -0.08])),
         ]
-        self._pointed: Floats = smoothstep(at, *WING)[:, None] ** WING_EXPONENT
+        self._pointed: FloatArray = smoothstep(at, *WING)[:, None] ** WING_EXPONENT
 
     def come_forward(self, lid: Front) -> None:
         """Move the rows in front of the lid, then run them into a point."""
@@ -84,11 +83,11 @@ class _Band:
             row[:, 2] += lid.lacking(row, gap)
         self._rows = [row + self._pointed * (self._rows[-1] - row) for row in self._rows]
 
-    def points(self) -> Floats:
+    def points(self) -> FloatArray:
         """(`N_ALONG` x `N_ROWS`, 3) points of the band."""
         return np.stack(self._rows, axis=1).reshape(-1, 3)
 
-    def turned(self, follow: Floats, turn: float, lid: Front) -> Floats:
+    def turned(self, follow: FloatArray, turn: float, lid: Front) -> FloatArray:
         """Displacements of the band that turns down with the lid, in front of it, from those of its roots."""
         points = self.points()
         off = points - np.repeat(self.root, N_ROWS, axis=0)
@@ -98,5 +97,5 @@ class _Band:
         shut = (points + follow + turn * share * (down - off)).reshape(N_ALONG, N_ROWS, 3)
         for row in range(1, N_ROWS):
             shut[:, row, 2] += lid.lacking(shut[:, row], SHUT_GAP_MM)
-        moved: Floats = shut.reshape(-1, 3) - points
+        moved: FloatArray = shut.reshape(-1, 3) - points
         return moved

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
@@ -13,10 +12,8 @@ from corpus_tools.shipped.head.lid_edges import LidEdge
 from corpus_tools.shipped.head.parts import Eyeball
 from corpus_tools.shipped.head.shapes import neighbour_means
 from corpus_tools.shipped.head.skin import HeadSkin, vertex_normals
-from tts2face.numeric.arrays import smoothstep
+from tts2face.numeric.arrays import FloatArray, Mask, smoothstep
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 WAY_LIMITS, N_WAY_COLUMNS = (0.7, 1.9), 60  # factors of the upper lid's way, and columns in which they are found
 OVERLAP_MM = 0.1  # of the lids' edges when they are shut
 LID_MM = (1.0, 2.4)  # least and greatest distance of a shut lid from the eyeball
@@ -29,7 +26,7 @@ LINING_MM, LINING_DEEP_MM = 0.2, 14.0  # distance of the tucked lining from the 
 BROWS = ("browInnerUp", "browOuterUpLeft", "browOuterUpRight", "browDownLeft", "browDownRight")
 
 
-def facing(skin: HeadSkin, ball: Eyeball) -> tuple[Floats, Floats, Floats]:
+def facing(skin: HeadSkin, ball: Eyeball) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Offset (N, 3) of the skin from an eyeball's centre, its length (N,), and its cosine (N,) with the normal."""
     off = skin.vertices - ball.centre
     distance = np.linalg.norm(off, axis=1)
@@ -37,7 +34,7 @@ def facing(skin: HeadSkin, ball: Eyeball) -> tuple[Floats, Floats, Floats]:
     return off, distance, np.einsum("nc,nc->n", off / distance[:, None], normals)
 
 
-def find_lining(skin: HeadSkin, balls: Sequence[Eyeball], most: float) -> Bools:
+def find_lining(skin: HeadSkin, balls: Sequence[Eyeball], most: float) -> Mask:
     """(N,) inner side of the lids: near an eyeball, with a cosine of its normal below `most`."""
     lining = np.zeros(len(skin.vertices), bool)
     for ball in balls:
@@ -62,7 +59,7 @@ def shut_lids(skin: HeadSkin, balls: Sequence[Eyeball], lids: Sequence[LidEdge])
     return replace(skin, shapes=shapes)
 
 
-def _raise_lower_lid(skin: HeadSkin, moved: Floats, ball: Eyeball, edge: LidEdge) -> Floats:
+def _raise_lower_lid(skin: HeadSkin, moved: FloatArray, ball: Eyeball, edge: LidEdge) -> FloatArray:
     """A blink (N, 3) whose lower lid comes up to an arc: a deep one would draw a shut eye with a hook at its corner."""
     low = (skin.vertices + moved)[edge.lower]
     ends = low[[low[:, 0].argmin(), low[:, 0].argmax()]]
@@ -82,7 +79,7 @@ def _raise_lower_lid(skin: HeadSkin, moved: Floats, ball: Eyeball, edge: LidEdge
     return np.asarray(moved + np.where((is_own & (distance < 3 * LOWER_LID_MM))[:, None], held - off, 0))
 
 
-def _way_factors(vertices: Floats, moved: Floats, edge: LidEdge) -> Floats:
+def _way_factors(vertices: FloatArray, moved: FloatArray, edge: LidEdge) -> FloatArray:
     """(N,) factors of a blink by which the upper edge reaches the lower one at each x."""
     low = vertices[edge.lower] + moved[edge.lower]
     order = np.argsort(low[:, 0])
@@ -98,7 +95,9 @@ def _way_factors(vertices: Floats, moved: Floats, edge: LidEdge) -> Floats:
     return np.interp(vertices[:, 0], columns, smooth)
 
 
-def _lay_on_ball(skin: HeadSkin, moved: Floats, ball: Eyeball, edge: LidEdge, means: sparse.csr_array) -> Floats:
+def _lay_on_ball(
+    skin: HeadSkin, moved: FloatArray, ball: Eyeball, edge: LidEdge, means: sparse.csr_array
+) -> FloatArray:
     """A blink (N, 3) whose shut lid lies on the eyeball."""
     _, distance, cosine = facing(skin, ball)
     off = skin.vertices + moved - ball.centre
@@ -115,7 +114,7 @@ def _lay_on_ball(skin: HeadSkin, moved: Floats, ball: Eyeball, edge: LidEdge, me
     return moved
 
 
-def tuck_lining(skin: HeadSkin, balls: Sequence[Eyeball], lining: Bools) -> HeadSkin:
+def tuck_lining(skin: HeadSkin, balls: Sequence[Eyeball], lining: Mask) -> HeadSkin:
     """Blinks whose lids' inner side lies on the eyeball: in front of the outer side it would be a dark patch."""
     shapes = dict(skin.shapes)
     for ball, side in zip(balls, ("Left", "Right"), strict=True):
@@ -141,7 +140,7 @@ def still_lining(skin: HeadSkin, balls: Sequence[Eyeball]) -> HeadSkin:
     return replace(skin, shapes=shapes)
 
 
-def keep_outside(skin: HeadSkin, vertices: Floats, balls: Sequence[Eyeball]) -> Floats:
+def keep_outside(skin: HeadSkin, vertices: FloatArray, balls: Sequence[Eyeball]) -> FloatArray:
     """Skin (N, 3) around the eyes that stays outside the eyeballs at rest; the inner side of the lids is left alone."""
     means = neighbour_means(skin)
     moved = vertices

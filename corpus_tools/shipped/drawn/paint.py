@@ -18,10 +18,8 @@ from corpus_tools.shipped.head.skin import HeadSkin
 from corpus_tools.shipped.head.source import SourceMesh
 from corpus_tools.shipped.head.subdivision import triangulate
 from corpus_tools.shipped.head.texture import INNER_LIP_Z, fill_gaps, in_mouth, line_distance, sample_mask
-from tts2face.numeric.arrays import smoothstep
+from tts2face.numeric.arrays import FloatArray, smoothstep
 from tts2face.picture.baked.eyes import EDGE_RAD
-
-Floats = NDArray[np.float64]
 
 SIDE = 1024  # pixels of the square texture
 NEAR_MM = 14.0  # from a line, as far as a tint along it may reach
@@ -43,7 +41,7 @@ def paint_skin(
     lids: Sequence[LidEdge],
     character: DrawnCharacter,
     mouth_y: float,
-    hair: Floats,
+    hair: FloatArray,
 ) -> NDArray[np.uint8]:
     """(SIDE, SIDE, 3) texture of the skin.
 
@@ -68,7 +66,7 @@ def paint_skin(
     return fill_gaps(texels, colour.values, SIDE)
 
 
-def vertex_masks(source: SourceMesh, source_uv: Floats, depth: Floats) -> dict[str, Floats]:
+def vertex_masks(source: SourceMesh, source_uv: FloatArray, depth: FloatArray) -> dict[str, FloatArray]:
     """Shares (N,) of the skin's vertices that are ``lips``, and ``inner``, the inside of the mouth behind them.
 
     `source_uv` (N, 2) are their coordinates in MakeHuman's layout, `depth` (N,) their z in mm.
@@ -81,24 +79,24 @@ def vertex_masks(source: SourceMesh, source_uv: Floats, depth: Floats) -> dict[s
 class _Paint:
     """Colours (P, 3) of texels that are tinted and painted over."""
 
-    def __init__(self, values: Floats) -> None:
+    def __init__(self, values: FloatArray) -> None:
         self.values = values
 
-    def tint(self, share: Floats, factor: Colour) -> None:
+    def tint(self, share: FloatArray, factor: Colour) -> None:
         """Multiply by a colour's factors, where the share (P,) is 1."""
         self.values = self.values * (1 + share[:, None] * (np.array(factor) - 1))
 
-    def blend(self, share: Floats, colours: Floats) -> None:
+    def blend(self, share: FloatArray, colours: FloatArray) -> None:
         """Paint over by colours (3,) or (P, 3), where the share (P,) is 1."""
         self.values = self.values + share[:, None] * (colours - self.values)
 
 
-def _mask(source: SourceMesh, name: str, blur: float, where: Floats) -> Floats:
+def _mask(source: SourceMesh, name: str, blur: float, where: FloatArray) -> FloatArray:
     """(P,) values of a blurred mask of the source at coordinates (P, 2), v up."""
     return sample_mask(gaussian_filter(source.mask(name), blur), where)
 
 
-def _lips(place: Floats, palette: CharacterColours, mouth_y: float) -> Floats:
+def _lips(place: FloatArray, palette: CharacterColours, mouth_y: float) -> FloatArray:
     """(P, 3) colour of the lips: the upper one darker, both deeper towards the line between them."""
     upper = smoothstep(place[:, 1], mouth_y - 0.6, mouth_y + 2.2)
     line = np.exp(-(((place[:, 1] - mouth_y) / 1.3) ** 2)) * (np.abs(place[:, 0]) < 40)
@@ -106,14 +104,16 @@ def _lips(place: Floats, palette: CharacterColours, mouth_y: float) -> Floats:
     return np.asarray(np.array(palette.lips) * darker * (1 - 0.16 * line[:, None]))
 
 
-def _mouth(source: SourceMesh, place: Floats, where: Floats, palette: CharacterColours) -> tuple[Floats, Floats]:
+def _mouth(
+    source: SourceMesh, place: FloatArray, where: FloatArray, palette: CharacterColours
+) -> tuple[FloatArray, FloatArray]:
     """Share (P,) and colour (P, 3) of the inside of the mouth: dark towards the throat, lips towards the front."""
     colour = np.array(palette.cavity) * (1 - 0.55 * smoothstep(-place[:, 2], -15.0, 25.0))[:, None]
     near = smoothstep(place[:, 2], *INNER_LIP_Z)[:, None]
     return _in_mouth(source, where), colour + near * (0.93 * np.array(palette.lips) - colour)
 
 
-def _in_mouth(source: SourceMesh, where: Floats) -> Floats:
+def _in_mouth(source: SourceMesh, where: FloatArray) -> FloatArray:
     """(P,) share of places (P, 2) in MakeHuman's layout that is the inside of the mouth."""
     return smoothstep(np.maximum(_mask(source, "inside-mouth", 2.0, where), in_mouth(where)), 0.15, 0.95)
 
@@ -141,11 +141,11 @@ def _paint_lids(
         )
 
 
-def _near(distance: Floats, reach: float) -> Floats:
+def _near(distance: FloatArray, reach: float) -> FloatArray:
     return np.asarray(np.exp(-((distance / reach) ** 2)))
 
 
-def _sprinkle(colour: _Paint, place: Floats, number: int) -> None:
+def _sprinkle(colour: _Paint, place: FloatArray, number: int) -> None:
     """Freckles across the nose and cheeks."""
     generator = np.random.default_rng(FRECKLE_SEED)
     for _ in range(number):
@@ -158,7 +158,7 @@ def _sprinkle(colour: _Paint, place: Floats, number: int) -> None:
         colour.tint(np.where(is_near, strength * np.exp(-squared / size**2), 0.0), FRECKLE)
 
 
-def _brow_hairs(place: Floats, brow: Brow) -> Floats:
+def _brow_hairs(place: FloatArray, brow: Brow) -> FloatArray:
     """(P,) share of skin that the hairs of both brows cover; they rise at the nose and lie along the line outside."""
     uncovered = np.ones(len(place))
     generator = np.random.default_rng(BROW_SEED)

@@ -12,9 +12,8 @@ from corpus_tools.shipped.drawn.fields import bump
 from corpus_tools.shipped.head.cage import SIDES, Cage, build_cage
 from corpus_tools.shipped.head.noise import gaussian_bump
 from corpus_tools.shipped.head.source import SourceMesh
-from tts2face.numeric.arrays import smoothstep
+from tts2face.numeric.arrays import FloatArray, smoothstep
 
-Floats = NDArray[np.float64]
 N_SMOOTHINGS, SHRINK, GROW = 5, 0.65, 0.45  # passes of Taubin's filter, and the weights of its two steps
 N_NOSTRIL_MEANS = 14  # fill the nostrils to soft dents
 FALLOFF = 2.6  # exponent of `_scale_about`
@@ -37,8 +36,8 @@ def drawn_cage(source: SourceMesh, targets: Mapping[str, float], proportions: Pr
     return replace(cage, vertices=rest - middle, units=units)
 
 
-def _eye(vertices: Floats, cage: Cage, side: str) -> Floats:
-    centre: Floats = vertices[cage.group(f"helper-{side}-eye")].mean(axis=0)
+def _eye(vertices: FloatArray, cage: Cage, side: str) -> FloatArray:
+    centre: FloatArray = vertices[cage.group(f"helper-{side}-eye")].mean(axis=0)
     return centre
 
 
@@ -76,9 +75,9 @@ def _neighbour_means(cage: Cage) -> tuple[sparse.csr_array, NDArray[np.int64]]:
     return sparse.csr_array(sparse.diags_array(1 / counts) @ beside), np.unique(quads)
 
 
-def apply_proportions(points: Floats, eyes: list[Floats], own: Proportions) -> Floats:
+def apply_proportions(points: FloatArray, eyes: list[FloatArray], own: Proportions) -> FloatArray:
     """Points (N, 3) after a character's map of space; `eyes` are the centres (3,) of the eyes before it."""
-    moved: Floats = points.copy()
+    moved: FloatArray = points.copy()
     for centre in eyes:
         inward = np.array([-0.5 * np.sign(centre[0]), 0.0, -4.0])
         moved = _scale_about(moved, centre + inward, own.eye_gain, own.eye_reach)
@@ -105,7 +104,7 @@ def apply_proportions(points: Floats, eyes: list[Floats], own: Proportions) -> F
     return moved
 
 
-def _shape_jaw(points: Floats, own: Proportions) -> None:
+def _shape_jaw(points: FloatArray, own: Proportions) -> None:
     """Taper and shorten the lower face to a small round chin, in place."""
     low = smoothstep(-points[:, 1], 12.0, 108.0)
     front = smoothstep(points[:, 2], -75.0, -10.0)
@@ -114,7 +113,7 @@ def _shape_jaw(points: Floats, own: Proportions) -> None:
     points[:, 2] += own.chin_forward * bump(points, (0, -88, 25), (18, 12, 22))
 
 
-def _shape_cheeks(points: Floats, own: Proportions) -> None:
+def _shape_cheeks(points: FloatArray, own: Proportions) -> None:
     """Round and high cheeks, and fat above the jaw, in place."""
     high = gaussian_bump(points, (36, -36, 14), (19, 17, 26))
     points += own.drawn * high[:, None] * np.array([0.0, 1.0, 3.4])
@@ -124,9 +123,9 @@ def _shape_cheeks(points: Floats, own: Proportions) -> None:
     points[:, 2] += 0.93 * low
 
 
-def _scale_about(points: Floats, centre: Floats, gain: float | Floats, reach: float) -> Floats:
+def _scale_about(points: FloatArray, centre: FloatArray, gain: float | FloatArray, reach: float) -> FloatArray:
     """Points scaled about a centre by 1 + gain (per axis), with a gain that falls off with distance."""
     off = points - centre
     share = np.exp(-((np.linalg.norm(off, axis=1) / reach) ** FALLOFF))
-    moved: Floats = centre + off * (1 + share[:, None] * np.asarray(gain))
+    moved: FloatArray = centre + off * (1 + share[:, None] * np.asarray(gain))
     return moved

@@ -26,9 +26,7 @@ from corpus_tools.shipped.head.teeth import (
     gum_piece,
     keep_behind,
 )
-from tts2face.numeric.arrays import smoothstep
-
-Floats = NDArray[np.float64]
+from tts2face.numeric.arrays import FloatArray, smoothstep
 
 N_ALONG = 145
 # A tooth's section: height above the edge and way outwards in mm of a crown of `CROWN_MM`, share of a seam's depth.
@@ -71,7 +69,7 @@ def teeth_pieces(
     return upper, replace(lower, vertices=lower.vertices - [0.0, 0.0, character.teeth_back])
 
 
-def _follow_line(points: Floats, name: str, skin: HeadSkin, ring: NDArray[np.int64]) -> Floats:
+def _follow_line(points: FloatArray, name: str, skin: HeadSkin, ring: NDArray[np.int64]) -> FloatArray:
     """An arch (N, 3) whose edge lies `SHOWN_MM` over the line between the lips, and follows a share of its curve."""
     line = skin.vertices[ring]
     front = line[np.abs(line[:, 0]) < FRONT_X_MM]
@@ -86,7 +84,7 @@ def _follow_line(points: Floats, name: str, skin: HeadSkin, ring: NDArray[np.int
     return moved
 
 
-def _smooth_cover(points: Floats, covered: Floats) -> Floats:
+def _smooth_cover(points: FloatArray, covered: FloatArray) -> FloatArray:
     """Teeth (N, 3) that retreat as far as `covered`, but along the arch: by vertex the retreat makes a wave."""
     n_teeth = N_ALONG * len(SECTION)
     lack = (covered - points)[:n_teeth, 2].reshape(N_ALONG, len(SECTION)).min(axis=1)
@@ -132,7 +130,7 @@ def _arch_piece(arch: Arch, name: str, character: DrawnCharacter) -> HeadPart:
     )
 
 
-def _facing_front(points: Floats) -> NDArray[np.int64]:
+def _facing_front(points: FloatArray) -> NDArray[np.int64]:
     """Triangles of an arch whose front teeth face the viewer."""
     triangles = grid_triangles(N_ALONG, len(SECTION))
     a, b, c = points[triangles].transpose(1, 0, 2)

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from corpus_tools.shipped.drawn.fields import Floats, Ints
 from lexicon.errors import DataError
+from tts2face.numeric.arrays import FloatArray, IntArray
 
 Tile = tuple[float, float, float, float]  # left, right, top and bottom, v down
 MARGIN = 0.004  # between tiles: four texels of 1024
@@ -23,13 +23,13 @@ def hair_tiles(number: int) -> list[Tile]:
     return [(column * wide, (column + 1) * wide, row * high, (row + 1) * high) for row, column in places]
 
 
-def strand_places(uv: Floats) -> Floats:
+def strand_places(uv: FloatArray) -> FloatArray:
     """(N, 3) places for the noise of hair at texture coordinates (N, 2): along and across locks, and their row."""
     along, across = uv[:, 1] * N_ROWS / HAIR_BOTTOM, uv[:, 0] * N_COLUMNS
     return np.column_stack([along, across, np.floor(along)])
 
 
-def in_tile(tile: Tile, across: Floats, down: Floats) -> Floats:
+def in_tile(tile: Tile, across: FloatArray, down: FloatArray) -> FloatArray:
     """(N, 2) texture coordinates of places (N,) and (N,) in 0..1 within a tile."""
     left, right, top, bottom = tile
     u = left + MARGIN + across * (right - left - 2 * MARGIN)
@@ -37,7 +37,7 @@ def in_tile(tile: Tile, across: Floats, down: Floats) -> Floats:
     return np.column_stack([u, v])
 
 
-def cut_seam(triangles: Ints, turn: Floats) -> tuple[Ints, Ints, Floats]:
+def cut_seam(triangles: IntArray, turn: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
     """Cut a surface where a place around an axis (N,), in 0..1, jumps from 1 to 0.
 
     Returns

@@ -8,13 +8,12 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from corpus_tools.shipped.film.materials import white
 from corpus_tools.shipped.film.scene import FilmScene
 from tts2face.models.view_transform import table_levels
+from tts2face.numeric.arrays import Float32Array
 
-Float32Array = NDArray[np.float32]
 ATTRIBUTE = "baked"
 MARGIN_PX = 4
 

@@ -12,10 +12,11 @@ from PIL import Image
 
 from corpus_tools.shipped.drawn.hair import OtherHair
 from corpus_tools.shipped.drawn.tiles import HAIR_BOTTOM
-from corpus_tools.shipped.film.bake import Float32Array, TexelBake, bake_vertices, displayed, view_table
+from corpus_tools.shipped.film.bake import TexelBake, bake_vertices, displayed, view_table
 from corpus_tools.shipped.film.pose_light import CAMERA_YAWS_DEG, FAR, FRONT, MOUTH, SKIN, PoseLight
 from corpus_tools.shipped.film.poses import LitPose
 from corpus_tools.shipped.film.scene import FilmScene
+from tts2face.numeric.arrays import Float32Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,18 +4,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from corpus_tools.shipped.film.poses import LitPose
 from tts2face.models.face import Face
 from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT
+from tts2face.numeric.arrays import Mask, Pixels
 from tts2face.picture.baked.scene import LitScene
 from tts2face.picture.baked.visibility import TRIANGLE_MASK, X, Y, nearest_triangles, project
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
-
-Pixels = NDArray[np.uint8]
-Mask = NDArray[np.bool_]
 
 REGIONS: Mapping[str, tuple[str, ...]] = {
     "hair": ("hair",),

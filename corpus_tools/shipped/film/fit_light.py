@@ -24,7 +24,6 @@ from corpus_tools.shipped.film.texel_light import (
     SKIN_LIT,
     STEP,
     TURN_SIDE,
-    Floats,
     camera_changes,
     drawn_texels,
     relit_skin,
@@ -36,10 +35,9 @@ from corpus_tools.shipped.head.eyes import EyeStyle
 from tts2face.face.deformation import build_rig
 from tts2face.models.baked_light import N_BALL_TERMS, BakedLight, HairLight, quantised
 from tts2face.models.face import Face
-from tts2face.numeric.arrays import smoothstep
+from tts2face.numeric.arrays import FloatArray, IntArray, smoothstep
 from tts2face.picture.surface import weld_groups
 
-Ints = NDArray[np.int64]
 N_TURN_MODES, HAIRCUT_TURN_MODES = 10, 4
 RIDGE, MOUTH_RIDGE = 0.003, 0.1  # of responses
 HIDDEN_WEIGHT, MOUTH_HIDDEN_WEIGHT = 0.02, 0.002  # of a pose that hides a vertex
@@ -136,7 +134,7 @@ def fit_haircut(faces: tuple[Face, Face], own: PoseLight, worn: PoseLight, light
 def _light_in_texels(
     face: Face,
     poses: tuple[PoseLight, PoseLight],
-    uncovered: tuple[Floats, Floats],
+    uncovered: tuple[FloatArray, FloatArray],
     number: int,
     light: BakedLight | None = None,
 ) -> dict[str, Any]:
@@ -179,8 +177,8 @@ def vertex_parts(face: Face) -> NDArray[np.str_]:
 
 
 def _skin_changes(
-    face: Face, poses: PoseLight, numbers: Ints, shown: NDArray[np.bool_], base: Floats
-) -> tuple[Ints, Floats]:
+    face: Face, poses: PoseLight, numbers: IntArray, shown: NDArray[np.bool_], base: FloatArray
+) -> tuple[IntArray, FloatArray]:
     """Vertices (N,) of skin whose light changes with expressions, and the changes (P, N, 3) from a base map (s, s, 3).
 
     They are kept where they are clear in poses that show them (P, V); what no pose shows does not change.
@@ -209,7 +207,7 @@ def _skin_changes(
     return used[kept], changes[:, kept]
 
 
-def neighbours(triangles: Ints, places: NDArray[np.floating]) -> Any:
+def neighbours(triangles: IntArray, places: NDArray[np.floating]) -> Any:
     """(N, N) means over the neighbours of vertices; those at one place are neighbours."""
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     n = len(places)
@@ -226,7 +224,7 @@ def _uv(face: Face) -> NDArray[np.float32]:
     return np.zeros((len(face.vertices), 2), np.float32) if face.uv is None else face.uv
 
 
-def read_maps(maps: NDArray[np.floating], uv: NDArray[np.floating]) -> Floats:
+def read_maps(maps: NDArray[np.floating], uv: NDArray[np.floating]) -> FloatArray:
     """(P, N, 3) values of maps (P, S, S, 3) at texture coordinates (N, 2)."""
     side = maps.shape[1]
     at = [uv[:, 1] * side - 0.5, uv[:, 0] * side - 0.5]
@@ -238,7 +236,9 @@ def read_maps(maps: NDArray[np.floating], uv: NDArray[np.floating]) -> Floats:
     ).astype(np.float64)
 
 
-def _base_map(poses: PoseLight, numbers: Ints, shown: NDArray[np.bool_]) -> tuple[Floats, Floats, Floats]:
+def _base_map(
+    poses: PoseLight, numbers: IntArray, shown: NDArray[np.bool_]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Map (s, s, 3) of the skin at rest, in which what other poses uncover has the mean light of those that show it.
 
     `shown` (P, s, s) is about the poses of `numbers`. Also the share (s, s) of that light, and the light (s, s, 3).
@@ -249,13 +249,13 @@ def _base_map(poses: PoseLight, numbers: Ints, shown: NDArray[np.bool_]) -> tupl
     ever = count[..., 0] > 0
     away, nearest = distance_transform_edt(~ever, return_indices=True)
     light = light[tuple(nearest)]
-    share: Floats = gaussian_filter((~shown[0] & (away <= BEYOND_TEXELS)).astype(np.float64), UNCOVERED_BLUR)
+    share: FloatArray = gaussian_filter((~shown[0] & (away <= BEYOND_TEXELS)).astype(np.float64), UNCOVERED_BLUR)
     return rest + share[..., None] * (light - rest), share, light
 
 
 def _smoothed_small(
-    face: Face, poses: PoseLight, numbers: Ints, rows: Ints, parts: NDArray[np.str_], shown: NDArray[np.bool_]
-) -> Floats:
+    face: Face, poses: PoseLight, numbers: IntArray, rows: IntArray, parts: NDArray[np.str_], shown: NDArray[np.bool_]
+) -> FloatArray:
     """(P, N, 3) light of the vertices (N,) of the small parts (N,) in poses, without the noise of single ones.
 
     Lit ones are averaged with each other, and in the mouth those that the poses show (P, V): a tooth does not take the
@@ -283,13 +283,13 @@ def _smoothed_small(
     return light
 
 
-def _corners(face: Face, names: Sequence[str]) -> Ints:
+def _corners(face: Face, names: Sequence[str]) -> IntArray:
     """(F, 3) triangles of parts."""
     spans = [slice(part.first, part.first + part.count) for part in face.parts if part.name in names]
     return np.concatenate([face.triangles[span] for span in spans]).astype(np.int64)
 
 
-def _lit_balls(face: Face, rows: Ints, light: NDArray[np.floating]) -> Floats:
+def _lit_balls(face: Face, rows: IntArray, light: NDArray[np.floating]) -> FloatArray:
     """(B, 3) light on eyeballs whose vertices under the lids take the light beside them."""
     filled = np.array(light, np.float64)
     for eye in face.eyes:

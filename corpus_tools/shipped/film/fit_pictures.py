@@ -18,13 +18,11 @@ from corpus_tools.shipped.film.fit_light import MOST_SHARE, neighbours, vertex_p
 from corpus_tools.shipped.film.poses import LitPose
 from tts2face.models.baked_light import LIMIT_STEP, BakedLight, quantised
 from tts2face.models.face import Face
+from tts2face.numeric.arrays import FloatArray, Pixels
 from tts2face.picture.baked.scene import LitScene
 from tts2face.picture.baked.visibility import TRIANGLE_MASK, X, Y, nearest_triangles, project
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
-
-Floats = NDArray[np.float64]
-Pixels = NDArray[np.uint8]
 
 SIDE_PX = 640
 RIDGE = 60.0  # of changes of responses, in pixels
@@ -49,8 +47,8 @@ class Missing:
     """
 
     shares: Any
-    light: Floats
-    terms: Floats
+    light: FloatArray
+    terms: FloatArray
 
 
 def fit_to_pictures(face: Face, poses: Sequence[LitPose], pictures: Mapping[str, Pixels]) -> BakedLight:
@@ -143,27 +141,27 @@ def _among(missing: Missing, own: NDArray[np.bool_]) -> Missing:
     return Missing(shares[seen], missing.light[seen], missing.terms[:, own])
 
 
-def _alike(missing: Sequence[Missing]) -> Floats:
+def _alike(missing: Sequence[Missing]) -> FloatArray:
     """(T, 3) change of the responses of all vertices of a part; each pose counts by the root of its pixels."""
     rows = [(view.shares @ view.terms.T, view.light, max(len(view.light), 1) ** -0.5) for view in missing]
     gram = sum(share * terms.T @ terms for terms, _, share in rows)
     sizes = np.sqrt(np.diag(gram)) + 1e-9
     moments = sum(share * terms.T @ light for terms, light, share in rows)
     scaled = gram / np.outer(sizes, sizes) + ALIKE_RIDGE * np.eye(len(gram))
-    change: Floats = np.linalg.solve(scaled, moments / sizes[:, None]) / sizes[:, None]
+    change: FloatArray = np.linalg.solve(scaled, moments / sizes[:, None]) / sizes[:, None]
     return change
 
 
-def _responses(steps: NDArray[np.int8], sizes: NDArray[np.float32]) -> Floats:
-    found: Floats = steps.astype(np.float64) * sizes[:, None, None]
+def _responses(steps: NDArray[np.int8], sizes: NDArray[np.float32]) -> FloatArray:
+    found: FloatArray = steps.astype(np.float64) * sizes[:, None, None]
     return found
 
 
 def _corrected(
-    answers: tuple[Floats, NDArray[np.int8]],
+    answers: tuple[FloatArray, NDArray[np.int8]],
     rows: NDArray[np.int64],
     missing: Sequence[Missing],
-    changes: Floats,
+    changes: FloatArray,
     near: Any,
 ) -> tuple[NDArray[np.int8], NDArray[np.float32], NDArray[np.int8]]:
     """Steps of responses (T, 3, N), their sizes and limits, of which those of rows (n,) take changes (T, 3, n).
@@ -192,7 +190,7 @@ def _neighbours(face: Face, rows: NDArray[np.int32]) -> Any:
     return neighbours(corners[(corners >= 0).all(axis=1)], face.vertices[rows])
 
 
-def _smoothed(values: Floats, near: Any, tone_rounds: int) -> Floats:
+def _smoothed(values: FloatArray, near: Any, tone_rounds: int) -> FloatArray:
     """Values (T, N, 3) as means over neighbours (N, N): so many rounds for tones, `COLOUR_ROUNDS` for colours.
 
     The channels are those of `OPPONENT`.
@@ -204,19 +202,19 @@ def _smoothed(values: Floats, near: Any, tone_rounds: int) -> Floats:
     return found
 
 
-def _unstriped(values: Floats, near: Any) -> Floats:
+def _unstriped(values: FloatArray, near: Any) -> FloatArray:
     """Values (T, N, 3) of vertices that change slowly over each part; noise makes stripes on teeth."""
-    found: Floats = _smoothed(values @ OPPONENT, near, TONE_ROUNDS) @ OPPONENT.T
+    found: FloatArray = _smoothed(values @ OPPONENT, near, TONE_ROUNDS) @ OPPONENT.T
     return found
 
 
-def _changes(missing: Sequence[Missing], near: Any) -> Floats:
+def _changes(missing: Sequence[Missing], near: Any) -> FloatArray:
     """(T, 3, N) changes of responses that add what is missing, smooth over neighbours (N, N)."""
     sizes = np.sqrt(np.mean([(view.terms**2).mean(axis=1) for view in missing], axis=0)) + 1e-9
     terms = [(view.terms / sizes[:, None])[:, :, None] for view in missing]
     back = [view.shares.T.tocsr() for view in missing]
 
-    def normal(change: Floats) -> Floats:
+    def normal(change: FloatArray) -> FloatArray:
         spread = _smoothed(change, near, TONE_ROUNDS)
         total = sum(
             own * (gather @ (view.shares @ (own * spread).sum(axis=0)))
@@ -234,5 +232,5 @@ def _changes(missing: Sequence[Missing], near: Any) -> Floats:
         change, rest = change + share * step, rest - share * ahead
         before, size = size, (rest**2).sum(axis=(0, 1))
         step = rest + size / np.maximum(before, 1e-12) * step
-    found: Floats = _smoothed(change, near, TONE_ROUNDS) @ OPPONENT.T / sizes[:, None, None]
+    found: FloatArray = _smoothed(change, near, TONE_ROUNDS) @ OPPONENT.T / sizes[:, None, None]
     return found.transpose(0, 2, 1)

@@ -10,7 +10,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from corpus_tools.shipped.drawn.build_drawn import CAST, face_masks
@@ -21,9 +20,8 @@ from corpus_tools.shipped.film.scene import FilmScene
 from corpus_tools.shipped.head.source import SourceMesh, fetch_data, read_source
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
+from tts2face.numeric.arrays import Pixels
 from tts2face.picture.camera_view import parse_camera
-
-Pixels = NDArray[np.uint8]
 
 SIDE_PX, SAMPLES = 512, 32
 CAMERAS = ("20,3", "35,3", "-35,3")  # about the pose at rest

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.shipped.film.poses import Float32Array
+from tts2face.numeric.arrays import Float32Array
 from tts2face.picture.camera_view import CameraView
 
 CAMERA_YAWS_DEG = (-35, -20, 20, 35)  # about the face at rest

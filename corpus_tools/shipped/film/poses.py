@@ -4,13 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tts2face.models.face import Face
 from tts2face.models.talker_file import load_talker
+from tts2face.numeric.arrays import Float32Array
 from tts2face.session.session import Session
 
-Float32Array = NDArray[np.float32]
 EXPRESSIONS: Mapping[str, Mapping[str, float]] = {
     "smile": {"mouthSmile": 0.8, "cheekSquint": 0.5, "eyeSquint": 0.2},
     "a": {"jawOpen": 0.6},

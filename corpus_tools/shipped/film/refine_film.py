@@ -23,10 +23,9 @@ from tts2face.face.deformation import build_rig
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.light import Baked
+from tts2face.numeric.arrays import Pixels
 from tts2face.picture.camera import camera_matrices
 from tts2face.picture.camera_view import parse_camera
-
-Pixels = NDArray[np.uint8]
 
 SAMPLES, MARGIN_PX = 24, 7
 CAMERA = parse_camera("front")

@@ -15,14 +15,11 @@ from corpus_tools.shipped.film.materials import UNIT_MM, part_materials
 from corpus_tools.shipped.film.shader import Shader, rgba
 from tts2face.face.deformation import build_rig, eye_rotations, head_transform
 from tts2face.models.face import Face
-from tts2face.numeric.arrays import decode_srgb, smoothstep
+from tts2face.numeric.arrays import FloatArray, IntArray, decode_srgb, smoothstep
 from tts2face.picture.baked.scene import BLINK_SHRINK
 from tts2face.picture.camera import camera_matrices
 from tts2face.picture.camera_view import CameraView
 from tts2face.picture.surface import weld_groups
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 SENSOR_MM = 36.0
 FAR = 200.0
@@ -40,14 +37,14 @@ class FilmScene:
         Shares (V,) of the face's vertices by name: ``lips`` and ``inner``, the inside of the mouth.
     """
 
-    def __init__(self, face: Face, look: Look, masks: Mapping[str, Floats]) -> None:
+    def __init__(self, face: Face, look: Look, masks: Mapping[str, FloatArray]) -> None:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         self.face, self.look = face, look
         self._rig, self._masks = build_rig(face), masks
         self._weld = weld_groups(face, self._rig)
         self._first = np.unique(self._weld, return_index=True)[1]
         self.materials = part_materials(look, face.textures[0], face.textures[2])
-        self.objects: dict[str, tuple[Any, Ints]] = {}  # by part, with the face's vertex of each of the mesh's
+        self.objects: dict[str, tuple[Any, IntArray]] = {}  # by part, with the face's vertex of each of the mesh's
         self._add_parts()
         self.lamps = {name: _lamp(name, lamp) for name, lamp in look.lamps.items()}
         for name, lamp in look.lamps.items():
@@ -76,7 +73,7 @@ class FilmScene:
             self._add(f"cornea{number}", own, self.materials["cornea"])
             self.objects[f"cornea{number}"][0].visible_shadow = False
 
-    def _add(self, name: str, corners: Ints, material: Any) -> None:
+    def _add(self, name: str, corners: IntArray, material: Any) -> None:
         """Add a part with triangles (F, 3); vertices at one place that move alike are one."""
         face = self.face
         rows, packed = np.unique(self._first[self._weld[corners]], return_inverse=True)
@@ -104,7 +101,7 @@ class FilmScene:
         made.shadow_terminator_geometry_offset = 0.1 if name in NO_SHADOW_TERMINATOR else 0.0
         self.objects[name] = made, rows
 
-    def _tangents(self, rows: Ints) -> Floats:
+    def _tangents(self, rows: IntArray) -> FloatArray:
         tangents = self.face.tangents
         return np.zeros((len(rows), 3)) if tangents is None else tangents[rows].astype(np.float64)
 
@@ -134,11 +131,11 @@ class FilmScene:
         self,
         number: int,
         name: str,
-        vertices: Floats,
-        turns: tuple[Floats, Floats],
+        vertices: FloatArray,
+        turns: tuple[FloatArray, FloatArray],
         weights: NDArray[np.float32],
         turns_eyes: bool,
-    ) -> Floats:
+    ) -> FloatArray:
         """(V, 3) vertices with those of one eyeball, or of the cornea over it, in place."""
         eye, (moved, gaze) = self.face.eyes[number], turns
         span = slice(eye.first, eye.first + eye.count)
@@ -232,12 +229,12 @@ class FilmScene:
         focus.use_dof = False
 
 
-def _linear(colours: NDArray[np.uint8]) -> Floats:
+def _linear(colours: NDArray[np.uint8]) -> FloatArray:
     """(N, 4) linear light of colours (N, 3), sRGB."""
     return np.column_stack([decode_srgb(colours / 255.0), np.ones(len(colours))])
 
 
-def _set(mesh: Any, name: str, kind: str, values: Floats) -> None:
+def _set(mesh: Any, name: str, kind: str, values: FloatArray) -> None:
     """Give the vertices of a mesh values."""
     field = {"FLOAT": "value", "FLOAT_VECTOR": "vector", "FLOAT_COLOR": "color"}[kind]
     mesh.attributes.new(name, kind, "POINT").data.foreach_set(field, values.astype(np.float32).ravel())

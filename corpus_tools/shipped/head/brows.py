@@ -10,10 +10,10 @@ from corpus_tools.shipped.head.cage import Cage
 from corpus_tools.shipped.head.cards import BROWS, CARDS_TEXTURE, HIDDEN, brow_coordinates
 from corpus_tools.shipped.head.correspondence import nearest_surface_points
 from corpus_tools.shipped.head.haircut import split_seams
-from corpus_tools.shipped.head.lashes import Floats, Ints
 from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
 from corpus_tools.shipped.head.skin import HeadSkin, vertex_normals
 from corpus_tools.shipped.head.subdivision import triangulate
+from tts2face.numeric.arrays import FloatArray, IntArray
 
 OFF_MM = 0.45  # above the skin
 AHEAD_Z = -5.0
@@ -24,10 +24,10 @@ BROW_MATERIAL = {"specular": 0.05, "shininess": 12.0, "cutout": True, "kind": "s
 class BrowCards:
     """The cards of a set of brows on the reference skin: corners (N, 3), weights (N, 3), triangles and coordinates."""
 
-    corners: Ints
-    weights: Floats
-    triangles: Ints
-    uv: Floats
+    corners: IntArray
+    weights: FloatArray
+    triangles: IntArray
+    uv: FloatArray
 
 
 def bind_brows(folder: Path, cage: Cage, skin: HeadSkin) -> dict[str, BrowCards]:

@@ -7,8 +7,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from corpus_tools.shipped.head.assets import asset_files, read_picture
-from corpus_tools.shipped.head.strands import Floats
 from tts2face.models.face import Texture
+from tts2face.numeric.arrays import FloatArray
 
 SIDE = 1024
 BROWS = ("eyebrow001", "eyebrow010", "eyebrow008", "eyebrow012")  # two finer sets, two fuller ones
@@ -50,15 +50,15 @@ def cards_texture(folder: Path, brow_colour: tuple[float, float, float] = BROW_C
     return Texture(np.rint(255 * pixels).astype(np.uint8), np.rint(cover).astype(np.uint8))
 
 
-def brow_coordinates(name: str, uv: Floats) -> Floats:
+def brow_coordinates(name: str, uv: FloatArray) -> FloatArray:
     """(N, 2) coordinates in the texture of a brow's own (N, 2)."""
     top = BROWS.index(name) * BROW_HEIGHT
     rows = np.clip(512 * uv[:, 1] - BROW_ROWS[name][0], 1, BROW_HEIGHT - 1)
-    placed: Floats = np.column_stack([512 * uv[:, 0], top + rows]) / SIDE
+    placed: FloatArray = np.column_stack([512 * uv[:, 0], top + rows]) / SIDE
     return placed
 
 
-def lash_coordinates(name: str, uv: Floats) -> Floats:
+def lash_coordinates(name: str, uv: FloatArray) -> FloatArray:
     """(N, 2) coordinates in the texture of a set of lashes' own (N, 2)."""
-    placed: Floats = (512 * uv + [LASH_LEFT, 512 * LASHES.index(name)]) / SIDE
+    placed: FloatArray = (512 * uv + [LASH_LEFT, 512 * LASHES.index(name)]) / SIDE
     return placed

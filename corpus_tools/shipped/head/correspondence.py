@@ -8,13 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from tts2face.models.face import Eye, Face
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tts2face.numeric.arrays import FloatArray, IntArray
 
 TABLE = Path(__file__).with_name("correspondence.csv")
 FAR = 0.05  # units of the source; a position further from the skin than this belongs to another mesh
@@ -23,7 +20,7 @@ IRISES = (range(468, 473), range(473, 478))
 IRIS_SIDES = np.array([(0, 0), (1, 0), (0, 1), (-1, 0), (0, -1)], np.float64)
 
 
-def read_places(path: Path = TABLE) -> dict[int, Floats]:
+def read_places(path: Path = TABLE) -> dict[int, FloatArray]:
     """Position (3,) of each landmark on the skin of the source's base mesh, in its units."""
     try:
         with path.open(encoding="utf-8", newline="") as file:
@@ -35,7 +32,7 @@ def read_places(path: Path = TABLE) -> dict[int, Floats]:
         ) from broken
 
 
-def write_places(places: dict[int, Floats], path: Path = TABLE) -> None:
+def write_places(places: dict[int, FloatArray], path: Path = TABLE) -> None:
     """Write the table; six decimals are a tenth of a micrometre."""
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -43,7 +40,7 @@ def write_places(places: dict[int, Floats], path: Path = TABLE) -> None:
         writer.writerows([number, *(f"{value:.6f}" for value in place)] for number, place in sorted(places.items()))
 
 
-def add_landmarks(face: Face, base: Floats) -> Face:
+def add_landmarks(face: Face, base: FloatArray) -> Face:
     """A face with landmarks: those of the table on the skin, those of the irises on the eyeballs.
 
     Parameters
@@ -76,7 +73,7 @@ def add_landmarks(face: Face, base: Floats) -> Face:
     )
 
 
-def iris_vertices(face: Face, eye: Eye) -> Ints:
+def iris_vertices(face: Face, eye: Eye) -> IntArray:
     """Vertices (5,) of an eyeball nearest to the middle of its iris and to the four sides of its rim."""
     iris = [face.triangles[part.first : part.first + part.count] for part in face.parts if part.name.startswith("iris")]
     inside = np.unique(np.concatenate(iris)).astype(np.int64)
@@ -87,7 +84,9 @@ def iris_vertices(face: Face, eye: Eye) -> Ints:
     return np.asarray(inside[nearest], np.int64)
 
 
-def nearest_surface_points(points: Floats, vertices: Floats, triangles: Ints) -> tuple[Ints, Floats, Floats]:
+def nearest_surface_points(
+    points: FloatArray, vertices: FloatArray, triangles: IntArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
     """Triangle (P,), barycentric weights (P, 3) and distance (P,) of the surface point nearest to each point.
 
     Source: Ericson 2005, Real-Time Collision Detection, section 5.1.5 (closest point on a triangle).
@@ -99,7 +98,7 @@ def nearest_surface_points(points: Floats, vertices: Floats, triangles: Ints) ->
     return numbers, weights, np.linalg.norm(there - points, axis=1)
 
 
-def _nearest_point(point: Floats, corners: Floats) -> tuple[int, Floats]:
+def _nearest_point(point: FloatArray, corners: FloatArray) -> tuple[int, FloatArray]:
     """Index of the nearest of the triangles (F, 3, 3), and the barycentric weights (3,) of its nearest point."""
     first, second, third = corners[:, 0], corners[:, 1], corners[:, 2]
     edges = [(0, 1, first, second), (1, 2, second, third), (2, 0, third, first)]
@@ -119,7 +118,7 @@ def _nearest_point(point: Floats, corners: Floats) -> tuple[int, Floats]:
     return int(number), weights[kind, number]
 
 
-def _plane_weights(point: Floats, corners: Floats) -> Floats:
+def _plane_weights(point: FloatArray, corners: FloatArray) -> FloatArray:
     """(F, 3) barycentric weights of a point's orthogonal projection onto each triangle's plane."""
     one, two, there = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], point - corners[:, 0]
     d11, d12, d22 = (one * one).sum(axis=1), (one * two).sum(axis=1), (two * two).sum(axis=1)

@@ -3,12 +3,10 @@
 from collections import defaultdict
 
 import numpy as np
-from numpy.typing import NDArray
 
-from corpus_tools.shipped.head.skin import Floats
 from lexicon.errors import DataError
+from tts2face.numeric.arrays import FloatArray, IntArray
 
-Ints = NDArray[np.int64]
 LONGEST = 400  # vertices; the head's own rings around mouth and eyes have under 100
 
 
@@ -22,7 +20,7 @@ class EdgeRings:
         Vertices at one position count as one, because texture seams split the mesh.
     """
 
-    def __init__(self, quads: Ints, places: Floats) -> None:
+    def __init__(self, quads: IntArray, places: FloatArray) -> None:
         rounded = np.rint(places * 1e6).astype(np.int64)
         _, first, where = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
         self._beside: defaultdict[int, set[int]] = defaultdict(set)
@@ -54,7 +52,9 @@ class EdgeRings:
         return ahead[0] if len(ahead) == 1 and len(self._beside[here]) == 4 else None
 
 
-def find_narrowest_ring(strips: EdgeRings, vertices: Floats, inside: Floats, reach: float, clear: float = 0.0) -> Ints:
+def find_narrowest_ring(
+    strips: EdgeRings, vertices: FloatArray, inside: FloatArray, reach: float, clear: float = 0.0
+) -> IntArray:
     """The ring around an opening with the smallest area in the frontal view: the edge of lips or lids.
 
     Parameters
@@ -85,12 +85,12 @@ def find_narrowest_ring(strips: EdgeRings, vertices: Floats, inside: Floats, rea
     return np.array(best, np.int64)
 
 
-def _encloses_origin(flat: Floats) -> bool:
+def _encloses_origin(flat: FloatArray) -> bool:
     """Whether a closed line winds once around the origin."""
     angles = np.unwrap(np.arctan2(*np.concatenate([flat, flat[:1]]).T[::-1]))
     return bool(abs(abs(angles[-1] - angles[0]) - 2 * np.pi) < 0.1)
 
 
-def _area(flat: Floats) -> float:
+def _area(flat: FloatArray) -> float:
     after = np.roll(flat, -1, axis=0)
     return float((flat[:, 0] * after[:, 1] - flat[:, 1] * after[:, 0]).sum() / 2)

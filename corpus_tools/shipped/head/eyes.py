@@ -9,10 +9,8 @@ from scipy.ndimage import map_coordinates
 from corpus_tools.shipped.head.cage import Cage, fit_sphere
 from corpus_tools.shipped.head.cards import EYE_TEXTURE
 from corpus_tools.shipped.head.parts import Eyeball, HeadPart, MaterialSpan
-from tts2face.numeric.arrays import smoothstep
+from tts2face.numeric.arrays import FloatArray, smoothstep
 from tts2face.picture.baked.eyes import EDGE_RAD
-
-Floats = NDArray[np.float64]
 
 N_AROUND = 44
 RECEDE_MM = 1.6  # backward shift of an eyeball whose lids are shut, because blend shapes move lids on straight lines
@@ -63,7 +61,7 @@ def fit_eyeballs(cage: Cage, style: EyeStyle | None = None) -> tuple[Eyeball, Ey
     return found[0], found[1]
 
 
-def ball_radius(ball: Eyeball, off: Floats) -> Floats:
+def ball_radius(ball: Eyeball, off: FloatArray) -> FloatArray:
     """Distance of the surface from the centre, mm, at angles from the gaze, radians."""
     return ball.radius * (1.0 + ball.bulge * np.clip(1.0 - (off / (ball.iris * 1.15)) ** 2, 0, None) ** 1.3)
 
@@ -92,17 +90,17 @@ def eyeball_piece(ball: Eyeball, side: str, style: EyeStyle) -> HeadPart:
     )
 
 
-def _ring_angles(style: EyeStyle) -> Floats:
+def _ring_angles(style: EyeStyle) -> FloatArray:
     """Angles from the gaze at which the eyeball's vertices lie, radians."""
     inner = np.linspace(style.pupil + 0.02, style.iris, 10)
     outer = np.linspace(style.iris + 0.03, style.iris + 0.27, 4)
     return np.concatenate([np.linspace(0, style.pupil, 4), inner, outer, np.linspace(style.iris + 0.4, BACK_RAD, 7)])
 
 
-def eye_coordinates(off: Floats, turn: Floats) -> Floats:
+def eye_coordinates(off: FloatArray, turn: FloatArray) -> FloatArray:
     """(N, 2) texture coordinates by the angle from the gaze and the angle around it, v down."""
     far = 0.5 * off / EDGE_RAD
-    placed: Floats = 0.5 + np.column_stack([far * np.cos(turn), -far * np.sin(turn)])
+    placed: FloatArray = 0.5 + np.column_stack([far * np.cos(turn), -far * np.sin(turn)])
     return placed
 
 

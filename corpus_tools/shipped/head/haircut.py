@@ -33,12 +33,12 @@ from corpus_tools.shipped.head.strands import (
 )
 from corpus_tools.shipped.head.subdivision import triangulate
 from tts2face.models.hair import Hair
-from tts2face.numeric.arrays import smoothstep, unit_vectors
+from tts2face.numeric.arrays import FloatArray, IntArray, smoothstep, unit_vectors
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Edit = Callable[[Cards], Cards]
-Finish = Callable[[Cards, NDArray[np.uint8], Floats], tuple[NDArray[np.uint8], Floats]]  # of coverage and tangents
+Finish = Callable[
+    [Cards, NDArray[np.uint8], FloatArray], tuple[NDArray[np.uint8], FloatArray]
+]  # of coverage and tangents
 AXIS_Z, FRONT_DEG = -60.0, (36.0, 60.0)  # the vertical axis of the head; a fringe lies in front of these angles
 FRINGE_TOP, BROW_Y = 62.0, 25.0  # heights between which a fringe ends up
 BUST_Y, SUNK_MM = -335.0, 3.0
@@ -126,7 +126,7 @@ def coverage_levels(coverage: NDArray[np.floating]) -> NDArray[np.uint8]:
     return levels
 
 
-def thin_roots(cards: Cards, alpha: NDArray[np.uint8], tangents: Floats) -> tuple[NDArray[np.uint8], Floats]:
+def thin_roots(cards: Cards, alpha: NDArray[np.uint8], tangents: FloatArray) -> tuple[NDArray[np.uint8], FloatArray]:
     """Coverage that falls off in single strands towards the edge of the cards above the forehead."""
     side = len(alpha)
     texels = find_texels(cards.uv, cards.triangles, side)
@@ -141,14 +141,14 @@ def thin_roots(cards: Cards, alpha: NDArray[np.uint8], tangents: Floats) -> tupl
     return coverage_levels(thinned), raise_roots(cards, tangents)
 
 
-def raise_roots(cards: Cards, tangents: Floats) -> Floats:
+def raise_roots(cards: Cards, tangents: FloatArray) -> FloatArray:
     """Tangents (N, 3) that point into the head at the parting, where strands rise from it and no highlight lies."""
     x, y, _ = cards.vertices.T
     near = np.exp(-((x / PARTING_MM) ** 2)) * smoothstep(y, *PARTING_Y)
     return unit_vectors(tangents + ROOT_TURN * near[:, None] * unit_vectors(MIDDLE - cards.vertices))
 
 
-def border_points(cards: Cards) -> Floats:
+def border_points(cards: Cards) -> FloatArray:
     """(B, 3) points on the borders of the cards, at most 1 mm apart on edges of up to 40 mm."""
     welded = cards.weld[cards.triangles]
     ends = np.sort(np.stack([welded, np.roll(welded, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
@@ -157,11 +157,11 @@ def border_points(cards: Cards) -> Floats:
     places[cards.weld] = cards.vertices
     one, two = places[pairs[count == 1]].transpose(1, 0, 2)
     along = np.linspace(0, 1, 41)[:, None, None]
-    points: Floats = (one + along * (two - one)).reshape(-1, 3)
+    points: FloatArray = (one + along * (two - one)).reshape(-1, 3)
     return points
 
 
-def finish_curls(cards: Cards, alpha: NDArray[np.uint8], tangents: Floats) -> tuple[NDArray[np.uint8], Floats]:
+def finish_curls(cards: Cards, alpha: NDArray[np.uint8], tangents: FloatArray) -> tuple[NDArray[np.uint8], FloatArray]:
     """Curls point away from the head, each its own way, so that single ones shine; no haze, no straight lower edge."""
     height = np.linspace(0, 1, len(alpha))[:, None]
     across = np.linspace(0, 1, len(alpha))[None]
@@ -170,7 +170,7 @@ def finish_curls(cards: Cards, alpha: NDArray[np.uint8], tangents: Floats) -> tu
     low = 1 - smoothstep(height + ragged, *CURL_ROOT)
     side = smoothstep(np.minimum(across, 1 - across) + ragged, 0.0, CURL_SIDE)
     solid = np.clip((alpha.astype(np.float64) - CURL_HAZE) * 255 / (CURL_SOLID - CURL_HAZE), 0, 255)
-    thinned: Floats = solid * np.where(is_card, low * side, 1.0)
+    thinned: FloatArray = solid * np.where(is_card, low * side, 1.0)
     outwards = unit_vectors(cards.vertices - MIDDLE)
     turned = np.random.default_rng(SEED).standard_normal((int(cards.weld.max()) + 1, 3))[cards.weld]
     return coverage_levels(thinned), unit_vectors(outwards + CURL_TURN * turned)
@@ -212,7 +212,7 @@ HAIRCUTS: Mapping[str, Haircut] = {
 }
 
 
-def build_haircuts(folder: Path, cage: Cage, skin: HeadSkin, head: Floats) -> Iterator[tuple[str, Hair]]:
+def build_haircuts(folder: Path, cage: Cage, skin: HeadSkin, head: FloatArray) -> Iterator[tuple[str, Hair]]:
     """Each haircut by name, on the reference head with vertices (V, 3), whose first ones are the skin's."""
     for name in HAIRCUTS:
         asset = read_asset(folder, f"hair/{name}", cage.source.vertices)
@@ -220,7 +220,7 @@ def build_haircuts(folder: Path, cage: Cage, skin: HeadSkin, head: Floats) -> It
     yield CROPPED, build_cropped(skin, head)
 
 
-def build_hair(name: str, asset: Asset, cage: Cage, skin: HeadSkin, head: Floats) -> Hair:
+def build_hair(name: str, asset: Asset, cage: Cage, skin: HeadSkin, head: FloatArray) -> Hair:
     """A haircut of the package."""
     cut = HAIRCUTS[name]
     cards = split_seams(asset, asset.fit(cage.vertices, cage.source.vertices))
@@ -245,7 +245,7 @@ def build_hair(name: str, asset: Asset, cage: Cage, skin: HeadSkin, head: Floats
     )
 
 
-def build_cropped(skin: HeadSkin, head: Floats) -> Hair:
+def build_cropped(skin: HeadSkin, head: FloatArray) -> Hair:
     """Hair of a few millimetres: painted, with a layer of fuzz above the scalp."""
     generator = np.random.default_rng(SEED)
     normals = vertex_normals(skin.vertices, skin.quads, skin.base)
@@ -271,7 +271,9 @@ def build_cropped(skin: HeadSkin, head: Floats) -> Hair:
     )
 
 
-def paint_fuzz(places: Floats, triangles: Ints, uv: Floats, generator: np.random.Generator) -> NDArray[np.uint8]:
+def paint_fuzz(
+    places: FloatArray, triangles: IntArray, uv: FloatArray, generator: np.random.Generator
+) -> NDArray[np.uint8]:
     """(FUZZ_SIDE, FUZZ_SIDE) coverage of a layer with vertices above `places` (N, 3): none at the hairline."""
     texels = find_texels(uv, triangles, FUZZ_SIDE)
     place = texels.interpolate(places)
@@ -281,12 +283,12 @@ def paint_fuzz(places: Floats, triangles: Ints, uv: Floats, generator: np.random
     return share_levels(alpha)
 
 
-def flatten_skull(places: Floats) -> Floats:
+def flatten_skull(places: FloatArray) -> FloatArray:
     """(N, 2) texture coordinates by the direction about the crown and the angle from it, of places (N, 3)."""
     off = places - MIDDLE
     angle = np.arccos(off[:, 1] / np.linalg.norm(off, axis=1)) / np.pi
     across = off[:, [0, 2]] / np.maximum(np.linalg.norm(off[:, [0, 2]], axis=1, keepdims=True), 1e-9)
-    flat: Floats = 0.5 + 0.5 * angle[:, None] * across
+    flat: FloatArray = 0.5 + 0.5 * angle[:, None] * across
     return flat
 
 
@@ -300,14 +302,14 @@ def _metadata(name: str, summary: str) -> dict[str, str]:
     }
 
 
-def split_seams(asset: Asset, places: Floats) -> Cards:
+def split_seams(asset: Asset, places: FloatArray) -> Cards:
     """Cards of an asset at places (N, 3), with a vertex for each pair of place and texture coordinates."""
     pairs = np.stack([asset.triangles.ravel(), asset.uv_triangles.ravel()], axis=1)
     unique, corners = np.unique(pairs, axis=0, return_inverse=True)
     return Cards(places[unique[:, 0]], corners.reshape(-1, 3), asset.uv[unique[:, 1]], unique[:, 0])
 
 
-def solid_points(cards: Cards, alpha: NDArray[np.uint8], generator: np.random.Generator) -> Floats:
+def solid_points(cards: Cards, alpha: NDArray[np.uint8], generator: np.random.Generator) -> FloatArray:
     """(S, 3) random points on the cards, spread by area, where the strands are dense."""
     corners = cards.vertices[cards.triangles]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
@@ -316,11 +318,11 @@ def solid_points(cards: Cards, alpha: NDArray[np.uint8], generator: np.random.Ge
     points = np.einsum("sk,skd->sd", weights, corners[chosen])
     where = np.einsum("sk,skd->sd", weights, cards.uv[cards.triangles[chosen]])
     texel = np.clip((where * len(alpha)).astype(np.int64), 0, len(alpha) - 1)
-    solid: Floats = points[alpha[texel[:, 1], texel[:, 0]] > 255 * SOLID]
+    solid: FloatArray = points[alpha[texel[:, 1], texel[:, 0]] > 255 * SOLID]
     return solid
 
 
-def choose_anchors(head: Floats) -> Ints:
+def choose_anchors(head: FloatArray) -> IntArray:
     """(A,) vertices spread over a head (V, 3): each is the farthest from those before it."""
     chosen = [int(head[:, 1].argmax())]
     distance = np.linalg.norm(head - head[chosen[0]], axis=1)

@@ -21,12 +21,13 @@ from corpus_tools.shipped.head.parts import HeadPart, HeadPieces, MaterialSpan
 from corpus_tools.shipped.head.proportions import person_targets
 from corpus_tools.shipped.head.retreat import add_retreat
 from corpus_tools.shipped.head.shapes import clear_eyeballs, correct_shapes
-from corpus_tools.shipped.head.shirt import Floats, shirt_piece
+from corpus_tools.shipped.head.shirt import shirt_piece
 from corpus_tools.shipped.head.skin import HeadSkin, build_shoulders, build_skin
 from corpus_tools.shipped.head.subdivision import triangulate
 from corpus_tools.shipped.head.teeth import COVER_MM, LOWER, UPPER, arch_piece, fit_teeth, follow_lips, keep_behind
 from corpus_tools.shipped.head.texture import HeadColours
 from corpus_tools.shipped.head.tongue import tongue_piece
+from tts2face.numeric.arrays import FloatArray
 
 SKIN_MATERIAL = {"specular": 0.16, "shininess": 14.0, "wrap": 0.35, "texture": 0, "kind": "skin"}
 SMILE = {"mouthSmileLeft": 1.0, "mouthSmileRight": 1.0}
@@ -112,9 +113,9 @@ def _teeth_pieces(cage: Cage, skin: HeadSkin, reference: ReferenceHead, jaw: Jaw
     return pieces[0], pieces[1]
 
 
-def cover_in_pose(points: Floats, skin: HeadSkin, jaw: Jaw, pose: Mapping[str, float], cover: float) -> Floats:
+def cover_in_pose(points: FloatArray, skin: HeadSkin, jaw: Jaw, pose: Mapping[str, float], cover: float) -> FloatArray:
     """Teeth and gums (N, 3) that stay `cover` mm behind the skin in a pose; the lower ones move with the jaw."""
     posed = skin.vertices + sum(weight * skin.shapes[name] for name, weight in pose.items())
     opened = pose.get("jawOpen", 0.0) * jaw.shapes(points)["jawOpen"]
-    covered: Floats = keep_behind(points + opened, posed, cover) - opened
+    covered: FloatArray = keep_behind(points + opened, posed, cover) - opened
     return covered

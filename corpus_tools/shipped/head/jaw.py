@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from corpus_tools.shipped.head.cage import Cage, fit_rotation
-from corpus_tools.shipped.head.shapes import Floats
+from tts2face.numeric.arrays import FloatArray
 
 JAW_SHAPES = ("jawOpen", "jawForward", "jawLeft", "jawRight")
 
@@ -13,9 +13,9 @@ JAW_SHAPES = ("jawOpen", "jawForward", "jawLeft", "jawRight")
 class Jaw:
     """Rotation (3, 3) and translation (3,) in mm of the lower jaw by shape, at weight 1."""
 
-    motions: Mapping[str, tuple[Floats, Floats]]
+    motions: Mapping[str, tuple[FloatArray, FloatArray]]
 
-    def shapes(self, points: Floats) -> dict[str, Floats]:
+    def shapes(self, points: FloatArray) -> dict[str, FloatArray]:
         """Displacements (N, 3) by shape of points (N, 3) that move with the lower jaw."""
         return {name: points @ turn.T + shift - points for name, (turn, shift) in self.motions.items()}
 

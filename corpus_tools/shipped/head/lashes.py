@@ -16,9 +16,8 @@ from corpus_tools.shipped.head.lid_edges import LidEdge
 from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
 from corpus_tools.shipped.head.skin import HeadSkin
 from corpus_tools.shipped.head.strands import number_islands
+from tts2face.numeric.arrays import FloatArray, IntArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 COLOUR = np.array([0.07, 0.05, 0.04])
 MATERIAL = {"specular": 0.05, "shininess": 20.0, "cutout": True, "kind": "strands", "texture": CARDS_TEXTURE}
 N_ROOTS = 3  # vertices of the lid's edge that a lash follows
@@ -32,11 +31,11 @@ class LashCards:
     """A set of lashes: its asset, triangles, coordinates, roots (N, 3) on the skin and their weights."""
 
     asset: Asset
-    order: Ints
-    triangles: Ints
-    uv: Floats
-    roots: Ints
-    weights: Floats
+    order: IntArray
+    triangles: IntArray
+    uv: FloatArray
+    roots: IntArray
+    weights: FloatArray
     is_upper: NDArray[np.bool_]
 
 
@@ -67,7 +66,7 @@ def bind_lashes(folder: Path, cage: Cage, skin: HeadSkin, edges: tuple[LidEdge, 
 def lash_piece(cage: Cage, skin: HeadSkin, bound: Mapping[str, LashCards], shown: str) -> HeadPart:
     """All sets of lashes of a head; those that are not shown lie inside the skull."""
     points, faces, coordinates, tangents, count = [], [], [], [], 0
-    shapes: dict[str, list[Floats]] = {name: [] for name in skin.shapes}
+    shapes: dict[str, list[FloatArray]] = {name: [] for name in skin.shapes}
     for name, own in bound.items():
         places = own.asset.fit(cage.vertices, cage.source.vertices)[own.order]
         root = np.einsum("nk,nkd->nd", own.weights, skin.vertices[own.roots])
@@ -92,16 +91,16 @@ def lash_piece(cage: Cage, skin: HeadSkin, bound: Mapping[str, LashCards], shown
     )
 
 
-def _is_beside(shape: str, root: Floats) -> NDArray[np.bool_]:
+def _is_beside(shape: str, root: FloatArray) -> NDArray[np.bool_]:
     """(N,) whether lashes belong to the eye that a shape moves."""
     beside: NDArray[np.bool_] = root[:, 0] > 0 if shape.endswith("Left") else root[:, 0] < 0
     return beside
 
 
-def _turn(off: Floats, shape: str, turns: NDArray[np.bool_]) -> Floats:
+def _turn(off: FloatArray, shape: str, turns: NDArray[np.bool_]) -> FloatArray:
     """(N, 3) displacement of lashes relative to their roots: those of a shut or lowered lid turn forwards and down."""
     share = {"eyeBlink": 1.0, "eyeLookDown": LOOK_DOWN_SHARE}.get(shape.removesuffix("Left").removesuffix("Right"), 0.0)
     length = np.linalg.norm(off[:, 1:], axis=1)
     turned = np.column_stack([off[:, 0], -SHUT_DOWN * length, SHUT_AHEAD * length])
-    moved: Floats = np.where(turns[:, None], share * (turned - off), 0.0)
+    moved: FloatArray = np.where(turns[:, None], share * (turned - off), 0.0)
     return moved

@@ -3,7 +3,7 @@
 import numpy as np
 
 from corpus_tools.dense.texels import ISLANDS_TOP
-from corpus_tools.shipped.head.cage import Floats
+from tts2face.numeric.arrays import FloatArray
 
 SIDE = 1280  # pixels of the square texture
 HEAD_BOTTOM = 0.80  # v at which the rows of the head end; the other islands begin at `ISLANDS_TOP`
@@ -18,7 +18,7 @@ ISLANDS = {  # box in MakeHuman's layout -> box in this one, both (u low, u high
 }
 
 
-def layout_coordinates(source_uv: Floats) -> Floats:
+def layout_coordinates(source_uv: FloatArray) -> FloatArray:
     """(N, 2) texture coordinates, v down, for MakeHuman's (N, 2), v up."""
     u, v = source_uv[:, 0], source_uv[:, 1]
     placed = np.column_stack([_stretch(u, HEAD_BOX[0], FACE[0]), HEAD_BOTTOM * (1 - _stretch(v, HEAD_BOX[1], FACE[1]))])
@@ -30,10 +30,10 @@ def layout_coordinates(source_uv: Floats) -> Floats:
     return placed
 
 
-def _stretch(values: Floats, box: tuple[float, float], face: tuple[float, float]) -> Floats:
+def _stretch(values: FloatArray, box: tuple[float, float], face: tuple[float, float]) -> FloatArray:
     """A box mapped monotonically to 0..1, with a higher density about the face's centre."""
     grid = np.linspace(box[0], box[1], 2001)
     density = 1.0 + FACE_GAIN * np.exp(-(((grid - face[0]) / face[1]) ** 4))
     share = np.concatenate([[0], np.cumsum((density[1:] + density[:-1]) / 2)])
-    placed: Floats = np.interp(values, grid, share / share[-1])
+    placed: FloatArray = np.interp(values, grid, share / share[-1])
     return placed

@@ -3,15 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from corpus_tools.shipped.head.edge_rings import EdgeRings, find_narrowest_ring
 from corpus_tools.shipped.head.eyes import RECEDE_MM, ball_radius
 from corpus_tools.shipped.head.parts import Eyeball, HeadPart, MaterialSpan
 from corpus_tools.shipped.head.skin import HeadSkin
 from corpus_tools.shipped.head.subdivision import grid_triangles
+from tts2face.numeric.arrays import IntArray
 
-Ints = NDArray[np.int64]
 REACH_MM = 30.0
 WET_MM, WET_OFF_MM = 0.75, 0.06  # height of the wet line, and its distance from the eyeball
 WET_COLOUR = np.array([0.76, 0.60, 0.56])
@@ -22,8 +21,8 @@ WET_MATERIAL = {"specular": 0.35, "shininess": 90.0, "kind": "eye"}
 class LidEdge:
     """Vertices of the skin along the edges of the lids of one eye, from the smaller x to the larger."""
 
-    upper: Ints
-    lower: Ints
+    upper: IntArray
+    lower: IntArray
 
 
 def find_lid_edges(skin: HeadSkin, balls: tuple[Eyeball, Eyeball]) -> tuple[LidEdge, LidEdge]:

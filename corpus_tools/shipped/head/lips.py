@@ -8,8 +8,8 @@ from scipy.ndimage import gaussian_filter1d
 
 from corpus_tools.shipped.head.edge_rings import EdgeRings, find_narrowest_ring
 from corpus_tools.shipped.head.skin import HeadSkin
+from tts2face.numeric.arrays import FloatArray
 
-Floats = NDArray[np.float64]
 PRESS_MM = 0.12  # lips overlap by this at rest, so that no light falls between them
 REACH_MM = 5.0  # from the line of contact to where the skin's motion has decayed
 N_COLUMNS = 61
@@ -29,7 +29,7 @@ class LipLine:
     """The line between the lips: half its width in mm, and the lip of each vertex (N,), -1 upper to 1 lower."""
 
     half_width: float
-    lower: Floats
+    lower: FloatArray
 
 
 def lip_ring(skin: HeadSkin) -> NDArray[np.int64]:
@@ -39,7 +39,7 @@ def lip_ring(skin: HeadSkin) -> NDArray[np.int64]:
     return find_narrowest_ring(EdgeRings(skin.quads, skin.base), opened, opened[middles].mean(axis=0), RING_REACH_MM)
 
 
-def lip_front(vertices: Floats, ring: NDArray[np.int64]) -> float:
+def lip_front(vertices: FloatArray, ring: NDArray[np.int64]) -> float:
     """Mean z in mm of the line between the lips near the middle."""
     line = vertices[ring]
     return float(line[np.abs(line[:, 0]) < MIDDLE_MM, 2].mean())
@@ -79,7 +79,7 @@ def ring_arcs(skin: HeadSkin, ring: NDArray[np.int64]) -> tuple[NDArray[np.int64
     return upper, lower
 
 
-def _ring_step(skin: HeadSkin, lips: LipLine, ring: NDArray[np.int64]) -> Floats:
+def _ring_step(skin: HeadSkin, lips: LipLine, ring: NDArray[np.int64]) -> FloatArray:
     """(N, 3) displacement by which each point of the ring meets the one opposite, with the lip around it."""
     upper, lower = ring_arcs(skin, ring)
     moved = np.zeros_like(skin.vertices)
@@ -100,7 +100,7 @@ def _ring_step(skin: HeadSkin, lips: LipLine, ring: NDArray[np.int64]) -> Floats
     return moved
 
 
-def lip_gaps(skin: HeadSkin, lips: LipLine) -> tuple[Floats, Floats, Floats]:
+def lip_gaps(skin: HeadSkin, lips: LipLine) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Columns x (C,), and the upper and lower lip's edges there as (C, 2) of y and z, mm."""
     low, high = np.array(MOUTH_BOX).T
     near = np.all((skin.base > low) & (skin.base < high), axis=1)
@@ -113,7 +113,7 @@ def lip_gaps(skin: HeadSkin, lips: LipLine) -> tuple[Floats, Floats, Floats]:
     return columns, upper, lower
 
 
-def _rims(vertices: Floats, edges: NDArray[np.int64], columns: Floats, sign: float) -> Floats:
+def _rims(vertices: FloatArray, edges: NDArray[np.int64], columns: FloatArray, sign: float) -> FloatArray:
     """(C, 2) y and z of the lowest (sign 1) or highest (-1) point of a lip at each x; NaN where there is none."""
     rims = np.full((len(columns), 2), np.nan)
     ends = vertices[edges]
@@ -127,7 +127,7 @@ def _rims(vertices: Floats, edges: NDArray[np.int64], columns: Floats, sign: flo
     return rims
 
 
-def _closing_step(skin: HeadSkin, lips: LipLine) -> Floats:
+def _closing_step(skin: HeadSkin, lips: LipLine) -> FloatArray:
     """(N, 3) displacement of half the remaining gap on each lip."""
     columns, upper, lower = lip_gaps(skin, lips)
     gap = np.nan_to_num(upper[:, 0] - lower[:, 0]) + PRESS_MM

@@ -21,13 +21,11 @@ from corpus_tools.shipped.head.subdivision import triangulate
 from lexicon.errors import DataError
 from tts2face.models.face import Face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LID_RINGS, N_MESH_LANDMARKS
+from tts2face.numeric.arrays import FloatArray, IntArray
 from tts2face.picture.camera import camera_matrices
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
 from tts2face.video.tracking import FaceTracker
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 YAWS, PITCHES, SIZES = (-14, -7, 0, 7, 14), (-3, 3, 9), (640, 900)
 LEAST_FACING = 0.25  # cosine between the surface normal and the ray; hits at lower values are discarded
@@ -47,7 +45,7 @@ MOUTH_OPEN = 0.3  # weight of jawOpen at which the lips' ring has an inside
 MOUTH_REACH_MM, EYE_REACH_MM = 40.0, 30.0
 
 
-def locate_landmarks(face: Face, skin: HeadSkin, cage: Cage, tracker: FaceTracker) -> dict[int, Floats]:
+def locate_landmarks(face: Face, skin: HeadSkin, cage: Cage, tracker: FaceTracker) -> dict[int, FloatArray]:
     """Position (3,) of each of the 468 mesh landmarks on the source's base mesh."""
     mirrored = mirrored_landmarks(face, tracker)
     triangles = triangulate(skin.quads)
@@ -74,7 +72,7 @@ def tracking_views() -> Iterator[Picture]:
                 yield Picture(size=f"{size}x{size}", camera=f"{yaw},{pitch}", background="#8a8f98")
 
 
-def project_landmarks(face: Face, picture: Picture, tracker: FaceTracker) -> tuple[Floats, NDArray[np.bool_]]:
+def project_landmarks(face: Face, picture: Picture, tracker: FaceTracker) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Positions (468, 3) in mm on the head of the landmarks tracked in a view, and which of them are reliable."""
     drawn = mesh_renderer(face, picture).draw(np.zeros(len(face.shape_names), np.float32))
     points = tracker.track(lambda: [drawn], 25.0).points[0, :N_MESH_LANDMARKS, :2].astype(np.float64)
@@ -93,7 +91,7 @@ def project_landmarks(face: Face, picture: Picture, tracker: FaceTracker) -> tup
     return np.array([place for place, _ in hits]), np.array([facing >= LEAST_FACING for _, facing in hits])
 
 
-def intersect_ray(origin: Floats, ray: Floats, corners: Floats) -> tuple[Floats, float]:
+def intersect_ray(origin: FloatArray, ray: FloatArray, corners: FloatArray) -> tuple[FloatArray, float]:
     """First intersection of a ray with triangles (F, 3, 3), and the cosine between the ray and the surface normal.
 
     A ray without intersection gives the nearest corner and 0; one that grazes an outline first gives the corner there.
@@ -120,13 +118,13 @@ def intersect_ray(origin: Floats, ray: Floats, corners: Floats) -> tuple[Floats,
     return origin + depth[first] * ray, -float(normal @ ray) / max(float(np.linalg.norm(normal)), 1e-30)
 
 
-def median_places(hits: Floats, is_reliable: NDArray[np.bool_]) -> Floats:
+def median_places(hits: FloatArray, is_reliable: NDArray[np.bool_]) -> FloatArray:
     """(L, 3) median over the views (N, L, 3) of the reliable positions; of all where few views are reliable."""
     used = is_reliable | (is_reliable.sum(axis=0) < LEAST_VIEWS)
     return np.asarray(np.nanmedian(np.where(used[:, :, None], hits, np.nan), axis=0))
 
 
-def mirrored_landmarks(face: Face, tracker: FaceTracker) -> Ints:
+def mirrored_landmarks(face: Face, tracker: FaceTracker) -> IntArray:
     """(468,) index of each landmark's mirror image on the other half of the face; its own index on the midline."""
     picture = Picture(size="900x900", camera="0,3")
     renderer, features = mesh_renderer(face, picture), []
@@ -143,13 +141,13 @@ def mirrored_landmarks(face: Face, tracker: FaceTracker) -> Ints:
     return mirrored
 
 
-def symmetrise(places: Floats, mirrored: Ints) -> Floats:
+def symmetrise(places: FloatArray, mirrored: IntArray) -> FloatArray:
     """Symmetric positions: the mean of each landmark and the reflection of its mirror image."""
-    mean: Floats = (places + (places * [-1, 1, 1])[mirrored]) / 2
+    mean: FloatArray = (places + (places * [-1, 1, 1])[mirrored]) / 2
     return mean
 
 
-def _align_inner_lips(places: Floats, skin: HeadSkin, strips: EdgeRings) -> None:
+def _align_inner_lips(places: FloatArray, skin: HeadSkin, strips: EdgeRings) -> None:
     """Move the inner lips onto the edge ring where they meet; opposite landmarks get the same x."""
     opened = skin.vertices + MOUTH_OPEN * skin.shapes["jawOpen"]
     lips = [int(np.linalg.norm(skin.base - places[lip], axis=1).argmin()) for lip in (0, 17)]  # outer, in the middle
@@ -165,13 +163,13 @@ def _align_inner_lips(places: Floats, skin: HeadSkin, strips: EdgeRings) -> None
     places[INNER_LIP_UPPER[0]], places[INNER_LIP_UPPER[-1]] = line[0], line[turn]
 
 
-def nearest_ring_point(skin: HeadSkin, ring: Ints, point: Floats) -> Floats:
+def nearest_ring_point(skin: HeadSkin, ring: IntArray, point: FloatArray) -> FloatArray:
     """Point (3,) of an edge ring, on the source's base mesh, nearest to a point in the frontal view."""
     after = np.roll(ring, -1)
     starts, along = skin.vertices[ring, :2], skin.vertices[after, :2] - skin.vertices[ring, :2]
     share = np.clip(((point[:2] - starts) * along).sum(axis=1) / (along**2).sum(axis=1), 0, 1)
     at = int(np.linalg.norm(starts + share[:, None] * along - point[:2], axis=1).argmin())
-    place: Floats = (1 - share[at]) * skin.base[ring[at]] + share[at] * skin.base[after[at]]
+    place: FloatArray = (1 - share[at]) * skin.base[ring[at]] + share[at] * skin.base[after[at]]
     return place
 
 

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.shipped.head.cage import Floats
 from tts2face.models.face import Eye, Face, FacePart, Texture
-from tts2face.numeric.arrays import unit_vectors
+from tts2face.numeric.arrays import FloatArray, unit_vectors
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,12 +27,12 @@ class HeadPart:
     ``tangents`` (N, 3) are unit vectors along strands, or None.
     """
 
-    vertices: Floats
+    vertices: FloatArray
     spans: tuple[MaterialSpan, ...]
-    colours: Floats
-    shapes: Mapping[str, Floats] = field(default_factory=dict)
-    uv: Floats | None = None
-    tangents: Floats | None = None
+    colours: FloatArray
+    shapes: Mapping[str, FloatArray] = field(default_factory=dict)
+    uv: FloatArray | None = None
+    tangents: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,9 +42,9 @@ class Eyeball:
     ``iris`` and ``pupil`` are half angles seen from the centre, radians; ``bulge`` is the cornea's height in radii.
     """
 
-    centre: Floats
+    centre: FloatArray
     radius: float
-    turns: Mapping[str, Floats]
+    turns: Mapping[str, FloatArray]
     iris: float
     pupil: float
     bulge: float
@@ -58,10 +57,10 @@ class HeadPieces:
     pieces: tuple[HeadPart, ...]
     eye_pieces: tuple[int, ...]
     balls: tuple[Eyeball, ...]
-    pivot: Floats
+    pivot: FloatArray
 
 
-def stack_vertices(built: HeadPieces) -> Floats:
+def stack_vertices(built: HeadPieces) -> FloatArray:
     """(V, 3) vertices of all pieces in order."""
     return np.concatenate([piece.vertices for piece in built.pieces])
 

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from corpus_tools.shipped.head.cage import build_cage
 from corpus_tools.shipped.head.cards import CardChoice
@@ -25,7 +24,6 @@ SKIN_SHARES = {
 BROWN, DARK = (0.85, 0.66, 0.50), (0.62, 0.44, 0.34)  # eyes; the iris in the texture is light
 BLACK, BLOND, GREY = (0.42, 0.43, 0.47), (1.9, 2.0, 1.75), (2.1, 2.8, 3.4)  # brows
 YOUNG, OLD, CHILD = {"young": 1.0}, {"old": 1.0}, {"child": 0.85, "young": 0.15}
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from corpus_tools.shipped.head.lips import Floats, ring_arcs
+from corpus_tools.shipped.head.lips import ring_arcs
 from corpus_tools.shipped.head.skin import HeadSkin
 from corpus_tools.shipped.head.subdivision import triangulate
+from tts2face.numeric.arrays import FloatArray
 
 COVER_MM = (
     2.4  # of skin ahead of teeth and gums below the lip, for all people, whose shapes are those of the default one
@@ -22,8 +23,8 @@ BACKWARDS = np.array([0.0, 0.0, -1.0])
 
 
 def add_retreat(
-    points: Floats, shapes: Mapping[str, Floats], skin: HeadSkin, lips: NDArray[np.int64]
-) -> dict[str, Floats]:
+    points: FloatArray, shapes: Mapping[str, FloatArray], skin: HeadSkin, lips: NDArray[np.int64]
+) -> dict[str, FloatArray]:
     """Shapes of the lower arch with vertices (N, 3) that stays behind the skin with an open jaw and with a smile.
 
     Parameters
@@ -36,7 +37,7 @@ def add_retreat(
     moved = dict(shapes)
     lower = ring_arcs(skin, lips)[1]
 
-    def lacking(opening: float, smiling: float) -> Floats:
+    def lacking(opening: float, smiling: float) -> FloatArray:
         """(N,) mm by which vertices must retreat in a pose."""
         posed = skin.vertices + opening * skin.shapes["jawOpen"] + smiling * sum(skin.shapes[name] for name in SMILES)
         place = points + opening * moved["jawOpen"]
@@ -47,7 +48,7 @@ def add_retreat(
 
     beside = cKDTree(points[:, [0, 2]]).query_ball_point(points[:, [0, 2]], CROWN_MM)
 
-    def whole(depth: Floats) -> Floats:
+    def whole(depth: FloatArray) -> FloatArray:
         """(N,) largest retreat of the vertices above, below and beside each one."""
         return np.array([depth[near].max() for near in beside])
 
@@ -59,7 +60,7 @@ def add_retreat(
     return moved
 
 
-def front_depth(places: Floats, vertices: Floats, triangles: NDArray[np.int64]) -> Floats:
+def front_depth(places: FloatArray, vertices: FloatArray, triangles: NDArray[np.int64]) -> FloatArray:
     """(N,) z of the foremost point of a surface at places (N, 2) of x and y; infinite where there is none."""
     corners = vertices[triangles]
     low, high = places.min(axis=0), places.max(axis=0)

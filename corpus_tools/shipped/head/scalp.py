@@ -9,9 +9,8 @@ from corpus_tools.dense.texels import Texels, find_texels
 from corpus_tools.shipped.head.layout import layout_coordinates
 from corpus_tools.shipped.head.noise import value_noise
 from corpus_tools.shipped.head.skin import HeadSkin, vertex_normals
-from corpus_tools.shipped.head.strands import Floats
 from corpus_tools.shipped.head.subdivision import triangulate
-from tts2face.numeric.arrays import smoothstep
+from tts2face.numeric.arrays import FloatArray, smoothstep
 
 MIDDLE = np.array([0.0, 25.0, -72.0])  # of the skull, mm
 CROWN = np.array([14.0, 122.0, -98.0])  # strands run from here
@@ -29,7 +28,7 @@ STUBBLE_SOFT_MM, RAGGED_MM, RAGGED_SIZE_MM, TOP_Y = 20.0, 2.5, 8.0, (0.0, 75.0)
 STRAND_MM = 0.55  # width of a painted strand
 
 
-def hair_share(places: Floats, soft_mm: float = SOFT_MM) -> Floats:
+def hair_share(places: FloatArray, soft_mm: float = SOFT_MM) -> FloatArray:
     """(P,) 1 where hair grows, 0 where it does not, for positions (P, 3) on the reference skin, mm."""
     off = places - MIDDLE
     angle = np.degrees(np.arctan2(np.abs(off[:, 0]), off[:, 2]))
@@ -37,11 +36,11 @@ def hair_share(places: Floats, soft_mm: float = SOFT_MM) -> Floats:
     share = smoothstep(places[:, 1] - line, -0.35 * SOFT_MM, soft_mm - 0.35 * SOFT_MM)
     mirrored = np.column_stack([np.abs(places[:, 0]), places[:, 1:]])
     ear = np.linalg.norm((mirrored - EAR[0]) / EAR[1], axis=1)
-    grown: Floats = share * smoothstep(ear, 0.92, 1.12)
+    grown: FloatArray = share * smoothstep(ear, 0.92, 1.12)
     return grown
 
 
-def covered_share(skin: HeadSkin, hair: Floats) -> Floats:
+def covered_share(skin: HeadSkin, hair: FloatArray) -> FloatArray:
     """(N,) share of a skin's scalp that lies under hair, given as points (S, 3) on the cards where strands are."""
     share = np.zeros(len(skin.vertices))
     scalp = np.flatnonzero(hair_share(skin.vertices) > 0)
@@ -58,7 +57,7 @@ def covered_share(skin: HeadSkin, hair: Floats) -> Floats:
     return share
 
 
-def paint_scalp(skin: HeadSkin, share: Floats, side: int, generator: np.random.Generator) -> NDArray[np.uint8]:
+def paint_scalp(skin: HeadSkin, share: FloatArray, side: int, generator: np.random.Generator) -> NDArray[np.uint8]:
     """(side, side) coverage of the skin's texture by hair, 0-255, with strands at its edge; `share` is (N,)."""
     texels = find_texels(layout_coordinates(skin.source_uv), triangulate(skin.quads), side)
     place = texels.interpolate(skin.vertices)
@@ -80,12 +79,12 @@ def paint_stubble(skin: HeadSkin, side: int, generator: np.random.Generator) -> 
     return _fill_gaps(texels, np.clip(share * (1 + grain * GRAIN / np.sqrt(share + 0.05)), 0, 1), side)
 
 
-def stubble_share(places: Floats) -> Floats:
+def stubble_share(places: FloatArray) -> FloatArray:
     """`hair_share` of cropped hair, which gets denser over a longer distance from the hairline."""
     return hair_share(places, STUBBLE_SOFT_MM)
 
 
-def _fill_gaps(texels: Texels, cover: Floats, side: int) -> NDArray[np.uint8]:
+def _fill_gaps(texels: Texels, cover: FloatArray, side: int) -> NDArray[np.uint8]:
     """(side, side) coverage, 0-255 in 32 steps; texels off the surface take the nearest value on it."""
     picture, is_gap = np.zeros((side, side)), np.ones((side, side), bool)
     picture[texels.rows, texels.columns], is_gap[texels.rows, texels.columns] = cover, False
@@ -93,13 +92,13 @@ def _fill_gaps(texels: Texels, cover: Floats, side: int) -> NDArray[np.uint8]:
     return share_levels(picture[tuple(nearest)])
 
 
-def share_levels(share: Floats) -> NDArray[np.uint8]:
+def share_levels(share: FloatArray) -> NDArray[np.uint8]:
     """Shares of 0 to 1 in 32 levels of coverage, which compress well."""
     levels: NDArray[np.uint8] = np.rint(share * 31).astype(np.uint8) * np.uint8(8)
     return levels
 
 
-def strand_field(places: Floats, width_mm: float, length_mm: float) -> Floats:
+def strand_field(places: FloatArray, width_mm: float, length_mm: float) -> FloatArray:
     """(P, 3) coordinates in which noise of size 1 has the width and length of a strand that runs from the crown."""
     off = places - CROWN
     axis = (CROWN - MIDDLE) / np.linalg.norm(CROWN - MIDDLE)

@@ -11,9 +11,8 @@ from corpus_tools.shipped.head.eyes import RECEDE_MM, ball_radius
 from corpus_tools.shipped.head.parts import Eyeball
 from corpus_tools.shipped.head.skin import HeadSkin
 from tts2face.face.deformation import rotation_matrix
-from tts2face.numeric.arrays import smoothstep
+from tts2face.numeric.arrays import FloatArray, smoothstep
 
-Floats = NDArray[np.float64]
 SMOOTHED_SHAPES = ("mouthSmileLeft", "mouthSmileRight", "mouthDimpleLeft", "mouthDimpleRight", "cheekPuff")
 SHAPE_GAINS = {  # brows of MakeHuman hardly rise; its upper lids hardly follow an upward gaze
     "browInnerUp": 2.4,
@@ -59,7 +58,7 @@ def correct_shapes(skin: HeadSkin) -> HeadSkin:
     return replace(skin, shapes=shapes)
 
 
-def _smooth_rounding(skin: HeadSkin, shapes: dict[str, Floats], means: sparse.csr_array) -> None:
+def _smooth_rounding(skin: HeadSkin, shapes: dict[str, FloatArray], means: sparse.csr_array) -> None:
     """Smooth the shapes of rounding on the skin above the upper lip, in place."""
     off = 100.0 * np.linalg.norm((skin.base - UPPER_LIP) * [0.45, 1.0, 0.6], axis=1)
     share = smoothstep(off, *LIP_NEAR_MM) * (1 - smoothstep(off, *LIP_FAR_MM)) * (skin.base[:, 1] > LIP_TOP)
@@ -67,7 +66,7 @@ def _smooth_rounding(skin: HeadSkin, shapes: dict[str, Floats], means: sparse.cs
         shapes[name] = smoothed(shapes[name], share, means, N_ROUND_MEANS)
 
 
-def smoothed(moved: Floats, share: Floats, means: sparse.csr_array, number: int) -> Floats:
+def smoothed(moved: FloatArray, share: FloatArray, means: sparse.csr_array, number: int) -> FloatArray:
     """A shape (N, 3) after so many averages over neighbours, where its share (N,) is 1."""
     smooth = moved
     for _ in range(number):
@@ -120,18 +119,20 @@ def clear_eyeballs(
     return replace(skin, shapes=shapes, corrections=corrections)
 
 
-def eyeball_overlap(vertices: Floats, ball: Eyeball, name: str, weight: float) -> Floats:
+def eyeball_overlap(vertices: FloatArray, ball: Eyeball, name: str, weight: float) -> FloatArray:
     """(N,) depth of vertices inside an eyeball in the pose of a shape, mm; negative outside."""
     turn = rotation_matrix(weight * ball.turns.get(name, np.zeros(3)))
     sink = RECEDE_MM * weight if name.startswith("eyeBlink") else 0.0
     off = vertices - ball.centre + [0.0, 0.0, sink]
     distance = np.linalg.norm(off, axis=1)
     angle = np.arccos(np.clip((off @ turn)[:, 2] / distance, -1, 1))
-    depth: Floats = ball_radius(ball, angle) - distance
+    depth: FloatArray = ball_radius(ball, angle) - distance
     return depth
 
 
-def _push(vertices: Floats, shape: tuple[Floats, float], ball: Eyeball, name: str, means: sparse.csr_array) -> Floats:
+def _push(
+    vertices: FloatArray, shape: tuple[FloatArray, float], ball: Eyeball, name: str, means: sparse.csr_array
+) -> FloatArray:
     """(N, 3) displacement that a shape, with its motion and clearance, needs to clear an eyeball."""
     moved, clear_mm = shape
     rest_depth = eyeball_overlap(vertices, ball, "", 0.0)

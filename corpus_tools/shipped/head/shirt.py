@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
 from corpus_tools.shipped.head.skin import HeadSkin, vertex_normals
 from corpus_tools.shipped.head.subdivision import triangulate
+from tts2face.numeric.arrays import FloatArray, IntArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 COLLAR_Y, COLLAR_SLOPE = -164.0, -0.30  # height in front of the neck, mm, and rise per mm towards the back
 BAND_MM = 13.0  # height of the collar's band
 BAND_OFF, BODY_OFF = 3.0, 1.8  # mm off the skin
@@ -22,16 +20,16 @@ MATERIAL = {"specular": 0.04, "shininess": 8.0, "wrap": 0.2}
 class Sheet:
     """Points (N, D) of any attributes, and triangles (F, 3)."""
 
-    points: Floats
-    triangles: Ints
+    points: FloatArray
+    triangles: IntArray
 
 
-def height_above_collar(places: Floats) -> Floats:
+def height_above_collar(places: FloatArray) -> FloatArray:
     """(P,) signed height above the collar's edge in mm, for positions on the default skin."""
     return places[:, 1] - COLLAR_Y - COLLAR_SLOPE * np.minimum(places[:, 2], 20.0)
 
 
-def shirt_piece(default: HeadSkin, own: HeadSkin, colour: Floats) -> HeadPart:
+def shirt_piece(default: HeadSkin, own: HeadSkin, colour: FloatArray) -> HeadPart:
     """The shirt over the shoulders `own` of an identity, cut where the shoulders of the `default` identity are."""
     normals = vertex_normals(own.vertices, own.quads, own.base)
     whole = Sheet(np.column_stack([default.vertices, own.vertices, normals]), triangulate(own.quads))
@@ -52,7 +50,7 @@ def shirt_piece(default: HeadSkin, own: HeadSkin, colour: Floats) -> HeadPart:
     )
 
 
-def clip_sheet(sheet: Sheet, inside: Floats | None) -> Sheet:
+def clip_sheet(sheet: Sheet, inside: FloatArray | None) -> Sheet:
     """The part of a sheet where `inside` (N,) is not negative, without unused points."""
     points, triangles = sheet.points, sheet.triangles
     if inside is not None:
@@ -61,10 +59,10 @@ def clip_sheet(sheet: Sheet, inside: Floats | None) -> Sheet:
     return Sheet(points[used], packed.reshape(-1, 3).astype(np.int64))
 
 
-def _cut_triangles(points: Floats, triangles: Ints, inside: Floats) -> tuple[Floats, Ints]:
+def _cut_triangles(points: FloatArray, triangles: IntArray, inside: FloatArray) -> tuple[FloatArray, IntArray]:
     is_in = inside >= 0
     n_in = is_in[triangles].sum(axis=1)
-    new_points: list[Floats] = []
+    new_points: list[FloatArray] = []
     known: dict[tuple[int, int], int] = {}
 
     def crossing(a: int, b: int) -> int:

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from corpus_tools.shipped.head.cage import Cage
 from corpus_tools.shipped.head.subdivision import catmull_clark
+from tts2face.numeric.arrays import FloatArray
 
-Floats = NDArray[np.float64]
 LOWEST, WIDEST = 4.1, 3.2  # of the bust, in units of the source
 NECK_Y, NECK_SLOPE = 5.80, -0.272  # the head ends below this plane, under the shirt's collar
 HEAD_WIDEST = 1.2  # half the width of head and neck; arms are further out
@@ -36,12 +36,12 @@ class HeadSkin:
         Displacements (N, 3) added to shapes, by name; lashes follow them.
     """
 
-    vertices: Floats
-    shapes: Mapping[str, Floats]
+    vertices: FloatArray
+    shapes: Mapping[str, FloatArray]
     quads: NDArray[np.int64]
-    source_uv: Floats
-    base: Floats
-    corrections: Mapping[str, Floats] = field(default_factory=dict)
+    source_uv: FloatArray
+    base: FloatArray
+    corrections: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 def build_skin(cage: Cage) -> HeadSkin:
@@ -80,7 +80,7 @@ def _subdivide(cage: Cage, kept: NDArray[np.bool_]) -> HeadSkin:
     )
 
 
-def _subdivide_coordinates(corners: Floats) -> Floats:
+def _subdivide_coordinates(corners: FloatArray) -> FloatArray:
     """(4 F, 4, 2) texture coordinates of quads split in four as in `catmull_clark`."""
     after = (corners + np.roll(corners, -1, axis=1)) / 2
     centre = corners.mean(axis=1)
@@ -88,7 +88,7 @@ def _subdivide_coordinates(corners: Floats) -> Floats:
     return np.stack(new, axis=1).reshape(-1, 4, 2)
 
 
-def vertex_normals(vertices: Floats, quads: NDArray[np.int64], base: Floats) -> Floats:
+def vertex_normals(vertices: FloatArray, quads: NDArray[np.int64], base: FloatArray) -> FloatArray:
     """(N, 3) unit normals; vertices on a seam share one."""
     diagonals = vertices[quads[:, 2]] - vertices[quads[:, 0]], vertices[quads[:, 3]] - vertices[quads[:, 1]]
     faces = np.cross(*diagonals)
@@ -97,5 +97,5 @@ def vertex_normals(vertices: Floats, quads: NDArray[np.int64], base: Floats) -> 
     total = np.zeros((int(weld.max()) + 1, 3))
     for corner in quads.T:
         np.add.at(total, weld[corner], faces)
-    unit: Floats = (total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12))[weld]
+    unit: FloatArray = (total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12))[weld]
     return unit

@@ -9,10 +9,8 @@ from scipy.ndimage import gaussian_filter, minimum_filter, zoom
 from scipy.sparse.csgraph import connected_components
 
 from tts2face.models.hair import MEAN_RELIEF
-from tts2face.numeric.arrays import LUMINANCE, decode_srgb, unit_vectors
+from tts2face.numeric.arrays import LUMINANCE, FloatArray, IntArray, decode_srgb, unit_vectors
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 SHADE_PX = 22.0  # at 512 pixels; lighter and darker areas wider than this are painted highlights, and are removed
 FINE_PX, FINE_STEPS = 0.55, 26  # width of a fine strand, and half its length, in pixels
 BROAD_PX, BROAD_STEPS = 2.2, 60
@@ -26,10 +24,10 @@ OUTLINE_LIGHT, OUTLINE_WEIGHT = 1.0, 0.02  # brightness of outlines relative to 
 class Cards:
     """Hair cards: vertices (N, 3) in mm, triangles (F, 3), texture coordinates (N, 2); ``weld`` numbers places (N,)."""
 
-    vertices: Floats
-    triangles: Ints
-    uv: Floats
-    weld: Ints
+    vertices: FloatArray
+    triangles: IntArray
+    uv: FloatArray
+    weld: IntArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,16 +47,16 @@ class StrandStyle:
     broad: float = BROAD_GAIN
 
 
-def strand_coverage(picture: NDArray[np.uint8], style: StrandStyle) -> Floats:
+def strand_coverage(picture: NDArray[np.uint8], style: StrandStyle) -> FloatArray:
     """(H, W) coverage in [0, 1]."""
-    cover: Floats = picture[:, :, 3] / 255.0
+    cover: FloatArray = picture[:, :, 3] / 255.0
     if style.matte:
         brightest = gaussian_filter(picture[:, :, :3].max(axis=2) / 255.0, 1.0)
         cover = cover * np.clip((brightest - 0.035) / 0.04, 0, 1)
     return cover
 
 
-def strand_angles(picture: NDArray[np.uint8], cover: Floats, style: StrandStyle) -> Floats:
+def strand_angles(picture: NDArray[np.uint8], cover: FloatArray, style: StrandStyle) -> FloatArray:
     """(H, W) direction of the strands in the texture, radians from +u towards +v (down), by the structure tensor.
 
     Only texels inside the cards count: the outline of a card is no strand.
@@ -71,16 +69,16 @@ def strand_angles(picture: NDArray[np.uint8], cover: Floats, style: StrandStyle)
         gaussian_filter(weight * part, style.blur_px) for part in (across * across, across * down, down * down)
     )
     xx = xx + style.upright * np.mean(xx + yy)
-    angles: Floats = 0.5 * np.arctan2(2 * xy, xx - yy) + np.pi / 2
+    angles: FloatArray = 0.5 * np.arctan2(2 * xy, xx - yy) + np.pi / 2
     return angles
 
 
-def solid_share(cover: Floats) -> Floats:
+def solid_share(cover: FloatArray) -> FloatArray:
     """(H, W) 1 for texels with covered ones all around, else 0."""
     return np.asarray(minimum_filter(cover, OUTLINE_PX) > SOLID_COVER, np.float64)
 
 
-def flat_relief(picture: NDArray[np.uint8], cover: Floats, style: StrandStyle) -> Floats:
+def flat_relief(picture: NDArray[np.uint8], cover: FloatArray, style: StrandStyle) -> FloatArray:
     """(H, W) luminance over that of the neighbourhood, so that painted highlights vanish; about 1.
 
     Outlines, which the pictures' ground brightens, are no lighter than the hair beside them.
@@ -93,13 +91,13 @@ def flat_relief(picture: NDArray[np.uint8], cover: Floats, style: StrandStyle) -
     weight = np.maximum(cover, 1e-3)
     shade_px = (style.shade_px, SHADE_PX)
     around = gaussian_filter(light * weight, shade_px) / gaussian_filter(weight, shade_px)
-    relief: Floats = np.clip(light / np.maximum(around, 1e-4), 0.05, 3.0) ** style.contrast
+    relief: FloatArray = np.clip(light / np.maximum(around, 1e-4), 0.05, 3.0) ** style.contrast
     return relief
 
 
 def bake_strands(
     picture: NDArray[np.uint8], style: StrandStyle, side: int, generator: np.random.Generator
-) -> tuple[NDArray[np.uint8], NDArray[np.uint8], Floats]:
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8], FloatArray]:
     """Relief (side, side), 128 where a strand has the hair's colour, coverage (side, side), and `strand_angles`."""
     cover = strand_coverage(picture, style)
     angles = strand_angles(picture, cover, style)
@@ -124,7 +122,7 @@ def bake_strands(
     )
 
 
-def streaks(angles: Floats, width_px: float, n_steps: int, generator: np.random.Generator) -> Floats:
+def streaks(angles: FloatArray, width_px: float, n_steps: int, generator: np.random.Generator) -> FloatArray:
     """(H, W) noise averaged along directions (line integral convolution; Cabral and Leedom 1993)."""
     noise = gaussian_filter(generator.standard_normal(angles.shape), width_px)
     cosine, sine = np.cos(angles), np.sin(angles)
@@ -144,7 +142,7 @@ def streaks(angles: Floats, width_px: float, n_steps: int, generator: np.random.
     return total
 
 
-def strand_tangents(cards: Cards, angles: Floats) -> Floats:
+def strand_tangents(cards: Cards, angles: FloatArray) -> FloatArray:
     """(N, 3) unit vectors along the strands, downwards, of cards whose texture has the directions `angles` (H, W)."""
     vertices, triangles, uv, weld = cards.vertices, cards.triangles, cards.uv, cards.weld
     height, width = angles.shape
@@ -171,18 +169,18 @@ def strand_tangents(cards: Cards, angles: Floats) -> Floats:
     return _weld_mean(tangents, weld)
 
 
-def _weld_mean(vectors: Floats, weld: Ints) -> Floats:
+def _weld_mean(vectors: FloatArray, weld: IntArray) -> FloatArray:
     total = np.zeros((int(weld.max()) + 1, 3))
     np.add.at(total, weld, vectors)
     return unit_vectors(total[weld])
 
 
-def number_islands(n: int, triangles: Ints) -> Ints:
+def number_islands(n: int, triangles: IntArray) -> IntArray:
     """(n,) number of the connected component of each vertex."""
     return np.asarray(connected_components(edge_graph(n, triangles), directed=False)[1], np.int64)
 
 
-def edge_graph(n: int, triangles: Ints) -> sparse.csr_array:
+def edge_graph(n: int, triangles: IntArray) -> sparse.csr_array:
     """(n, n) matrix that is 1 for vertices that share an edge."""
     ends = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     pairs = np.unique(np.concatenate([ends, ends[:, ::-1]]), axis=0)

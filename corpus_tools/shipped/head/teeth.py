@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from corpus_tools.shipped.head.cage import SCALE
 from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
 from corpus_tools.shipped.head.subdivision import grid_triangles
-from tts2face.numeric.arrays import smoothstep
+from tts2face.numeric.arrays import FloatArray, smoothstep
 
-Floats = NDArray[np.float64]
 # Sizes after Wheeler, Dental Anatomy. The incisors touch the inner side of the lips, 2.5 mm (upper) and 6 mm (lower)
 # behind the line between them, the canines and premolars that of the cheeks; the molars are those of MakeHuman's strip.
 UPPER_CURVE = np.array(
@@ -68,12 +67,12 @@ class Arch:
         Crowns from the middle to the first molar, mm.
     """
 
-    curve: Floats
+    curve: FloatArray
     edge_y: float
     up: float
-    widths: Floats
-    heights: Floats
-    depths: Floats
+    widths: FloatArray
+    heights: FloatArray
+    depths: FloatArray
 
 
 UPPER = Arch(
@@ -114,7 +113,7 @@ def arch_piece(arch: Arch, name: str) -> HeadPart:
     return HeadPart(np.concatenate([vertices, gum.vertices]), spans, np.concatenate([*colours, gum.colours]))
 
 
-def gum_piece(path: "ArchPath", arch: Arch, colour: Floats) -> HeadPart:
+def gum_piece(path: "ArchPath", arch: Arch, colour: FloatArray) -> HeadPart:
     """The gum of an arch, darker towards its ends."""
     vertices = _gum(path, arch)
     faces = _wind_outward(_tube_triangles(*_GUM_GRID, closed_start=False), arch.up)
@@ -122,14 +121,14 @@ def gum_piece(path: "ArchPath", arch: Arch, colour: Floats) -> HeadPart:
     return HeadPart(vertices, (MaterialSpan("gums", faces, MATERIALS["gums"]),), colours)
 
 
-def fit_teeth(points: Floats, before: Floats, after: Floats) -> Floats:
+def fit_teeth(points: FloatArray, before: FloatArray, after: FloatArray) -> FloatArray:
     """Points scaled and shifted per axis as the strip of teeth `before` (N, 3) is to `after` (N, 3)."""
     scale = after.std(axis=0) / before.std(axis=0)
-    moved: Floats = after.mean(axis=0) + scale * (points - before.mean(axis=0))
+    moved: FloatArray = after.mean(axis=0) + scale * (points - before.mean(axis=0))
     return moved
 
 
-def follow_lips(points: Floats, default: Floats, ahead: float) -> Floats:
+def follow_lips(points: FloatArray, default: FloatArray, ahead: float) -> FloatArray:
     """Points (N, 3) whose front teeth follow lips that lie `ahead` mm further forward than the default person's.
 
     `default` holds the same points on the default person.
@@ -141,7 +140,7 @@ def follow_lips(points: Floats, default: Floats, ahead: float) -> Floats:
     return moved
 
 
-def keep_behind(points: Floats, skin: Floats, cover: float) -> Floats:
+def keep_behind(points: FloatArray, skin: FloatArray, cover: float) -> FloatArray:
     """Points (N, 3) at least `cover` mm behind the foremost of the skin's vertices (S, 3) nearby, in front view."""
     from scipy.spatial import cKDTree
 
@@ -155,18 +154,18 @@ def keep_behind(points: Floats, skin: Floats, cover: float) -> Floats:
 class ArchPath:
     """The curve by arc length from the middle, left positive: (n,) lengths, (n, 2) x and z, (n, 2) outward normals."""
 
-    lengths: Floats
-    places: Floats
-    normals: Floats
+    lengths: FloatArray
+    places: FloatArray
+    normals: FloatArray
 
-    def at(self, along: Floats) -> tuple[Floats, Floats]:
+    def at(self, along: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Positions and normals (..., 2) at arc lengths."""
         both = [np.stack([np.interp(along, self.lengths, line[:, k]) for k in (0, 1)], axis=-1)
                 for line in (self.places, self.normals)]  # fmt: skip
         return both[0], both[1]
 
 
-def arch_path(curve: Floats) -> ArchPath:
+def arch_path(curve: FloatArray) -> ArchPath:
     """The curve of an arch, mirrored, from its points (K, 2) on the left."""
     from scipy.interpolate import CubicSpline
 
@@ -179,7 +178,7 @@ def arch_path(curve: Floats) -> ArchPath:
     return ArchPath(lengths - lengths[-1] / 2, places, normals)
 
 
-def _crown(width: float, height: float, depth: float) -> tuple[Floats, Floats]:
+def _crown(width: float, height: float, depth: float) -> tuple[FloatArray, FloatArray]:
     """Points (n, 3) of a crown, x along the arch, y from the edge, z outwards, and their colours (n, 3)."""
     around = np.linspace(0, 2 * np.pi, N_AROUND, endpoint=False)
     corner = np.stack([np.cos(around), np.sin(around)], axis=1)
@@ -202,7 +201,7 @@ def _crown(width: float, height: float, depth: float) -> tuple[Floats, Floats]:
     return np.concatenate([rings.reshape(-1, 3), cap]), colours * (1 - sides * GAP_SHADE)
 
 
-def _place_crown(points: Floats, path: ArchPath, along: float, arch: Arch) -> Floats:
+def _place_crown(points: FloatArray, path: ArchPath, along: float, arch: Arch) -> FloatArray:
     """Points of a crown in head coordinates, upright on the arch's curve."""
     place, normal = path.at(np.array(along))
     normal = normal / np.linalg.norm(normal)
@@ -211,15 +210,15 @@ def _place_crown(points: Floats, path: ArchPath, along: float, arch: Arch) -> Fl
     return np.column_stack([flat[:, 0], arch.edge_y + arch.up * points[:, 1], flat[:, 1]])
 
 
-def _light_along(arch: Arch) -> Floats:
+def _light_along(arch: Arch) -> FloatArray:
     """(61,) brightness of the rings of a gum."""
     ends = np.cumsum(arch.widths)
     along = np.linspace(-ends[-1], ends[-1], _GUM_GRID[0])
-    light: Floats = np.interp(np.abs(along), ends - arch.widths / 2, SHADE)
+    light: FloatArray = np.interp(np.abs(along), ends - arch.widths / 2, SHADE)
     return light
 
 
-def _gum(path: ArchPath, arch: Arch) -> Floats:
+def _gum(path: ArchPath, arch: Arch) -> FloatArray:
     """Points of a tube along the arch, scalloped about the necks of the teeth."""
     total = arch.widths.sum()
     along = np.linspace(-total, total, _GUM_GRID[0])

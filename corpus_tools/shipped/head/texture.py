@@ -17,9 +17,7 @@ from corpus_tools.shipped.head.noise import gaussian_bump, value_noise
 from corpus_tools.shipped.head.skin import HeadSkin
 from corpus_tools.shipped.head.source import SourceMesh
 from corpus_tools.shipped.head.subdivision import triangulate
-from tts2face.numeric.arrays import smoothstep
-
-Floats = NDArray[np.float64]
+from tts2face.numeric.arrays import FloatArray, smoothstep
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +69,8 @@ def paint_texture(
 
 
 def _flesh(
-    place: Floats, where: Floats, source: SourceMesh, palette: HeadColours, generator: np.random.Generator
-) -> Floats:
+    place: FloatArray, where: FloatArray, source: SourceMesh, palette: HeadColours, generator: np.random.Generator
+) -> FloatArray:
     strength = palette.variation
     factors = np.ones((len(place), 3))
     for centre, reach, tint in TINTS:
@@ -89,7 +87,7 @@ def _flesh(
     return np.array(palette.skin) * factors
 
 
-def _fold(place: Floats) -> Floats:
+def _fold(place: FloatArray) -> FloatArray:
     nearest = np.full(len(place), np.inf)
     flat = np.column_stack([np.abs(place[:, 0]), place[:, 1]])
     for start, end in pairwise(FOLD):
@@ -98,7 +96,7 @@ def _fold(place: Floats) -> Floats:
     return np.exp(-((nearest / 3.0) ** 2)) * (place[:, 2] > 0)
 
 
-def _freckles(place: Floats, generator: np.random.Generator) -> Floats:
+def _freckles(place: FloatArray, generator: np.random.Generator) -> FloatArray:
     """(P,) small spots on cheeks, nose and forehead."""
     chance = 0.9 * gaussian_bump(place, (32, -22), (24, 18)) + 0.5 * gaussian_bump(place, (0, -25), (16, 20)) + 0.12
     chance *= place[:, 2] > -30
@@ -111,45 +109,45 @@ def _freckles(place: Floats, generator: np.random.Generator) -> Floats:
     return np.clip(spots, 0, 1)
 
 
-def _lip_colour(place: Floats, palette: HeadColours, generator: np.random.Generator) -> Floats:
+def _lip_colour(place: FloatArray, palette: HeadColours, generator: np.random.Generator) -> FloatArray:
     lines = value_noise(place * np.array([1.0, 0.22, 0.3]), 0.9, generator)  # fine creases from edge to edge
     colour = np.tile(np.array(palette.lips), (len(place), 1))
     return colour * (1 + palette.variation * (0.035 * lines + 0.03 * value_noise(place, 4.0, generator))[:, None])
 
 
-def _cavity_colour(place: Floats, palette: HeadColours) -> Floats:
+def _cavity_colour(place: FloatArray, palette: HeadColours) -> FloatArray:
     """Colour of the lips at their inner edge, that of the cavity at the cheeks, darker towards the throat."""
     inner = np.array(palette.cavity) * (1 - THROAT_DARKER * smoothstep(-place[:, 2], *THROAT_Z))[:, None]
     near = smoothstep(place[:, 2], *INNER_LIP_Z)[:, None]
     return inner + near * (np.array(palette.lips) - inner)
 
 
-def _beside(place: Floats, line: Floats) -> Floats:
+def _beside(place: FloatArray, line: FloatArray) -> FloatArray:
     """(P,) 1 on a line of points (L, 3), falling off beside it."""
-    near: Floats = np.exp(-((line_distance(place, line, 6.0) / LINE_MM) ** 2))
+    near: FloatArray = np.exp(-((line_distance(place, line, 6.0) / LINE_MM) ** 2))
     return near
 
 
-def line_distance(place: Floats, line: Floats, most: float) -> Floats:
+def line_distance(place: FloatArray, line: FloatArray, most: float) -> FloatArray:
     """(P,) distance of points from a line of points (L, 3), mm; infinite beyond `most`."""
     fine = np.linspace(0, len(line) - 1, 12 * len(line))
     dense = np.stack([np.interp(fine, np.arange(len(line)), line[:, k]) for k in range(3)], axis=1)
     return np.asarray(cKDTree(dense).query(place, distance_upper_bound=most)[0])
 
 
-def in_mouth(where: Floats) -> Floats:
+def in_mouth(where: FloatArray) -> FloatArray:
     """(P,) 1 on the island of the mouth's cavity, fading to the lips' colour at its rim."""
     inside = (where[:, 0] > 0.75) & (where[:, 0] < 0.93) & (where[:, 1] < 0.14)
     return inside.astype(float)
 
 
-def sample_mask(mask: Floats, where: Floats) -> Floats:
+def sample_mask(mask: FloatArray, where: FloatArray) -> FloatArray:
     """(P,) values of a mask of the source at coordinates (P, 2), v up."""
     height, width = mask.shape
     return map_coordinates(mask, [(1 - where[:, 1]) * (height - 1), where[:, 0] * (width - 1)], order=1, mode="nearest")
 
 
-def fill_gaps(texels: Texels, colour: Floats, side: int) -> NDArray[np.uint8]:
+def fill_gaps(texels: Texels, colour: FloatArray, side: int) -> NDArray[np.uint8]:
     """(side, side, 3) texture of the colours (P, 3) of texels; those off the surface take the nearest one on it."""
     picture = np.zeros((side, side, 3))
     known = np.zeros((side, side), bool)

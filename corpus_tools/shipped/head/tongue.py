@@ -6,8 +6,7 @@ from corpus_tools.shipped.head.cage import Cage
 from corpus_tools.shipped.head.jaw import Jaw
 from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
 from corpus_tools.shipped.head.subdivision import catmull_clark, triangulate
-from corpus_tools.shipped.head.teeth import Floats
-from tts2face.numeric.arrays import smoothstep
+from tts2face.numeric.arrays import FloatArray, smoothstep
 
 TONGUE_UP = "tongueUp"
 FREE_MM = 34.0  # length of the part that narrows towards the tip
@@ -52,16 +51,16 @@ def tongue_piece(cage: Cage, jaw: Jaw) -> HeadPart:
     )
 
 
-def _height_in_tongue(points: Floats) -> Floats:
+def _height_in_tongue(points: FloatArray) -> FloatArray:
     """(N,) height of vertices above the middle of the tongue's cross-section, -1 lowest to 1 highest."""
     bins = np.linspace(points[:, 2].min(), points[:, 2].max(), 40)
     near = [points[np.abs(points[:, 2] - z) < 3.0, 1] for z in bins]
     low, high = (np.interp(points[:, 2], bins, [pick(line) for line in near]) for pick in (np.min, np.max))
-    height: Floats = (2 * points[:, 1] - low - high) / np.maximum(high - low, 1e-9)
+    height: FloatArray = (2 * points[:, 1] - low - high) / np.maximum(high - low, 1e-9)
     return height
 
 
-def shape_tip(source: Floats) -> tuple[Floats, Floats]:
+def shape_tip(source: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Vertices (N, 3) with a tip, and the share (N,) of the tip, 0 at the body to 1 at its end."""
     points = source.copy()
     middle = float(np.median(points[:, 1]))

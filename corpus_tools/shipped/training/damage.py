@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.sequence import PhoneSequence
+from tts2face.numeric.arrays import FloatArray
 from tts2face.types import Waveform
 
 VOICES = (0.86, 1.2)  # factors by which a vocal tract and its pitch are shortened, and speech is quicker
@@ -21,7 +22,6 @@ MICROPHONE_SHARE, MICROPHONE_SPREAD, MICROPHONE_BANDS = 0.5, 0.5, 7
 CODED_SHARE, TELEPHONE_SHARE, TELEPHONE_HZ = 0.2, 0.1, 8000
 CODECS = (("libmp3lame", "mp3", 64_000), ("libmp3lame", "mp3", 32_000), ("libopus", "ogg", 16_000))
 AUDIBLE, LOWEST_HZ, PEAK = 0.02, 60.0, 0.3
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,36 +80,36 @@ def speech_power(samples: NDArray[np.floating]) -> float:
     return float(np.square(samples[np.abs(samples) > AUDIBLE * np.abs(samples).max()], dtype=np.float64).mean())
 
 
-def stationary_noise(n: int, rate: int, tilt: float, rng: np.random.Generator) -> Floats:
+def stationary_noise(n: int, rate: int, tilt: float, rng: np.random.Generator) -> FloatArray:
     """Noise (n,) of unit power whose amplitudes fall with the frequency to the power of `tilt`, and differ by bands."""
     frequencies = np.maximum(np.fft.rfftfreq(n, 1.0 / rate), LOWEST_HZ)
     made = _filtered(rng.normal(size=n), frequencies**-tilt * _bands(n, N_BANDS, NOISE_SPREAD, rng))
-    scaled: Floats = made / made.std()
+    scaled: FloatArray = made / made.std()
     return scaled
 
 
-def babble(n: int, others: Sequence[NDArray[np.floating]], rng: np.random.Generator) -> Floats:
+def babble(n: int, others: Sequence[NDArray[np.floating]], rng: np.random.Generator) -> FloatArray:
     """Several people at once (n,), of unit power."""
     made = np.zeros(n)
     for _ in range(N_TALKERS):
         other = others[int(rng.integers(len(others)))]
         made += np.resize(np.roll(other / other.std(), int(rng.integers(len(other)))), n)
-    scaled: Floats = made / made.std()
+    scaled: FloatArray = made / made.std()
     return scaled
 
 
-def _bands(n: int, n_bands: int, spread: float, rng: np.random.Generator) -> Floats:
+def _bands(n: int, n_bands: int, spread: float, rng: np.random.Generator) -> FloatArray:
     """Smooth random amplitudes of the frequencies of n samples."""
     places = np.linspace(0.0, 1.0, n // 2 + 1)
     return np.exp(np.interp(places, np.linspace(0.0, 1.0, n_bands), rng.normal(0.0, spread, n_bands)))
 
 
-def _filtered(samples: Floats, amplitudes: Floats) -> Floats:
-    found: Floats = np.fft.irfft(np.fft.rfft(samples) * amplitudes, len(samples))
+def _filtered(samples: FloatArray, amplitudes: FloatArray) -> FloatArray:
+    found: FloatArray = np.fft.irfft(np.fft.rfft(samples) * amplitudes, len(samples))
     return found
 
 
-def with_echo(samples: Floats, rate: int, room: tuple[float, float], rng: np.random.Generator) -> Floats:
+def with_echo(samples: FloatArray, rate: int, room: tuple[float, float], rng: np.random.Generator) -> FloatArray:
     """Speech in a room: seconds in which its echo falls by 60 dB, and the echo's level relative to the speech."""
     from scipy.signal import fftconvolve
 
@@ -118,11 +118,11 @@ def with_echo(samples: Floats, rate: int, room: tuple[float, float], rng: np.ran
     answer[: round(FIRST_ECHO_S * rate)] = 0.0
     answer *= room[1] / np.sqrt(np.square(answer).sum())
     answer[0] = 1.0
-    found: Floats = fftconvolve(samples, answer)[: len(samples)]
+    found: FloatArray = fftconvolve(samples, answer)[: len(samples)]
     return found
 
 
-def coded(samples: Floats, rate: int, codec: str, container: str, bit_rate: int) -> Floats:
+def coded(samples: FloatArray, rate: int, codec: str, container: str, bit_rate: int) -> FloatArray:
     """The samples after a codec, without its delay."""
     import av
 

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import log_ndtr
 
 from corpus_tools.training.gaze_recordings import Fixations, Lengths, find_looks, read_people
 from tts2face.gestures.gaze import LEAST_JUMP_DEG
 from tts2face.models.gaze import DIRECTIONS, FACE_DEG, PARAMETERS, STATES, GazeModel
+from tts2face.numeric.arrays import FloatArray
 
 SOURCE = {
     "source": "github.com/psyberlab/eye-gaze-during-conversation-dataset at e156145: fixations of 15 people",
@@ -28,8 +28,6 @@ SOURCE = {
 MIN_LENGTH_S = 0.05
 FEW = 10.0  # observations that the mean of all people counts as in a person's own parameters
 PSEUDO_COUNT = 0.5  # of each direction
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from corpus_tools.shipped.training.damage import damaged_copies
 from corpus_tools.shipped.training.epochs import fit_epochs
@@ -19,6 +18,7 @@ from corpus_tools.training.linear_audio_map import standardised_windows
 from tts2face.lips.exemplar import build_exemplar_model, speech_trajectory
 from tts2face.models.audio_map import AudioMap
 from tts2face.models.talker import Talker
+from tts2face.numeric.arrays import Float32Array
 from tts2face.sound.alignment import Aligner
 from tts2face.sound.features import speech_features
 from tts2face.types import Progress, Waveform
@@ -32,15 +32,14 @@ SPREAD_EXPONENT = 0.5  # as `corpus_tools.training.network_audio_map.NetworkMapO
 N_DAMAGED = 8  # times that each sound is learnt
 GAINS_DB = (-18.0, 6.0)
 TEST_SHARE = 20  # every twentieth sound tells the error
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Lesson:
     """Features (T, D) of damaged speech and the lips (T, S) of its phones."""
 
-    features: Floats
-    lips: Floats
+    features: Float32Array
+    lips: Float32Array
     is_test: bool
 
 

@@ -6,14 +6,13 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from corpus_tools.measures.intervals import IntervalEstimate, interval_of
 from corpus_tools.studies.evaluation.people_tables import FIGURE_HEADS
+from tts2face.numeric.arrays import FloatArray
 
 LOWER_IS_BETTER = frozenset({"dtw_cost"})
-Floats = NDArray[np.float64]
-ChoiceFigures = Mapping[str, Floats]  # (W,) of each figure: its value, then resamples over utterances
+ChoiceFigures = Mapping[str, FloatArray]  # (W,) of each figure: its value, then resamples over utterances
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +51,7 @@ class CurvePoint:
         shares = np.random.default_rng([1, number]).multinomial(n_choices, np.full(n_choices, 1 / n_choices), n_draws)
         weights = np.concatenate([np.ones((1, n_choices)), shares]) / n_choices
         estimates: dict[str, dict[str, ChoiceEstimate]] = {}
-        samples: dict[str, dict[str, Floats]] = {}
+        samples: dict[str, dict[str, FloatArray]] = {}
         for method, each in figures.items():
             for name, _ in FIGURE_HEADS:
                 values = np.stack([item[name] for item in each], axis=1)  # (W, C)

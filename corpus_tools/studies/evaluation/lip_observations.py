@@ -19,21 +19,21 @@ from corpus_tools.training.pooling.speech import PooledSpeech, talker_features
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.lips.motion_measures import speech_frames
 from tts2face.models.talker import Talker
+from tts2face.numeric.arrays import FloatArray
 
 MIN_PART_S = 3.0  # tracks are cut at the first pause after as much: about a sentence
 MIN_PAUSE_S = 0.12  # shorter silences may be closures
 OPENING = 0  # of `lip_features.FEATURES`
 CLOSED_SHARE = 0.02  # of the frames whose lips touch: points of dlib do not tell when they do
 NOISE = 0.05  # deviation of a feature, in units of its spread, that the map need not reproduce
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FeatureMap:
     """Speech parameters (D,) = offset + matrix (D, 8) @ z-scored lip features."""
 
-    matrix: Floats
-    offset: Floats
+    matrix: FloatArray
+    offset: FloatArray
 
     @classmethod
     def of(cls, talker: Talker) -> "FeatureMap":
@@ -54,7 +54,7 @@ class FeatureMap:
         explained = slopes.T @ covariance @ slopes + NOISE**2 * np.eye(scored.shape[1])
         return cls(covariance @ slopes @ np.linalg.inv(explained), wanted.mean(axis=0))
 
-    def parameters(self, features: Floats) -> Floats:
+    def parameters(self, features: FloatArray) -> FloatArray:
         """(T, D) of features (T, 8)."""
         return np.asarray(self.offset + features @ self.matrix.T)
 

@@ -5,7 +5,6 @@ from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from corpus_tools.measures.intervals import CONFIDENCE
 from corpus_tools.measures.scores import Scores, available_figures
@@ -16,13 +15,13 @@ from corpus_tools.studies.plots import RULE, SERIES, draw_svg
 from corpus_tools.studies.report import Report, as_csv, as_html, as_json
 from corpus_tools.studies.videos import MethodVideos
 from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.numeric.arrays import RealArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
-Floats = NDArray[np.floating]
 SHOWN = "exemplar"  # the method whose sentences are shown where it was compared; otherwise the last one
 PLAIN = "theobald2007"  # shown beside it
 N_SHOWN = 3  # sentences of each kind
@@ -141,7 +140,7 @@ def _curves(run: SplitResult, at: int, names: Sequence[str]) -> str:
     return "\n".join(plots)
 
 
-def curves_plot(times: Floats, curves: Mapping[str, Floats], label: str, phones: PhoneSequence) -> str:
+def curves_plot(times: RealArray, curves: Mapping[str, RealArray], label: str, phones: PhoneSequence) -> str:
     """Plot of named curves (T,) at times (T,) in seconds, with the phones above (SVG)."""
 
     def draw(figure: "Figure") -> None:

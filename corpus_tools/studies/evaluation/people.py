@@ -26,9 +26,9 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.lips.motion_measures import DTW_BAND_S, speech_frames, warping_cost
 from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import Talker
+from tts2face.numeric.arrays import FloatArray
 
 DEFAULT_METHOD, NETWORKS_METHOD, TRACKS_METHOD = "exemplar", "networks alone", "tracks"
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +39,7 @@ class TestUtterance:
 
     observation: Observation
     evaluated: slice
-    real: Floats
+    real: FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,10 +123,10 @@ def evaluate_people(
 
 def _heard_curves(
     talker: Talker, method: SynthesisMethod, tests: Sequence[TestUtterance], sounds: Mapping[str, Path]
-) -> dict[str, tuple[Floats, ...]]:
+) -> dict[str, tuple[FloatArray, ...]]:
     """Curves of the default on phones that are found in the sounds, and of the audio maps."""
     seen = [test.observation for test in tests]
-    curves: dict[str, tuple[Floats, ...]] = {}
+    curves: dict[str, tuple[FloatArray, ...]] = {}
     for name, phones in heard_phones(seen, sounds).items():
         spoken = [
             replace(test, observation=replace(test.observation, phones=found))
@@ -169,11 +169,11 @@ def synthesise_people(
     methods: Mapping[str, SynthesisMethod],
     tests: Sequence[TestUtterance],
     scale: CurveScale | None = None,
-) -> dict[str, tuple[Floats, ...]]:
+) -> dict[str, tuple[FloatArray, ...]]:
     """Curves (T, 2) of every method on the evaluated frames, z-scored by `scale`: by default its recordings."""
     scale = scale or CurveScale.of_talker(talker)
 
-    def curves(method: SynthesisMethod, test: TestUtterance) -> Floats:
+    def curves(method: SynthesisMethod, test: TestUtterance) -> FloatArray:
         seen = test.observation
         motion = method(seen.phones, len(seen.landmarks), seen.fps)
         return scale.z_score(LipCurves.of_parameters(talker.model, motion[test.evaluated]).values())
@@ -183,7 +183,7 @@ def synthesise_people(
 
 def compare_people(
     tests: Sequence[TestUtterance],
-    curves: Mapping[str, Sequence[Floats]],
+    curves: Mapping[str, Sequence[FloatArray]],
     *,
     n_people: int,
     heard: Collection[str],
@@ -217,7 +217,7 @@ def compare_people(
     )
 
 
-def pair_curves(tests: Sequence[TestUtterance], curves: Sequence[Floats]) -> PairedCurves:
+def pair_curves(tests: Sequence[TestUtterance], curves: Sequence[FloatArray]) -> PairedCurves:
     """Statistics of a method whose z-scored curves (T, 2) are given for each utterance."""
     costs = [
         warping_cost(test.real, made, np.ones(2), round(DTW_BAND_S * test.observation.fps))
@@ -227,9 +227,9 @@ def pair_curves(tests: Sequence[TestUtterance], curves: Sequence[Floats]) -> Pai
 
 
 def _phone_figures(
-    tests: Sequence[TestUtterance], curves: Mapping[str, Sequence[Floats]], heard: Collection[str]
+    tests: Sequence[TestUtterance], curves: Mapping[str, Sequence[FloatArray]], heard: Collection[str]
 ) -> tuple[PhoneFigures, ...]:
-    rows: dict[str, list[Floats]] = {}  # by phone, for each token (1 + methods, 2)
+    rows: dict[str, list[FloatArray]] = {}  # by phone, for each token (1 + methods, 2)
     for at, test in enumerate(tests):
         every = np.stack([test.real, *(values[at] for values in curves.values())])
         labels = _frame_phones(test)
@@ -246,7 +246,7 @@ def _phone_figures(
 
 
 def _heard_correlations(
-    tests: Sequence[TestUtterance], curves: Sequence[Floats], heard: Collection[str]
+    tests: Sequence[TestUtterance], curves: Sequence[FloatArray], heard: Collection[str]
 ) -> tuple[float, float]:
     parts = []
     for test in tests:

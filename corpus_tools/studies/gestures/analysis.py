@@ -35,6 +35,7 @@ from lexicon.values.fields import check_fields
 from tts2face.gestures.stream import GestureFields
 from tts2face.lips.motion_measures import pearson
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
+from tts2face.numeric.arrays import FloatArray
 from tts2face.types import Progress
 
 NEAR, HALF = 1.5, 0.5  # maximum distance of a field, relative to the distance between halves and to that of noise
@@ -42,7 +43,6 @@ CORRELATION_WITHIN = 0.1
 FEWEST = 10  # recordings; with fewer, none is held out
 N_TAKES = 60  # recordings whose distances are the reference of diversity
 
-Doubles = NDArray[np.float64]
 Motion = Mapping[str, NDArray[np.floating]]
 
 
@@ -88,10 +88,10 @@ class TraitComparison:
     """
 
     trait: Trait
-    real: Doubles
-    field: Doubles
-    noise: Doubles
-    published: Doubles
+    real: FloatArray
+    field: FloatArray
+    noise: FloatArray
+    published: FloatArray
     halves: float
     to_field: float
     to_noise: float
@@ -251,7 +251,7 @@ def _blink_rate(motion: Motion, held_out: Style) -> float:
 
 
 def _compare_trait(trait: Trait, held_out: Style, kinds: list[list[Motion]], options: StudyOptions) -> TraitComparison:
-    def values_of(motion: Motion) -> list[Doubles]:
+    def values_of(motion: Motion) -> list[FloatArray]:
         return [trait.of(part) for part in split_recordings(motion[trait.feature], held_out.lengths)]
 
     parts = values_of(kinds[0][0])

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.studies.gestures.measures import Doubles
+from tts2face.numeric.arrays import FloatArray
 
 SHUT = 0.5  # closure from which lids count as shut (as in tts2face.gestures.noise)
 OPEN = 0.2  # closure below which lids count as open; trackers measure about 0.1 for narrowed eyes
@@ -31,14 +31,14 @@ class Blinks:
 
     n: int
     seconds: float
-    intervals: Doubles
-    closing: Doubles
-    opening: Doubles
-    closing_speeds: Doubles
-    opening_speeds: Doubles
+    intervals: FloatArray
+    closing: FloatArray
+    opening: FloatArray
+    closing_speeds: FloatArray
+    opening_speeds: FloatArray
 
     @property
-    def durations(self) -> Doubles:
+    def durations(self) -> FloatArray:
         """(B,) seconds from open to open."""
         return self.closing + self.opening
 
@@ -62,14 +62,14 @@ def find_blinks(shut: NDArray[np.floating], lengths: NDArray[np.int32], fps: flo
     return Blinks(n, seconds, np.concatenate(intervals), closing, opening, closing_speeds, opening_speeds)
 
 
-def blink_onsets(lids: Doubles) -> Doubles:
+def blink_onsets(lids: FloatArray) -> FloatArray:
     """(B,) fractional frames at which lid closures (T,) cross `SHUT` upwards."""
     shut = lids > SHUT
     last = np.flatnonzero(~shut[:-1] & shut[1:])
     return np.asarray(last + (SHUT - lids[last]) / (lids[last + 1] - lids[last]))
 
 
-def _blink_phases(lids: Doubles, fps: float) -> Doubles:
+def _blink_phases(lids: FloatArray, fps: float) -> FloatArray:
     """(B, 4) closing time, opening time, closing speed and opening speed of the blinks within a recording."""
     rows = []
     closed = lids > OPEN

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from corpus_tools.studies.gestures.measures import Doubles
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.face.breathing import BREATH_SHAPE, Breathing
 from tts2face.face.pupils import DILATION, PUPIL_SHAPE, Pupils
 from tts2face.gestures.gaze import microsaccades
 from tts2face.models.palette import GESTURE_FPS
+from tts2face.numeric.arrays import FloatArray
 from tts2face.types import Trajectory
 
 MINUTES = 4
@@ -56,7 +56,7 @@ def measure_body(seed: int) -> tuple[BodyMeasure, ...]:
     )
 
 
-def _channels(phones: PhoneSequence, seed: int) -> Doubles:
+def _channels(phones: PhoneSequence, seed: int) -> FloatArray:
     """(T, 2) breath and pupils with phones."""
     n_frames = round(float(phones.edges[-1]) * GESTURE_FPS)
     motion = Trajectory((BREATH_SHAPE, PUPIL_SHAPE), np.zeros((n_frames, 2), np.float32), float(GESTURE_FPS))
@@ -65,7 +65,7 @@ def _channels(phones: PhoneSequence, seed: int) -> Doubles:
     return moved.values.astype(np.float64)
 
 
-def _breaths(level: Doubles) -> float:
+def _breaths(level: FloatArray) -> float:
     """Breaths a minute: beginnings of a rise."""
     rises = np.diff(level) > RISING
     starts = int((rises[1:] & ~rises[:-1]).sum())

@@ -20,23 +20,21 @@ from tts2face.gestures.prosody import SILENT_PROSODY
 from tts2face.gestures.stream import FIELD_OPTIONS, GestureFields
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
-from tts2face.numeric.arrays import interpolate_cubic
+from tts2face.numeric.arrays import Float32Array, FloatArray, interpolate_cubic
 from tts2face.types import Waveform
 
-Floats = NDArray[np.float32]
 NO_SOUND = Waveform(np.zeros(2, np.float32), 16000)
 MINUTES = 10
 VISITED_AFTER = (1, 3, MINUTES)  # minutes
 LAGS_S = 300  # half of the clip, so that each lag is averaged over at least five minutes
 FROM_S = 5  # shorter lags are within one gesture
-Doubles = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FieldClip:
     """Motion (T, k), and the recorded moment (T',) of each frame of the field."""
 
-    values: Floats
+    values: Float32Array
     moments: NDArray[np.int64]
 
 
@@ -61,7 +59,7 @@ def hold_out(style: Style, one_in: int, seed: int) -> tuple[Style, Style]:
 def select_recordings(style: Style, chosen: NDArray[np.int64]) -> Style:
     """A style of some of its recordings, in that order."""
 
-    def select(values: Floats) -> Floats:
+    def select(values: Float32Array) -> Float32Array:
         parts = split_recordings(values, style.lengths)
         return np.concatenate([parts[at] for at in chosen])
 
@@ -79,7 +77,7 @@ def replace_style(palette: Palette, name: str, style: Style) -> Palette:
     return replace(palette, styles={**palette.styles, name: style})
 
 
-def field_clip(fields: GestureFields, style: str, feature: str, intensity: Floats, seed: int) -> FieldClip:
+def field_clip(fields: GestureFields, style: str, feature: str, intensity: Float32Array, seed: int) -> FieldClip:
     """A feature of a style, measured or derived, for an intensity (T,) at `GESTURE_FPS`."""
     source, tempo = fields.source(style, feature), fields.change(style, feature).tempo
     field = fields.of(source, feature)
@@ -94,7 +92,7 @@ def field_clip(fields: GestureFields, style: str, feature: str, intensity: Float
     return FieldClip(fields.apply_change(style, feature, values), sample.moments[: round(len(intensity) * tempo)])
 
 
-def published_clip(palette: Palette, style: str, intensity: Floats, seed: int) -> Mapping[str, Floats]:
+def published_clip(palette: Palette, style: str, intensity: Float32Array, seed: int) -> Mapping[str, Float32Array]:
     """All features of a measured style by the published fields (`tts2face.gestures.stream`), each as `field_clip`."""
     fields = GestureFields(palette, FIELD_OPTIONS["ju2008"])
     features = tuple(palette.styles[style].motion)
@@ -103,7 +101,7 @@ def published_clip(palette: Palette, style: str, intensity: Floats, seed: int) -
         return dict(zip(features, clips, strict=True))
 
 
-def noise_clip(fields: GestureFields, style: str, n_frames: int, seed: int) -> Mapping[str, Floats]:
+def noise_clip(fields: GestureFields, style: str, n_frames: int, seed: int) -> Mapping[str, Float32Array]:
     """All features of a style from noise, which does not depend on the sound."""
     stream = NoiseStream(fields, style=style, seed=seed, fps=GESTURE_FPS)
     return stream.next(NO_SOUND, n_frames, Timeline())
@@ -113,9 +111,9 @@ def noise_clip(fields: GestureFields, style: str, n_frames: int, seed: int) -> M
 class Repetition:
     """(L,) highest autocorrelation in each second of lag: recordings in random order, speech, silence."""
 
-    real: Doubles
-    speech: Doubles
-    silence: Doubles
+    real: FloatArray
+    speech: FloatArray
+    silence: FloatArray
 
     @property
     def highest(self) -> tuple[float, float, float]:
@@ -165,7 +163,7 @@ def _shuffle_recordings(
     return np.resize(whole, (n_frames, *whole.shape[1:])) if len(whole) < n_frames else whole[:n_frames]
 
 
-def _highest_per_second(values: NDArray[np.float32]) -> Doubles:
+def _highest_per_second(values: NDArray[np.float32]) -> FloatArray:
     a_second = round(GESTURE_FPS)
     found = autocorrelation(values, LAGS_S * a_second - 1)
     return np.asarray(found.reshape(LAGS_S, a_second).max(axis=1))

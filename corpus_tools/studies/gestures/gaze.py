@@ -6,7 +6,6 @@ from itertools import combinations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from corpus_tools.training.gaze_recordings import (
     Fixations,
@@ -20,11 +19,10 @@ from tts2face.gestures.gaze import GazeProcess
 from tts2face.gestures.presentation import FrameContext
 from tts2face.models.gaze import LISTENING, STATES, GazeModel, load_gaze
 from tts2face.models.palette import GESTURE_FPS
+from tts2face.numeric.arrays import FloatArray
 
 MINUTES = 10  # of each made person in each state
 FEWEST = 5  # complete looks or jumps of a person who is compared
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

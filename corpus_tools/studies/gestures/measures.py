@@ -12,9 +12,10 @@ from scipy.signal import welch
 from scipy.spatial.distance import cdist
 from scipy.stats import wasserstein_distance
 
+from tts2face.numeric.arrays import FloatArray
+
 FAST_HZ = 6.0  # motion of head or brows above this is perceived as trembling
 SEGMENT = 64  # frames of a spectrum's window: 2.1 s, which a recording of 3 s holds
-Doubles = NDArray[np.float64]
 Motion = NDArray[np.floating]
 Lengths = NDArray[np.int32]
 
@@ -40,8 +41,8 @@ def random_halves(n: int, n_times: int, generator: np.random.Generator) -> Itera
 class Spectrum:
     """Power (F,) of frequencies (F,) in Hz: squared units per Hz, summed over the channels."""
 
-    hz: Doubles
-    power: Doubles
+    hz: FloatArray
+    power: FloatArray
 
     @property
     def fast_power(self) -> float:
@@ -51,7 +52,7 @@ class Spectrum:
 
 def spectrum(values: Motion, lengths: Lengths, fps: float) -> Spectrum:
     """Mean power spectrum of the recordings without their means (Welch 1967; Hann windows of `SEGMENT` frames)."""
-    total: Doubles | None = None
+    total: FloatArray | None = None
     hz: Motion = np.zeros(0)
     used = 0
     for part in split_recordings(values, lengths):
@@ -72,7 +73,7 @@ def ratio(value: float, other: float) -> float:
     return value / other if other else float("nan")
 
 
-def frame_midpoints(values: Motion, lengths: Lengths) -> Doubles:
+def frame_midpoints(values: Motion, lengths: Lengths) -> FloatArray:
     """(T - R,) means of neighbouring frames of (T,): values at the instants of finite differences."""
     return np.concatenate([(part[1:] + part[:-1]) / 2.0 for part in split_recordings(values, lengths)])
 
@@ -103,7 +104,7 @@ def coverage(shown: NDArray[np.int64], lengths: Lengths, within: int) -> float:
     return float(visited.mean())
 
 
-def autocorrelation(values: Motion, most: int) -> Doubles:
+def autocorrelation(values: Motion, most: int) -> FloatArray:
     """(most + 1,) autocorrelation of a clip at lags of 0 to `most` frames, over all channels; 1 at lag 0.
 
     Close to 1 at the period of a repetition. Each lag is averaged over its number of frame pairs.

@@ -14,6 +14,7 @@ from corpus_tools.studies.gestures.blinks import find_blinks
 from lexicon.errors import BackendError, InputError
 from lexicon.values.fields import check_fields
 from tts2face.models.palette import Palette
+from tts2face.numeric.arrays import FloatArray
 from tts2face.picture.options import Picture
 from tts2face.session.session import Session
 from tts2face.types import Progress
@@ -28,8 +29,6 @@ SENTENCES = (
 )
 LEAST_SPREAD = 0.01  # added to the spread of scores within a mood, so that constant scores do not decide
 SHUT_SHAPES, SMILE_SHAPES = ("eyeBlinkLeft", "eyeBlinkRight"), ("mouthSmileLeft", "mouthSmileRight")
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,14 +92,14 @@ class MoodClip:
         Three frames of the clip.
     """
 
-    scores: Floats
-    smile: Floats
+    scores: FloatArray
+    smile: FloatArray
     blinks_per_minute: float
     yaw_spread_deg: float
     frames: NDArray[np.uint8]
 
     @property
-    def features(self) -> Floats:
+    def features(self) -> FloatArray:
         """(104,) mean and standard deviation of each score over the clip."""
         return np.concatenate([self.scores.mean(axis=0), self.scores.std(axis=0)])
 
@@ -220,7 +219,7 @@ def _confusions(
     return confusion_matrix(training, testing), confusion_matrix(training_frames, testing_frames)
 
 
-def confusion_matrix(training: Sequence[Floats], testing: Sequence[Floats]) -> NDArray[np.int64]:
+def confusion_matrix(training: Sequence[FloatArray], testing: Sequence[FloatArray]) -> NDArray[np.int64]:
     """Confusion (M, M) of a nearest-mean classifier of M classes.
 
     Parameters

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from corpus_tools.studies.gestures.blinks import Blinks, find_blinks
-from corpus_tools.studies.gestures.measures import Doubles, Motion
+from corpus_tools.studies.gestures.measures import Motion
 from tts2face.gestures.stream import style_median
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
+from tts2face.numeric.arrays import FloatArray
 
 IN_DEGREES = 180.0 / np.pi
 INTERVALS = "blink interval"
@@ -24,10 +25,10 @@ class Trait:
     name: str
     unit: str
     feature: str
-    of: Callable[[Motion], Doubles]
+    of: Callable[[Motion], FloatArray]
     has_target: bool = False
 
-    def values_of(self, parts: Sequence[Motion]) -> Doubles:
+    def values_of(self, parts: Sequence[Motion]) -> FloatArray:
         """Values of all recordings."""
         return np.concatenate([self.of(part) for part in parts]) if len(parts) else np.zeros(0)
 
@@ -44,11 +45,11 @@ def style_traits(palette: Palette, style: Style) -> tuple[Trait, ...]:
     return tuple(found)
 
 
-def _blink_trait(value: Callable[[Blinks], Doubles]) -> Callable[[Motion], Doubles]:
+def _blink_trait(value: Callable[[Blinks], FloatArray]) -> Callable[[Motion], FloatArray]:
     return lambda part: value(find_blinks(part, np.array([len(part)], np.int32), GESTURE_FPS))
 
 
-BLINKS: tuple[tuple[str, str, Callable[[Motion], Doubles]], ...] = (
+BLINKS: tuple[tuple[str, str, Callable[[Motion], FloatArray]], ...] = (
     (INTERVALS, "s", _blink_trait(lambda found: found.intervals)),
     ("blink duration", "s", _blink_trait(lambda found: found.durations)),
     ("closing time", "s", _blink_trait(lambda found: found.closing)),
@@ -58,7 +59,7 @@ BLINKS: tuple[tuple[str, str, Callable[[Motion], Doubles]], ...] = (
 )
 
 
-def _motion_traits(palette: Palette, feature: str, middle: Doubles) -> list[Trait]:
+def _motion_traits(palette: Palette, feature: str, middle: FloatArray) -> list[Trait]:
     """Speed and amplitude of a feature in display units."""
     display, unit = display_units(palette, feature)
     if feature == "brows":

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import check_any_kept, observe
@@ -21,6 +20,7 @@ from tts2face.lips.retargeting import BILABIALS
 from tts2face.models.face import Face
 from tts2face.models.landmarks import inner_lip_gaps, lip_opening, lip_width
 from tts2face.models.score_map import SCORE_SHAPES, mouth_scores
+from tts2face.numeric.arrays import FloatArray
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
 from tts2face.types import Progress, Trajectory
@@ -35,8 +35,6 @@ LEAST_TOKENS = 5  # of a phone that is judged
 TOLERANCE = 0.06  # largest difference of two mean scores that counts as equal
 CLOSED_MM = 0.3  # largest gap of closed lips
 SCORES = tuple(SCORE_SHAPES)
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,20 +6,19 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from corpus_tools.studies.plots import FIRST, INK, RULE, SECOND, SOFT, Plot, Tip, draw_svg
 from corpus_tools.studies.similarity.analysis import Analysis, TableComparison
 from corpus_tools.studies.similarity.mantel import upper_triangle
 from corpus_tools.studies.similarity.tables import cluster_tree, phone_label
 from lexicon.phones import look_up_phone
+from tts2face.numeric.arrays import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
-Floats = NDArray[np.float64]
 CELL = 20  # px of a heat map
 TREE, LABEL, MARGIN = 170, 62, 14  # px: width of the dendrogram, room for "tʃ CH", border
 HEAD, FOOT = 30, 74  # px: the title above, the scales below
@@ -42,16 +41,16 @@ class TableFigure:
 
     title: str
     names: tuple[str, ...]
-    values: Floats
+    values: FloatArray
     colours: str
     limits: tuple[float, float]
     scale: str
     blocks: tuple[int, ...] = ()
-    joins: Floats | None = None
+    joins: FloatArray | None = None
     cut: float | None = None
 
 
-def tree_joins(links: Floats) -> Floats:
+def tree_joins(links: FloatArray) -> FloatArray:
     """(P - 1, 4, 2) corners (height, row) of a tree's brackets; the phone of rank r is at row r."""
     from scipy.cluster.hierarchy import dendrogram
 
@@ -139,7 +138,7 @@ def draw_table(figure: "Figure", table: TableFigure) -> list[Tip]:
     ]
 
 
-def _draw_tree(axes: "Axes", joins: Floats, cut: float | None) -> None:
+def _draw_tree(axes: "Axes", joins: FloatArray, cut: float | None) -> None:
     """Draw a dendrogram with its root to the left."""
     from matplotlib.collections import LineCollection
 
@@ -195,7 +194,7 @@ def articulation_svg(analysis: Analysis, labels: str) -> str:
     return draw_svg(draw, *SIZE, "similarity over articulatory distance")
 
 
-def shares_svg(names: Sequence[str], shares: Floats) -> str:
+def shares_svg(names: Sequence[str], shares: FloatArray) -> str:
     """Shares from 0 to 1 as named bars, each with its number."""
 
     def draw(figure: "Figure") -> None:
@@ -209,7 +208,7 @@ def shares_svg(names: Sequence[str], shares: Floats) -> str:
     return draw_svg(draw, SIZE[0], 50 + 22 * len(names), "share of each movement that the phones do not explain")
 
 
-def freedom_svg(rows: Sequence[str], columns: Sequence[str], values: Floats) -> str:
+def freedom_svg(rows: Sequence[str], columns: Sequence[str], values: FloatArray) -> str:
     """(R, K) spread within phones over that of all speech as coloured cells with their numbers."""
 
     def draw(figure: "Figure") -> None:

@@ -5,7 +5,6 @@ suffices: no recordings of the base's speakers are needed (docs/decisions/131-ba
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from corpus_tools.training.pooling.lip_features import parameter_features
 from corpus_tools.training.pooling.speech import SILENCE_KEPT_S, PooledSpeech
@@ -17,6 +16,7 @@ from lexicon.sequence import PhoneSequence
 from tts2face.lips.targets import build_targets, target_phones
 from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import Talker
+from tts2face.numeric.arrays import FloatArray
 from tts2face.types import Progress, frame_count
 
 N_PHRASES = 500  # about half an hour of speech: as much as the lip tracks of decision 124
@@ -33,7 +33,6 @@ TEMPI = (0.75, 1.25)  # factors of nominal durations, one for each phrase
 DURATION_SPREAD = 0.25  # standard deviation of the logarithm of single durations
 EDGE_SILENCE_S = 0.3
 FPS = 25.0
-Floats = NDArray[np.float64]
 
 
 def base_speech(base: Talker, *, on_progress: Progress | None = None) -> tuple[PooledSpeech, ...]:
@@ -82,6 +81,6 @@ def english_phrases(n_phrases: int) -> tuple[PhoneSequence, ...]:
     return tuple(phrases)
 
 
-def _network_features(base: Talker, network: PhoneNetwork, phones: PhoneSequence, times: Floats) -> Floats:
+def _network_features(base: Talker, network: PhoneNetwork, phones: PhoneSequence, times: FloatArray) -> FloatArray:
     shown = target_phones(build_targets(phones, network.inventory))
     return parameter_features(network.parameters(shown, times), base.model)

@@ -20,6 +20,7 @@ from corpus_tools.training.network_training import (
 from lexicon.errors import DataError
 from lexicon.phones import look_up_phone
 from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.numeric.arrays import FloatArray
 from tts2face.numeric.kernels import kernel
 
 RATE_HZ = 50  # of the alignment
@@ -43,14 +44,13 @@ DURATIONS_S = {
     "plosive": 0.065, "voiceless fricative": 0.09, "other": 0.06,
 }  # fmt: skip
 LAX_VOWELS = frozenset("ɪʊʌɛɚ")
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LipSpeech:
     """z-scored features (T, F) at `RATE_HZ` and the phones in time."""
 
-    features: Floats
+    features: FloatArray
     phones: PhoneSequence
 
 
@@ -64,11 +64,11 @@ class PartModel:
     weights: Weights
     table: NDArray[np.float32]
     inventory: tuple[str, ...]
-    precision: Floats
-    log_determinant: Floats
+    precision: FloatArray
+    log_determinant: FloatArray
 
 
-def alignment_features(features: Floats, fps: float) -> Floats:
+def alignment_features(features: FloatArray, fps: float) -> FloatArray:
     """(U, 10) features and velocities at `RATE_HZ` of z-scored features (T, 8)."""
     from scipy.interpolate import CubicSpline
 
@@ -130,14 +130,14 @@ def _contexts(labels: NDArray[np.integer], silence: int) -> NDArray[np.int32]:
 
 
 def align_phones(
-    features: Floats,
+    features: FloatArray,
     labels: Sequence[str],
     is_optional: NDArray[np.bool_],
-    expected: Floats,
+    expected: FloatArray,
     model: PartModel,
     *,
     speaker: int,
-) -> tuple[Floats, float]:
+) -> tuple[FloatArray, float]:
     """End of each phone in seconds, near its expected one, and the cost of the alignment per frame."""
     means = _part_means(labels, is_optional, model, speaker)
     n_frames = len(features)
@@ -175,7 +175,7 @@ def typical_duration(label: str) -> float:
     return DURATIONS_S["voiceless fricative" if is_hissed else "other"]
 
 
-def _part_means(labels: Sequence[str], is_optional: NDArray[np.bool_], model: PartModel, speaker: int) -> Floats:
+def _part_means(labels: Sequence[str], is_optional: NDArray[np.bool_], model: PartModel, speaker: int) -> FloatArray:
     """(N, 3, F) means; the context of a phone skips optional silences."""
     number = {label: at for at, label in enumerate(model.inventory)}
     coded = np.array([number[label] for label in labels])
@@ -194,13 +194,13 @@ def _part_means(labels: Sequence[str], is_optional: NDArray[np.bool_], model: Pa
 
 
 def _window_costs(
-    features: Floats,
-    means: Floats,
+    features: FloatArray,
+    means: FloatArray,
     silent: NDArray[np.bool_],
     low: NDArray[np.integer],
     high: NDArray[np.integer],
     model: PartModel,
-) -> Floats:
+) -> FloatArray:
     """(N, 3, W) cumulative costs of the frames from `MAX_SILENCE` before each window on."""
     width = int((high - low).max()) + MAX_SILENCE + 1
     costs = np.zeros((*means.shape[:2], width + 1))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from corpus_tools.training.ridge import fit_ridge
 from tts2face.models.landmarks import CHIN, EYE_OUTER_LEFT, EYE_OUTER_RIGHT
 from tts2face.models.talker import ShapeModel
+from tts2face.numeric.arrays import FloatArray
 
 FEATURES = (
     "opening", "width", "lip height", "chin", "upper lip", "lower lip", "inner width", "corner height",
@@ -20,10 +21,9 @@ EYE_SIGMA_S = 0.4  # smoothing of the eye distance: dlib's landmarks jitter by 1
 ROLL_SIGMA_S = 0.04  # of the roll of the head
 POSE_SIGMA_S = 0.12  # of the terms of the head pose
 JITTER_SIGMA_S = 0.024  # of the features, against the same jitter; lips move below 8 Hz in these recordings
-Floats = NDArray[np.float64]
 
 
-def landmark_features(landmarks: NDArray[np.floating], neutral: NDArray[np.floating]) -> Floats:
+def landmark_features(landmarks: NDArray[np.floating], neutral: NDArray[np.floating]) -> FloatArray:
     """(T, 8) `FEATURES` of pose-free landmarks (T, 478, 3); heights are relative to the head, not to the nose.
 
     ``neutral`` (478, 3) gives the distance of the eyes.
@@ -31,7 +31,7 @@ def landmark_features(landmarks: NDArray[np.floating], neutral: NDArray[np.float
     eyes = float(np.sqrt(np.square(neutral[EYE_OUTER_RIGHT] - neutral[EYE_OUTER_LEFT], dtype=np.float64).sum()))
     y = -landmarks[..., 1].astype(np.float64) / eyes
 
-    def distance(first: int, other: int) -> Floats:
+    def distance(first: int, other: int) -> FloatArray:
         return np.asarray(np.linalg.norm(landmarks[:, first] - landmarks[:, other], axis=1) / eyes, np.float64)
 
     opening = (y[:, 14] - y[:, 13] + y[:, 87] - y[:, 82] + y[:, 317] - y[:, 312]) / 3
@@ -42,7 +42,7 @@ def landmark_features(landmarks: NDArray[np.floating], neutral: NDArray[np.float
     return np.stack(columns, axis=1)
 
 
-def parameter_features(parameters: NDArray[np.floating], model: ShapeModel) -> Floats:
+def parameter_features(parameters: NDArray[np.floating], model: ShapeModel) -> FloatArray:
     """(T, 8) `FEATURES` of shape parameters (T, m) of the first m modes of a model.
 
     Summed mode by mode instead of with BLAS, so that networks learnt from them have the same bytes with any number of
@@ -56,7 +56,7 @@ def parameter_features(parameters: NDArray[np.floating], model: ShapeModel) -> F
     return landmark_features(points, model.mean)
 
 
-def track_features(points: NDArray[np.floating], fps: float) -> Floats:
+def track_features(points: NDArray[np.floating], fps: float) -> FloatArray:
     """(T, 8) `FEATURES` of dlib's points (T, 68, 2) without roll, head pose, jitter and slow drift; means are about 0.
 
     Head pose is removed by a regression on the positions of nose, cheeks and eyes, which speech hardly moves.
@@ -76,7 +76,7 @@ def track_features(points: NDArray[np.floating], fps: float) -> Floats:
     return steady - _smooth(steady, DRIFT_SIGMA * DRIFT_S * fps)
 
 
-def _upright_points(points: Floats, fps: float) -> tuple[Floats, Floats]:
+def _upright_points(points: FloatArray, fps: float) -> tuple[FloatArray, FloatArray]:
     """(T, 68, 2) points about the eyes in units of their distance, eyes level; (T,) distances in pixels."""
     from scipy.ndimage import median_filter
 
@@ -88,7 +88,7 @@ def _upright_points(points: Floats, fps: float) -> tuple[Floats, Floats]:
     return np.stack([cos * x + sin * y, cos * y - sin * x], axis=2) / eyes[:, None, None], eyes
 
 
-def _pose_terms(placed: Floats, eyes: Floats, fps: float) -> Floats:
+def _pose_terms(placed: FloatArray, eyes: FloatArray, fps: float) -> FloatArray:
     bridge = placed[:, 30] - placed[:, 27]
     cheeks = placed[:, 16, 0] + placed[:, 0, 0]
     terms = np.stack([*placed[:, 33].T, *bridge.T, cheeks, np.log(eyes)], axis=1)
@@ -97,7 +97,7 @@ def _pose_terms(placed: Floats, eyes: Floats, fps: float) -> Floats:
     return np.concatenate([terms, terms**2, terms[:, :1] * terms[:, 1:2]], axis=1)
 
 
-def _smooth(values: Floats, sigma: float) -> Floats:
+def _smooth(values: FloatArray, sigma: float) -> FloatArray:
     from scipy.ndimage import gaussian_filter1d
 
     return np.asarray(gaussian_filter1d(values, sigma, axis=0))

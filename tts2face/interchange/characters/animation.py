@@ -11,7 +11,7 @@ from lexicon.errors import InputError
 from tts2face.face.landmarks import landmark_motion
 from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES
 from tts2face.interchange.characters.binding import character_file, read_binding
-from tts2face.interchange.characters.bone_tracks import BoneTracks, FloatArray, Track
+from tts2face.interchange.characters.bone_tracks import BoneTracks, Track
 from tts2face.interchange.characters.character import Character, MorphTarget
 from tts2face.interchange.characters.gltf_reader import read_gltf_character
 from tts2face.interchange.characters.head_mesh import mapped_targets, source_weights
@@ -20,6 +20,7 @@ from tts2face.interchange.gltf.nodes import NodeTree, read_nodes
 from tts2face.interchange.gltf.reader import GltfFile, read_gltf
 from tts2face.interchange.gltf.writer import GlbWriter
 from tts2face.models.face import Face
+from tts2face.numeric.arrays import FloatArray
 from tts2face.numeric.least_squares import bounded_least_squares
 from tts2face.storage.files import write_atomically
 from tts2face.storage.output_paths import refuse_overwriting

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.interchange.characters.character import MASK, OPAQUE, Material
+from tts2face.numeric.arrays import FloatArray
 from tts2face.picture.kernels.tones import encoding_table, linear_light
 
 MAX_ATLAS_SIDE = 4096  # pixels
@@ -15,8 +16,6 @@ CLEAR, FULL = 32, 224  # of 255: pixels with less coverage count as holes, with 
 LEVELS = (0.3, 0.55, 0.8, 1.0)  # opacities in which translucent triangles are drawn
 CUTOUT = 2.0  # opacity of triangles that are drawn where the coverage of the texture is
 TABLE_STEPS = 4096
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,7 +1,6 @@
 """Rotations of the neck, head and eye bones of a character's file, as tracks of an animation."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tts2face.face.deformation import head_rotation, rotation_matrix
 from tts2face.interchange.characters.binding import CharacterBinding
@@ -10,10 +9,9 @@ from tts2face.interchange.gltf.nodes import NodeTree
 from tts2face.interchange.gltf.reader import GltfFile
 from tts2face.interchange.gltf.writer import GlbWriter
 from tts2face.models.face import Face
-from tts2face.numeric.arrays import continuous_quaternions, matrix_quaternion
+from tts2face.numeric.arrays import FloatArray, continuous_quaternions, matrix_quaternion
 from tts2face.types import Trajectory
 
-FloatArray = NDArray[np.float64]
 Track = tuple[int, str, FloatArray]  # node, path and rows of an animation
 HEAD_NODE = "tts2face_head"
 # Share of the head's rotation that the neck bone takes, a convention of character rigs. The spine below the second

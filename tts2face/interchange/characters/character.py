@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from tts2face.numeric.arrays import FloatArray, IntArray
+
 OPAQUE = "OPAQUE"
 MASK = "MASK"
 BLEND = "BLEND"

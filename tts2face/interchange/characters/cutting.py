@@ -3,10 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-IntArray = NDArray[np.int64]
-FloatArray = NDArray[np.float64]
+from tts2face.numeric.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,7 +10,7 @@ from tts2face.face.expressions import GAZE_SHAPES
 from tts2face.face.shape_transfer import default_head
 from tts2face.interchange.characters.character import Character
 from tts2face.interchange.characters.head_mesh import LEFT_EYE, RIGHT_EYE, HeadMesh
-from tts2face.numeric.arrays import connected_pieces
+from tts2face.numeric.arrays import FloatArray, connected_pieces
 
 BLINKS = {LEFT_EYE: "eyeBlinkLeft", RIGHT_EYE: "eyeBlinkRight"}
 SIDE_NAMES = {LEFT_EYE: "Left", RIGHT_EYE: "Right"}
@@ -19,8 +19,6 @@ MAX_ROUNDNESS_ERROR = 0.12  # standard deviation of the distance from the centre
 MIN_VERTICES = 20
 LID_REACH = 1.0  # radii between the centre of an eyeball and the middle of the vertices that its lid moves, in x and y
 MOVED_BY_SHAPES = 0.02  # of the radius: a gaze shape that moves an eyeball's vertices further turns it itself
-
-FloatArray = NDArray[np.float64]
 
 
 def mark_eyeballs(head: HeadMesh, character: Character) -> HeadMesh:

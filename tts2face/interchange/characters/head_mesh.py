@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from tts2face.interchange.characters.character import Character, MaterialPiece, MorphTarget
-from tts2face.interchange.characters.cutting import FloatArray, IntArray, cut_triangles
+from tts2face.interchange.characters.cutting import cut_triangles
 from tts2face.interchange.characters.shapes import ShapeMapping, ShapeSource
-from tts2face.numeric.arrays import ordered_product, smoothstep
+from tts2face.numeric.arrays import FloatArray, IntArray, ordered_product, smoothstep
 
 MOVED_SHARE = 0.1  # of a shape's largest displacement: vertices that it clearly moves
 NECK_SHARE = 0.55  # of the height of the moved face: length of neck kept below it

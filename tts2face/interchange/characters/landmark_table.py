@@ -7,10 +7,10 @@ import numpy as np
 
 from lexicon.errors import DataError, InputError
 from lexicon.values.files import read_text
-from tts2face.interchange.characters.landmarks import FloatArray
 from tts2face.models.landmarks import (
     N_LANDMARKS,
 )
+from tts2face.numeric.arrays import FloatArray
 
 COLUMNS = ("landmark", "x", "y", "z")
 MAX_TABLE_BYTES = 1_000_000

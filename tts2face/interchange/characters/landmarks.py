@@ -17,6 +17,7 @@ from tts2face.models.landmarks import (
     N_LANDMARKS,
     N_MESH_LANDMARKS,
 )
+from tts2face.numeric.arrays import FloatArray
 from tts2face.picture.camera import camera_matrices
 from tts2face.picture.kernels.lamps import lamp_directions, light_table
 from tts2face.picture.options import Picture
@@ -33,7 +34,6 @@ OPENINGS = (0.5, 0.8)  # weights of the opening shape at which the inner lips ar
 OPENING_SHAPES = ("jawOpen", f"{VISEME_PREFIX}aa", f"{VISEME_PREFIX}oh")
 SKIN, EYES = "skin", "eyes"  # beginnings of the names of parts on which landmarks lie
 BEHIND_LIPS = ("teeth", "tongue")  # not in the views: the tracker reads the upper teeth as a part of the lip
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

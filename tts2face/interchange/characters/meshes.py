@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from tts2face.interchange.characters.character import (
@@ -15,14 +14,13 @@ from tts2face.interchange.characters.character import (
 from tts2face.interchange.gltf.fields import Fields
 from tts2face.interchange.gltf.nodes import NodeTree
 from tts2face.interchange.gltf.reader import DRACO, GltfFile
+from tts2face.numeric.arrays import FloatArray, IntArray
 
 TRIANGLES = 4
 STRIP = 5
 FAN = 6
 MAX_VERTICES = 2_000_000  # of all meshes; a film character has 200,000
 MAX_TARGETS = 1000  # morph targets of a mesh
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 def read_pieces(file: GltfFile, tree: NodeTree) -> Iterator[MaterialPiece]:

@@ -10,11 +10,11 @@ from lexicon.errors import DataError
 from tts2face.interchange.characters.character import Character, Material, MaterialPiece, MorphTarget
 from tts2face.interchange.characters.landmark_table import MAX_COORDINATE
 from tts2face.interchange.characters.obj_materials import read_libraries, read_lines
+from tts2face.numeric.arrays import FloatArray
 
 NEUTRAL = "neutral.obj"
 MAX_OBJ_VERTICES = 500_000
 MAX_SHAPES = 500
-FloatArray = NDArray[np.float64]
 
 
 def read_obj_folder(folder: Path) -> Character:

@@ -19,6 +19,7 @@ from tts2face.models.landmarks import (
     OUTER_LIP_UPPER,
 )
 from tts2face.models.light import Photographed
+from tts2face.numeric.arrays import Pixels
 from tts2face.picture.camera import camera_matrices
 from tts2face.picture.options import STUDIO, Picture
 from tts2face.picture.provenance import png_labels
@@ -42,7 +43,6 @@ OPEN_WEIGHT = 0.5  # of the opening shape in the second picture of the preview
 SHOWN_OPENING_SHAPES = ("jawOpen", f"{VISEME_PREFIX}aa")
 WALL = "#8a8f98"
 PAPER, INK = (245, 245, 243), (20, 20, 20)
-Pixels = NDArray[np.uint8]
 
 
 def draw_preview(face: Face) -> Pixels:

@@ -13,6 +13,7 @@ from tts2face.interchange.characters.character import OPAQUE, Character, Materia
 from tts2face.interchange.characters.eyeballs import eyeball_centres, fit_sphere, gaze_turns
 from tts2face.interchange.characters.head_mesh import LEFT_EYE, RIGHT_EYE, HeadMesh
 from tts2face.models.face import VERTEX_COLOURS, Eye, Face, FacePart, Texture
+from tts2face.numeric.arrays import FloatArray
 
 # Highlights and softness of materials by kind, as on the default head: specular, shininess, wrap.
 SHADING = {
@@ -48,7 +49,6 @@ IRIS_RAD, PUPIL_RAD = 0.50, 0.20  # angles of plain irises and pupils from the l
 IRIS, PUPIL = (86, 104, 96), (18, 16, 16)  # sRGB
 MIN_BALL_VERTICES = 12  # of an eyeball that is painted
 UNPAINTED = 0.9  # least linear value of each channel of a white material
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

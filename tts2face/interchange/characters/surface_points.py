@@ -6,10 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from tts2face.numeric.arrays import FloatArray, IntArray
 from tts2face.picture.camera import CameraMatrices
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # A ray that passes a vertex at up to 3 mm, at least 12 mm before its hit, hits the vertex: it passed an outline; at up
 # to 10 mm where the hit is 30 mm behind, as the neck is behind the chin.

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.interchange.exports.parts import Float32Array, Target
+from tts2face.interchange.exports.parts import Target
 from tts2face.models.face import Face
+from tts2face.numeric.arrays import Float32Array
 from tts2face.numeric.least_squares import bounded_least_squares
 
 # ARFaceAnchor.BlendShapeLocation, in the order of the columns of Live Link Face.

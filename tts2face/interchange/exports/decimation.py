@@ -11,14 +11,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import FloatArray, IntArray
+
 N_SPACE = 3  # first numbers of a point: its place
 SHARE_OF_PASS = 0.35  # of the vertices with the least errors, from which a pass chooses
 LEAST_TURN_COS = 0.35  # of a triangle's normal: more than 70 degrees folds the surface
 LEAST_QUALITY = 0.06  # of a triangle: 1 has equal sides, 0 is a line
 LENGTH_SHARE = 1e-4  # of an edge's squared length in its error, so that plane regions keep compact triangles
 MAX_PASSES = 80
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 class _Quadrics(NamedTuple):

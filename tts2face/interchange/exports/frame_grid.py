@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lexicon.errors import InputError
-from tts2face.interchange.exports.parts import Float32Array, Part
-from tts2face.numeric.arrays import interpolate_rows
+from tts2face.interchange.exports.parts import Part
+from tts2face.numeric.arrays import Float32Array, interpolate_rows
 from tts2face.types import HEAD_CHANNELS, Clip, exact_rate, first_sample, frame_count
 
 if TYPE_CHECKING:

@@ -6,7 +6,8 @@ import numpy as np
 
 from tts2face.interchange.exports.arkit import ARKIT_SHAPES, build_arkit_projection
 from tts2face.interchange.exports.frame_grid import frame_rows
-from tts2face.interchange.exports.parts import Float32Array, Part, Target
+from tts2face.interchange.exports.parts import Part, Target
+from tts2face.numeric.arrays import Float32Array
 from tts2face.types import HEAD_CHANNELS
 from tts2face.video.livelink import TIMECODE_RATES
 

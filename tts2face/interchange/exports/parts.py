@@ -14,16 +14,12 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TextIO
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tts2face.interchange.exports.table import sound_name
+from tts2face.numeric.arrays import Float32Array
 from tts2face.types import Clip
 
 if TYPE_CHECKING:
     from tts2face.models.face import Face
-
-Float32Array = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.face.deformation import head_share
-from tts2face.interchange.exports.parts import Float32Array
 from tts2face.models.face import Face
-from tts2face.numeric.arrays import quaternion_product, rotation_quaternions
+from tts2face.numeric.arrays import Float32Array, quaternion_product, rotation_quaternions
 from tts2face.types import HEAD_CHANNELS
 
 ROOT, HEAD = 0, 1  # the first two joints; the eyes follow

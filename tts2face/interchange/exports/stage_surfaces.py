@@ -3,9 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.interchange.exports.decimation import N_SPACE, FloatArray, decimate
+from tts2face.interchange.exports.decimation import N_SPACE, decimate
 from tts2face.interchange.exports.surfaces import ExportSurface, divide_surface
 from tts2face.models.face import Face
+from tts2face.numeric.arrays import FloatArray
 from tts2face.picture.light_fields import N_HARMONICS
 from tts2face.picture.materials import EYE_KIND, SKIN, STRANDS
 

@@ -5,13 +5,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from tts2face.interchange.gltf.fields import Fields
-from tts2face.numeric.arrays import quaternion_matrix
-
-FloatArray = NDArray[np.float64]
+from tts2face.numeric.arrays import FloatArray, quaternion_matrix
 
 MAX_NODES = 100_000
 BONES = ("head", "neck", "leftEye", "rightEye")

@@ -21,6 +21,7 @@ from lexicon.values.json_text import parse_json
 from tts2face.interchange.gltf.container import ALIGNMENT, BINARY_CHUNK, JSON_CHUNK, MAGIC
 from tts2face.interchange.gltf.fields import MISSING, Fields
 from tts2face.interchange.gltf.meshopt import EXPONENTIAL, NO_FILTER, apply_exponential_filter, decode_buffer
+from tts2face.numeric.arrays import FloatArray
 
 MAX_FILE_BYTES = 512_000_000  # a film character with 4k textures has about 100 MB
 MAX_DECODED_BYTES = 1_000_000_000  # of all compressed or sparse arrays of a file
@@ -46,8 +47,6 @@ READABLE = (
     "VRMC_node_constraint", "KHR_lights_punctual", "KHR_node_visibility",
 )  # fmt: skip
 MATERIAL_EXTENSION = "KHR_materials_"
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(slots=True, eq=False)

@@ -4,14 +4,11 @@ import copy
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tts2face.interchange.gltf.container import COMPONENTS, TYPES, GltfBuffer
 from tts2face.interchange.gltf.nodes import local_matrix
 from tts2face.interchange.gltf.reader import MESHOPT, GltfFile
-from tts2face.numeric.arrays import matrix_quaternion
-
-FloatArray = NDArray[np.float64]
+from tts2face.numeric.arrays import FloatArray, matrix_quaternion
 
 
 class GlbWriter:

@@ -1,19 +1,17 @@
 """A photographed person before a background: the cover of the picture moves with it."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.models.baked_light import BakedLight
 from tts2face.models.photo_view import PhotoView
+from tts2face.numeric.arrays import Array
 from tts2face.numeric.kernels import kernel, vectorized_kernel
 from tts2face.picture.baked.surface import COVER_SHIFT, OPAQUE, LitSurface
 from tts2face.picture.baked.visibility import U, V, nearest_triangles, project
 from tts2face.picture.camera import CameraMatrices
-
-Array = NDArray[Any]
 
 
 def page_covers(light: BakedLight, view: PhotoView) -> NDArray[np.uint8]:

@@ -7,13 +7,11 @@ are gathered into rows of long arrays, over which the lamps are added up.
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tts2face.models.view_transform import OFFSET, SPAN
+from tts2face.numeric.arrays import Array
 from tts2face.numeric.kernels import inlined_kernel, kernel, vectorized_kernel
 from tts2face.picture.baked.visibility import NEAR, X, Y
-
-Array = NDArray[Any]
 
 EDGE_RAD = 1.1  # angle from the gaze at the edge of the texture
 REFRACTION = 1.45  # index of the cornea

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Float32Array = NDArray[np.float32]
+from tts2face.numeric.arrays import Float32Array, FloatArray
 
 TURN_SCALE_DEG = (10.0, 8.0)  # of yaw and pitch in the distance between turns
 TURN_LIMIT_DEG = (23.0, 14.0)  # beyond the baked turns light stays
@@ -22,10 +21,10 @@ class Cardinal:
     1971.
     """
 
-    nodes: Floats
-    scale: Floats
-    limit: Floats
-    inverse: Floats
+    nodes: FloatArray
+    scale: FloatArray
+    limit: FloatArray
+    inverse: FloatArray
 
     @classmethod
     def between(cls, nodes: NDArray[np.floating], scale: Sequence[float], limit: Sequence[float]) -> "Cardinal":
@@ -45,9 +44,9 @@ class Cardinal:
         return weights
 
 
-def _multiquadric(a: Floats, b: Floats) -> Floats:
+def _multiquadric(a: FloatArray, b: FloatArray) -> FloatArray:
     squared = ((a[:, None] - b[None]) ** 2).sum(axis=2)
-    root: Floats = np.sqrt(squared + 0.25)
+    root: FloatArray = np.sqrt(squared + 0.25)
     return root
 
 
@@ -62,6 +61,6 @@ def camera_weights(yaws_deg: NDArray[np.floating]) -> Cardinal:
     return Cardinal.between(np.asarray(yaws_deg)[:, None], (CAMERA_SCALE_DEG,), (most,))
 
 
-def yaw_and_pitch_deg(head: NDArray[np.floating]) -> Floats:
+def yaw_and_pitch_deg(head: NDArray[np.floating]) -> FloatArray:
     """(2,) of a head pose (6,)."""
     return np.degrees(np.asarray(head, np.float64)[[1, 0]])

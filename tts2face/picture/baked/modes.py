@@ -1,14 +1,11 @@
 """Sums of modes of baked light."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.models.baked_light import BLACK_SHARE, N_PAGES
+from tts2face.numeric.arrays import Array
 from tts2face.numeric.kernels import vectorized_kernel
-
-Array = NDArray[Any]
 
 LIGHT_BITS, LIGHT_MASK = 10, 1023  # of each of the three numbers in a texel of changing light
 LIGHT_STEP, LIGHT_ZERO = np.float32(0.5), np.float32(512)  # of 255 a step, and the number of no change

@@ -14,13 +14,11 @@ from numpy.typing import NDArray
 from tts2face.face.deformation import FaceRig
 from tts2face.models.baked_light import LIMIT_STEP, LIP_RING, N_MOUTH_TERMS, N_TERMS, BakedLight
 from tts2face.models.face import Face
+from tts2face.numeric.arrays import Array, Float32Array
 from tts2face.numeric.kernels import vectorized_kernel
 from tts2face.picture.kernels.fragments import face_normals, vertex_normals
 from tts2face.picture.kernels.tables import NORMAL
 from tts2face.picture.surface import triangles_by_vertex
-
-Array = NDArray[np.generic]
-Float32Array = NDArray[np.float32]
 
 MOVE_MM = np.float32(8.0)  # movement that counts as much as a turn of 1 rad
 GAP_MM = np.float32(2.0)  # of an opening that is half as good as a wide one

@@ -12,6 +12,7 @@ from tts2face.face.pupils import DILATION, PUPIL_SHAPE
 from tts2face.models.baked_light import LEAST_SIDE, N_BALL_TERMS, N_PAGES, N_TERMS, BakedLight, equal_limits
 from tts2face.models.face import Face
 from tts2face.models.light import Lit
+from tts2face.numeric.arrays import Float32Array
 from tts2face.numeric.kernels import BLOCK
 from tts2face.picture.baked.cut_out import compose_over, find_covers
 from tts2face.picture.baked.eyes import CENTRE, N_EYE_COLUMNS, PUPIL, TURN, colour_eyes
@@ -36,8 +37,6 @@ from tts2face.picture.baked.visibility import N_SPAN_VALUES, NEAR, RED, X, fill_
 from tts2face.picture.camera import CameraMatrices
 from tts2face.picture.options import Picture
 
-Floats = NDArray[np.float64]
-Float32Array = NDArray[np.float32]
 BLINK_SHRINK = 0.075  # of the ball behind a shut lid, times its weight to the fourth power
 BLINKS = ("eyeBlinkLeft", "eyeBlinkRight")  # of the face's eyes
 BEHIND_SHARE = np.float32(0.8)  # of the nearness of what lies in openings

@@ -3,13 +3,11 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import Array
 from tts2face.numeric.kernels import flat_view, kernel, vectorized_kernel
 from tts2face.picture.baked.modes import LIGHT_BITS, LIGHT_STEP, LIGHT_ZERO
 from tts2face.picture.baked.visibility import TRIANGLE_BITS, TRIANGLE_MASK, U, X, Y
-
-Array = NDArray[Any]
 
 SAME_DEPTH_BITS = 9  # samples of one piece are one surface if their 1/z differ by less than 1 / 512
 N_VALUES = 5  # of a fragment: place in the texture, and light of the vertices

@@ -1,7 +1,6 @@
 """Surface of a face with baked light in the arrays that the kernels take."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,6 @@ from tts2face.picture.baked.response import LightTerms, light_terms
 from tts2face.picture.baked.visibility import MAX_TRIANGLES, N_COLUMNS, RED, U, V
 from tts2face.processes.shared import shared
 
-Array = NDArray[Any]
 DARK = (17.0, 6.0, 5.5)  # colour of skin that is seen from behind, in the mouth
 OPAQUE, COVER_SHIFT = 255, 24  # cover of pages without any, and its bits in a texel
 TEXELS_A_PIXEL = 1.0  # beyond which the next smaller texels are read

@@ -5,14 +5,11 @@ do not depend on the number of threads. Both triangles at an edge compute the sa
 so that no sample falls between them. Picture space: x right, y down, in samples.
 """
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import Array
 from tts2face.numeric.kernels import BLOCK, flat_view, kernel, write_larger
-
-Array = NDArray[Any]
 
 X, Y, NEAR, U, V, RED, GREEN, BLUE = range(8)  # columns of a table of projected vertices
 N_COLUMNS = 8

@@ -7,8 +7,8 @@ in any order of drawing (alpha to coverage); without supersampling the threshold
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import Array
 from tts2face.numeric.kernels import kernel
 from tts2face.picture.kernels.raster import (
     BACK_BIAS,
@@ -22,8 +22,6 @@ from tts2face.picture.kernels.raster import (
     edge_function,
 )
 from tts2face.picture.kernels.tables import UV
-
-Array = NDArray[Any]
 
 
 class Textures(NamedTuple):

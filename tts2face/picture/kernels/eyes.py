@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from tts2face.face.deformation import FaceRig, eye_rotations, head_transform
 from tts2face.models.face import Face
 from tts2face.models.landmarks import LEFT_LIDS, RIGHT_LIDS
+from tts2face.numeric.arrays import Array
 from tts2face.numeric.kernels import kernel
 from tts2face.picture.kernels.tables import AT_ALBEDO, AT_DIFFUSE, AT_EXPOSURE, AT_GLOW, AT_NORMAL, N_EXPOSURES
-
-Array = NDArray[Any]
 
 N_LID = 9
 RADIUS_MM = 12.0  # radius of a human eyeball

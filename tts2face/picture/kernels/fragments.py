@@ -3,11 +3,11 @@
 Lighting one fragment instead of its samples takes a third of the time of full supersampling.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import Array
 from tts2face.numeric.kernels import kernel
 from tts2face.picture.kernels.eyes import light_eye
 from tts2face.picture.kernels.raster import NO_TRIANGLE
@@ -31,8 +31,6 @@ from tts2face.picture.kernels.tables import (
     UV,
 )
 from tts2face.picture.textures import mip_level, read_texel
-
-Array = NDArray[Any]
 
 MIN_NORMAL_COSINE = np.float32(0.85)  # least cosine between the normals of samples that are merged
 HIDDEN_SHARE = np.float32(1 / 512)  # light that passes strands below which nothing behind them is drawn

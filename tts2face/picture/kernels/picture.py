@@ -50,9 +50,6 @@ from tts2face.picture.kernels.tables import COLOUR, N_ROWS, N_VERTEX_COLUMNS, UV
 from tts2face.picture.kernels.tones import TONE_TABLES
 from tts2face.picture.surface import Surface
 
-Array = NDArray[Any]
-
-
 BAND_SAMPLES = 65_536  # per band of rows; the time is the same from 16,384 to 262,144
 ROW_PADDING = 80  # extra entries per table row, so that rows do not all start in one cache set
 

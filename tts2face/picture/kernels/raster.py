@@ -10,11 +10,9 @@ y down, z ahead, mm. Sources: Pineda 1988 (edge functions), Olano and Greer 1997
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import Array
 from tts2face.numeric.kernels import inlined_kernel, kernel
-
-Array = NDArray[Any]
 
 GRID_SHIFT = 8
 GRID = 1 << GRID_SHIFT  # steps of the snapping grid in one sample

@@ -3,8 +3,8 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import Array
 from tts2face.numeric.kernels import inlined_kernel, kernel
 from tts2face.picture.kernels.fragments import (
     PIXEL_ENDS,
@@ -17,8 +17,6 @@ from tts2face.picture.kernels.fragments import (
 )
 from tts2face.picture.kernels.raster import NO_TRIANGLE
 from tts2face.picture.kernels.tables import AT_OPACITY, AT_SHARE
-
-Array = NDArray[Any]
 
 
 @inlined_kernel

@@ -8,8 +8,8 @@ and Reitz 1975 (GGX), with the reflectance of Schlick 1994.
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import Array
 from tts2face.numeric.kernels import inlined_kernel, kernel, vectorized_kernel
 from tts2face.picture.kernels.lamps import BRIGHTNESS, FIRST_LIGHT_ROW, FLOOR_ROW, SKY_ROW, UP_ROW
 from tts2face.picture.kernels.tables import (
@@ -28,8 +28,6 @@ from tts2face.picture.kernels.tables import (
     EXPOSURE,
     NORMAL,
 )
-
-Array = NDArray[Any]
 
 SKIN_SCATTERING = np.array(
     [1.0, 0.75, 0.65], np.float32

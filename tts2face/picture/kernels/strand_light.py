@@ -6,14 +6,12 @@ Highlights follow Kajiya and Kay 1989, with the two shifted highlights of Marsch
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import Array
 from tts2face.numeric.kernels import kernel, vectorized_kernel
 from tts2face.picture.kernels.lamps import FIRST_LIGHT_ROW, FLOOR_ROW, SKY_ROW, UP_ROW
 from tts2face.picture.kernels.shade import kept_hue, tone_curve
 from tts2face.picture.kernels.tables import NORMAL
-
-Array = NDArray[Any]
 
 # Columns of the strand table: place in the picture in samples, 1/z, texture coordinates, diffuse light, and for the key
 # light and the first rim light: tangent and normal along the half vector, and how much of the light arrives.

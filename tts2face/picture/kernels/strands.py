@@ -7,8 +7,8 @@ of it. Where nothing passes, cards and surfaces behind are not drawn.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import Array
 from tts2face.numeric.kernels import inlined_kernel, kernel
 from tts2face.picture.kernels.strand_light import (
     AT_NEAR,
@@ -21,8 +21,6 @@ from tts2face.picture.kernels.strand_light import (
     shade_strands,
 )
 from tts2face.picture.textures import mip_level, read_texel
-
-Array = NDArray[Any]
 
 FRAGMENTS_AT_ONCE = 2048 + 80  # the table stays in the cache; rows do not start in one set of it
 TEXTURE_SHIFT = np.float32(0.12)  # further shift by the brightness of the texture: highlights follow the strands

@@ -7,11 +7,10 @@ and runs on one thread.
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import Array
 from tts2face.numeric.kernels import inlined_kernel, kernel
 
-Array = NDArray[Any]
 EDGE_TOLERANCE = -1e-6  # least barycentric coordinate inside a triangle: leaves no gap between neighbours
 
 
