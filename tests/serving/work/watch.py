@@ -12,7 +12,7 @@ INTERVAL_S = 0.5
 
 
 class StoreWatch:
-    """Looks at the results of a store again and again; that of a segment that was rendered again is another file (inode).
+    """Reads the results of a store again and again; that of a segment rendered again is another file (inode).
 
     A process that is killed between a movie and its result leaves a movie that is not stored: it is rendered again.
 
