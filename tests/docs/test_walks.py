@@ -11,9 +11,10 @@ MADE = (
     "def passed_on(style):\n    return chosen(style)\n\n\n"
     "class Idle:\n    def pieces(self):\n        return ()\n\n\n"
     "def of_rate(rate):\n    return rate > 1\n\n\n"
-    "def from_table(style):\n    return TABLE[style.name]\n"
+    "def from_table(style):\n    return TABLE[style.name]\n\n\n"
+    "def of_numpy(rate):\n    return rate > np.style(rate)\n"
 )
-LINES = {"chosen": 1, "passed_on": 5, "Idle.pieces": 10, "of_rate": 14, "from_table": 18}
+LINES = {"chosen": 1, "passed_on": 5, "Idle.pieces": 10, "of_rate": 14, "from_table": 18, "of_numpy": 22}
 
 
 def walked(root: Path, walk: Walk, *functions: str) -> tuple[list[str], list[str], int]:
@@ -30,7 +31,7 @@ def walked(root: Path, walk: Walk, *functions: str) -> tuple[list[str], list[str
 def test_files_to_open_are_those_that_decide_about_the_datum(tmp_path: Path) -> None:
     style = Walk(lambda _: None, "styles?", kinds=frozenset(["Idle"]))
     files, decide, moves = walked(tmp_path, style, *LINES)
-    assert (len(files), moves) == (5, 4)
+    assert (len(files), moves) == (6, 5)
     assert decide == ["chosen", "Idle.pieces", "from_table"]
     at_home = Walk(lambda _: None, "", home=("tts2face/room",), within=("tts2face/room3", "tts2face/room1"))
     files, decide, moves = walked(tmp_path, at_home, *LINES)

@@ -5,7 +5,8 @@
 - the files that run: a function of them is called while the datum passes, in whichever process;
 - the files to open: such a function decides about the datum. A decision is a condition, a comparison, a `match` or a
   look-up in a table of the module that names the datum as in `Walk.names`; any condition in `Walk.home`, which serves
-  this datum alone; or a method of a class of `Walk.kinds`, whose kinds are chosen by the datum;
+  this datum alone; or a method of a class of `Walk.kinds`, whose kinds are chosen by the datum. Names of
+  numpy are no data: ``np.clip`` makes no clip;
 - the moves between rooms: how often the room changes from file to file, in the order in which they are entered.
 """
 
@@ -55,8 +56,10 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef
 SERVICE, WORK = "tts2face/serving/service/", "tts2face/serving/work/"
 JOB = (SERVICE, WORK)
 TAKE = ("tts2face/serving/studio/", WORK, "corpus_tools/tools/")
-KINDS = frozenset(("Spoken", "Recorded", "Idle", "Listening", "Lamps", "Baked", "Photographed"))
+KINDS = frozenset(("Spoken", "Recorded", "Idle", "Listening", "_OfHead", "Lamps", "Baked", "Photographed"))
 CLIP = r"request|picture|text|prepared|piece|speech|clip|source|audio|idle|format|photo\w*|lamps|baked"
+# The kind of a light stands beside `light` or is a class; `kind` alone is that of an array, a phone, a field or a file.
+PHOTO = r"\w*[Pp]hoto\w*|light|Lamps|Baked|is_flat"
 
 
 class Called(NamedTuple):
@@ -223,7 +226,7 @@ class Walk:
 WALKS = {
     "a clip": Walk(Traced.speak, CLIP, 35, kinds=KINDS),
     "`--audio` with words": Walk(speak_audio, r"audio|record(?:ing|ed)\w*|words|heard|source", kinds=KINDS),
-    "`--photo`": Walk(speak_photo, r"\w*photo\w*|light|kind", 40, ("tts2face/photo/",), kinds=KINDS),
+    "`--photo`": Walk(speak_photo, PHOTO, 40, ("tts2face/photo/",), kinds=KINDS),
     "`--style`": Walk(lambda traced: traced.speak("--style", "delighted"), r"\w*style\w*"),
     "`POST /v1/clips`": Walk(post_clip, "", 10, (SERVICE,), (SERVICE,)),
     "a subtitle job to its webhook": Walk(subtitle_job, "", 15, JOB, JOB),
@@ -273,11 +276,11 @@ def decides(walk: Walk, root: Path, called: Called) -> bool:
 
 
 def words(expression: ast.expr) -> Iterator[str]:
-    """Names and attributes of an expression."""
+    """Names and attributes of an expression, without names of numpy."""
     for node in ast.walk(expression):
         if isinstance(node, ast.Name):
             yield node.id
-        elif isinstance(node, ast.Attribute):
+        elif isinstance(node, ast.Attribute) and ast.unparse(node.value) != "np":
             yield node.attr
 
 

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from tts2face.face.eyeballs import EyeballClearance, build_clearance
 from tts2face.models.face import Face
 from tts2face.models.landmarks import CHIN
-from tts2face.models.light import Photographed
 from tts2face.numeric.arrays import smoothstep
 from tts2face.numeric.kernels import kernel
 from tts2face.types import HEAD_CHANNELS
@@ -99,8 +98,10 @@ def build_rig(face: Face) -> FaceRig:
 
 def head_share(face: Face) -> NDArray[np.float32]:
     """Share (V,) of the head motion that each vertex follows: 1 on the head, falling to 0 at the end of the neck."""
-    if isinstance(face.light, Photographed):
-        return face.light.view.follow
+    return face.light.head_share(_share_by_height(face))
+
+
+def _share_by_height(face: Face) -> NDArray[np.float32]:
     height = face.vertices[:, 1]
     chin = np.flatnonzero(face.landmarks == CHIN)
     if not len(chin):

@@ -59,22 +59,21 @@ OF_HAIR: Mapping[str, Tensor] = {
 
 def encode_light(light: BakedLight) -> tuple[NDArray[np.uint8], dict[str, Any]]:
     """Bytes (N,) of light, and the fields that `decode_light` takes with them."""
-    content, stored = _encoded(light, {"backdrop": encode_colours(light.backdrop)})
+    content, stored = _encoded(light, JPEG_QUALITY, {"backdrop": encode_colours(light.backdrop)})
     more = {"page_of": dict(light.page_of), "head_lamps": light.head_lamps, "eye_gain": light.eye_gain}
     return content, stored | more
 
 
 def encode_hair_light(light: HairLight) -> tuple[NDArray[np.uint8], dict[str, Any]]:
     """Bytes (N,) of light with another haircut, and the fields that `decode_hair_light` takes with them."""
-    return _encoded(light, {})
+    return _encoded(light, HAIR_QUALITY, {})
 
 
-def _encoded(light: BakedLight | HairLight, pictures: Mapping[str, Any]) -> tuple[NDArray[np.uint8], dict[str, Any]]:
+def _encoded(light: HairLight, quality: int, pictures: Mapping[str, Any]) -> tuple[NDArray[np.uint8], dict[str, Any]]:
     arrays = stored_arrays(light) | dict(pictures)
     if light.tint is not None:
         arrays |= {"tint_colours": light.tint.colours, "tint_vertices": light.tint.vertices}
     arrays["triangle_steps"] = np.diff(light.triangles, prepend=np.int32(0))
-    quality = JPEG_QUALITY if isinstance(light, BakedLight) else HAIR_QUALITY
     arrays |= {f"page{number}": encode_colours(page, quality) for number, page in enumerate(light.pages)}
     content, listed = pack_arrays(arrays)
     return content, {"arrays": listed}
@@ -92,13 +91,13 @@ def decode_light(
     for name in ("rows", "partners", "mouth_rows", "ball_rows"):
         contents.indices(name, sizes["vertices"], "vertices")
     kept = _checked(contents, sizes)
-    lamps = stored["head_lamps"]
-    contents.require(lamps <= len(arrays["lamps"]), f"light has {lamps} head_lamps, but {len(arrays['lamps'])} lamps")
+    of_head, n_lamps = stored["head_lamps"], len(arrays["lamps"])
+    contents.require(of_head <= n_lamps, f"light has {of_head} head_lamps, but {n_lamps} lamps")
     return BakedLight(
         **kept,
         backdrop=decode_colours(arrays["backdrop"], path),
         page_of=stored["page_of"],
-        head_lamps=lamps,
+        head_lamps=of_head,
         eye_gain=stored["eye_gain"],
     )
 

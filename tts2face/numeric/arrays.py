@@ -249,8 +249,8 @@ def decode_srgb(srgb: NDArray[np.floating]) -> NDArray[np.float64]:
 
 def encode_light(linear: NDArray[np.floating]) -> NDArray[Any]:
     """Values in sRGB of linear light, both in [0, 1]; light beyond is clipped."""
-    light = np.clip(linear, 0.0, 1.0)
-    srgb: NDArray[Any] = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    clipped = np.clip(linear, 0.0, 1.0)
+    srgb: NDArray[Any] = np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055)
     return srgb
 
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from tts2face.face.own_face import OwnFaceGestures
 from tts2face.models.appearance import Appearance, nearest_pixels
-from tts2face.models.face import SYNTHETIC_NOTICE
 from tts2face.models.landmarks import FACE_OVAL
+from tts2face.models.light import SYNTHETIC_NOTICE
 from tts2face.models.talker import ShapeModel, Talker
 from tts2face.numeric.arrays import Float32Array
 from tts2face.picture.kernels.warps import warp_image

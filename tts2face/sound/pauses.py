@@ -29,8 +29,8 @@ Span = tuple[float, float]
 
 def speech_level(levels: NDArray[np.floating]) -> float:
     """Mean in dB of those (T, 1) levels that exceed the midpoint of the noise and speech levels."""
-    noise, speech = np.quantile(levels, NOISE_QUANTILE), np.quantile(levels, SPEECH_QUANTILE)
-    return float(levels[levels >= (noise + speech) / 2].mean())
+    noise_db, speech_db = np.quantile(levels, NOISE_QUANTILE), np.quantile(levels, SPEECH_QUANTILE)
+    return float(levels[levels >= (noise_db + speech_db) / 2].mean())
 
 
 def find_pauses(sound: Waveform) -> tuple[Span, ...]:
@@ -38,10 +38,10 @@ def find_pauses(sound: Waveform) -> tuple[Span, ...]:
     levels = _window_levels(sound)
     if not len(levels):
         return ()
-    noise, speech = np.quantile(levels, NOISE_QUANTILE), np.quantile(levels, SPEECH_QUANTILE)
-    if speech - noise < MIN_CONTRAST_DB:
+    noise_db, speech_db = np.quantile(levels, NOISE_QUANTILE), np.quantile(levels, SPEECH_QUANTILE)
+    if speech_db - noise_db < MIN_CONTRAST_DB:
         return ()
-    quiet = levels < noise + QUIET_SHARE * (speech - noise)
+    quiet = levels < noise_db + QUIET_SHARE * (speech_db - noise_db)
     spans = (true_runs(quiet) * LEVEL_WINDOW_S).tolist()
     return tuple((start, end) for start, end in spans if end - start >= MIN_PAUSE_S)
 
