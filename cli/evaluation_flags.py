@@ -2,15 +2,12 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
 from cli.flags import switch, whole_number
 from lexicon.errors import InputError
-
-if TYPE_CHECKING:
-    pass
 
 
 @Parameter(name="*")

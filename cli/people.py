@@ -1,15 +1,11 @@
 """``tts2face corpus evaluate --people``: a finished talker on landmark tracks of other people."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from cli.evaluation_flags import ComparisonFlags
 from cli.process import write_message
 from lexicon.errors import InputError
 from tts2face.storage.output_paths import check_file_name
-
-if TYPE_CHECKING:
-    pass
 
 PEOPLE_SUFFIXES = (".json", ".csv")
 DEFAULT_TALKER = "grid_s1"

@@ -3,16 +3,13 @@
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from cli.flags import Exports, Face, Hair, HairColor, Out, switch
 from cli.process import write_message
 from cli.speak import SpeakOptions, run_prepared
-
-if TYPE_CHECKING:
-    pass
 
 
 def render(  # noqa: PLR0913 - one parameter a flag

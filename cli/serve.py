@@ -4,16 +4,13 @@ import sys
 from dataclasses import fields, replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from cyclopts import App, Parameter
 
 from cli.flags import add_option_flags, switch, whole_number
 from cli.photo import YES, Yes, sets_up_model
 from tts2face.serving.service.settings import ServiceSettings, read_settings
-
-if TYPE_CHECKING:
-    pass
 
 keys = App(name="keys", help="API keys of the service.")
 SECRETS = frozenset(setting.name for setting in fields(ServiceSettings) if setting.metadata["is_secret"])

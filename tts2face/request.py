@@ -246,9 +246,7 @@ def make_source(**options: Any) -> Source:
         if given.audio_map in {None, RECOGNISED}:
             return Recorded(given.audio, FromPhones("" if is_blank else given.text, given.articulation), given.volume)
         return Recorded(given.audio, FromSound(str(given.audio_map)), given.volume)
-    spoken = Spoken(
-        given.text, given.voice, given.rate, given.lead, given.plain_delivery, given.volume, given.articulation
-    )
+    spoken = Spoken(**{declared.name: getattr(given, declared.name) for declared in fields(Spoken)})
     if given.listen is None:
         return spoken
     return Listening(given.listen, given.partner, None if is_blank else spoken)

@@ -1,17 +1,12 @@
 """Light and sharpness of the face in pictures: whether its parts can be distinguished."""
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, FACE_OVAL
 from tts2face.video.media import TimedFrame
-
-if TYPE_CHECKING:
-    pass
-
 
 INTERVAL_S = 0.5  # between the pictures that are measured
 EYE_PX = 60.0  # larger faces are reduced to this distance of the outer eye corners: finer detail is not needed

@@ -33,12 +33,17 @@ def test_the_readme_counts_what_is_shipped() -> None:
     ]
     stated += [f"`{one.name}`" for one in faces]
     text = " ".join(README.read_text(encoding="utf-8").partition("## What is shipped")[2].split()).lower()
-    assert [one for one in stated if one.lower() not in text] == []
+    missing = [one for one in stated if one.lower() not in text]
+    assert not missing, f"README.md, What is shipped: write {', '.join(missing)}"
 
 
 def test_the_page_of_exports_has_a_row_for_each_format() -> None:
     table = re.findall(r"^\| (\S.*?) \| (`\..*?) \|", (DOCS / "exports.md").read_text(encoding="utf-8"), re.MULTILINE)
     rows = {tuple(names.split(", ")): set(re.findall(r"`(.+?)`", endings.lower())) for names, endings in table}
-    assert sorted(name for names in rows for name in names) == sorted(one.name for one in FORMATS)
+    written = [name for names in rows for name in names]
+    missing, left = ({one.name for one in FORMATS} - {*written}, {*written} - {one.name for one in FORMATS})
+    assert not missing, f"docs/exports.md: add a row for {', '.join(missing)}"
+    assert not left, f"docs/exports.md: remove the row of {', '.join(left)}"
+    assert len(written) == len(set(written))
     for names, endings in rows.items():
         assert endings == {suffix for one in FORMATS if one.name in names for suffix in one.suffixes}, names

@@ -3,7 +3,7 @@
 import hashlib
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import MISSING, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,19 @@ import pytest
 from lexicon.errors import DataError, InputError
 from tests.world import ROOT, World
 from tts2face.numeric.kernels import CACHE_VARIABLE, FOLDER
-from tts2face.request import GESTURES, LEAD_S, OPTIONS, TURN_S, Request
+from tts2face.request import (
+    GESTURES,
+    LEAD_S,
+    OPTIONS,
+    SOURCE_OPTIONS,
+    TURN_S,
+    FromSound,
+    Idle,
+    Listening,
+    Recorded,
+    Request,
+    Spoken,
+)
 from tts2face.session.session import Session
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.types import Clip, concatenate_clips
@@ -43,6 +55,16 @@ CHANGES = {
 ELSEWHERE = {"audio", "audio_map", "idle", "partner", "plain_delivery"}
 
 
+def test_an_option_of_a_source_is_a_field_of_one_with_the_same_default() -> None:
+    sources = (Spoken("a"), Recorded(Path("a.wav")), FromSound("network"), Idle(1.0), Listening(1.0))
+    taken = {name for source in sources for name in source.as_options()}
+    missing = ", ".join({*SOURCE_OPTIONS} - taken)
+    assert not missing, f"add {missing} to the sources of tts2face/request.py that have it"
+    for one in fields(Spoken):
+        default = SOURCE_OPTIONS[one.name].default
+        assert one.default in {MISSING, default}, f"Spoken.{one.name} has another default than SourceOptions"
+
+
 @pytest.fixture(scope="module")
 def session(world: World) -> Session:
     """It keeps finished sentences: an option that the keys of `ResultMemory` lack would change nothing."""
@@ -65,9 +87,14 @@ def test_every_option_changes_the_clip(name: str, clip: Clip, session: Session, 
     own.write_text("bob  B IY1 M\n")
     plan = tmp_path / "plan.json"
     plan.write_text('{"nods": [{"time": 0.4}]}')
-    value = {"dictionary": own, "timeline": plan}.get(name) or CHANGES[name]
+    values = CHANGES | {"dictionary": own, "timeline": plan}
+    assert name in values, f"add {name} to CHANGES, with a value that changes the clip"
+    value = values[name]
     changed = session.clip(replace(Request(text=TEXT), **{name: value}))
-    assert digest(changed) != digest(clip)
+    assert digest(changed) != digest(clip), (
+        f"{name}={value!r} changes nothing: no step of tts2face.session reads {name}, or a step that keeps its result "
+        "lacks it in its key"
+    )
 
 
 def test_a_plain_delivery_changes_the_clip_of_a_style(session: Session) -> None:

@@ -1,10 +1,6 @@
 """A stream that collects what an encoder writes until it is taken."""
 
 import io
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    pass
 
 
 class WriteBuffer(io.RawIOBase):

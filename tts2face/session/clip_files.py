@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from lexicon.errors import DataError
 from tts2face.face.gestures import gesture_face
@@ -19,9 +18,6 @@ from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.speech_stream import Piece
 from tts2face.storage.output_paths import refuse_overwriting
 from tts2face.types import Clip, concatenate_clips
-
-if TYPE_CHECKING:
-    pass
 
 
 def write_clip(

@@ -26,7 +26,6 @@ from tts2face.session.shared_models import SessionModels
 from tts2face.session.speech_stream import Piece, timed_speech
 from tts2face.types import Chunk
 
-LINES = "application/jsonl"  # media type of lines of JSON
 BLOCK_BYTES = 1 << 18  # of a file that is read when it is complete
 
 
@@ -42,8 +41,7 @@ def media_types() -> Mapping[str, str]:
     return MappingProxyType({
         **{name: kind.media_type for name, kind in MOVIE_KINDS.items()},
         **{name: kind.media_type for name, kind in SOUND_KINDS.items()},
-        **dict.fromkeys(line_formats(), LINES),
-        "livelink": "text/csv",
+        **{name: info.media_type for name, info in line_formats().items()},
         "glb": "model/gltf-binary",
     })  # fmt: skip
 

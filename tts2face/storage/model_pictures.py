@@ -2,15 +2,12 @@
 
 import io
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.storage.pictures import open_picture
-
-if TYPE_CHECKING:
-    pass
 
 JPEG_QUALITY = 92
 

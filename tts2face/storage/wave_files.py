@@ -2,13 +2,10 @@
 
 import io
 import wave
-from typing import TYPE_CHECKING, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    pass
 
 FULL_SCALE = 32767
 

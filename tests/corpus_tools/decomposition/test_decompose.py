@@ -200,7 +200,7 @@ def test_a_first_style_without_cheeks(basis: ExpressionBasis) -> None:
 
 def test_the_paper_s_six_moods_are_derived() -> None:
     made = read_derived_styles("someone")
-    assert list(made) == ["neutral", "depressed", "delighted", "annoyed", "exaggerated", "exasperated"]
+    assert list(made)[:6] == ["neutral", "depressed", "delighted", "annoyed", "exaggerated", "exasperated"]
     assert all(derived.source == "someone" and derived.summary for derived in made.values())
     assert made["depressed"].changes["expression"].offset == {"sad": 0.9}
     assert made["depressed"].delivery == Delivery(0.9, -2.0)

@@ -10,6 +10,7 @@ from tts2face.serving.work.run import find_runner
 
 @pytest.mark.parametrize("kind", sorted({*KINDS, *JOB_KINDS}))
 def test_a_kind_is_asked_for_executed_and_has_places(kind: str) -> None:
-    assert kind in JOB_KINDS, "add it to tts2face.serving.service.job_kinds.table"
+    assert kind in JOB_KINDS, f"add {kind} to JOB_KINDS of tts2face.serving.service.job_kinds.table"
+    assert kind in KINDS, f"add {kind} to KINDS of tts2face.serving.work.kinds"
     assert callable(find_runner(kind))
     assert PLACES[KINDS[kind].queue] > 0

@@ -1,7 +1,6 @@
 """Consecutive clips of any frame rate on the frames of an export."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,9 +8,6 @@ from lexicon.errors import InputError
 from tts2face.interchange.exports.parts import Part
 from tts2face.numeric.arrays import Float32Array, interpolate_rows
 from tts2face.types import HEAD_CHANNELS, Clip, exact_rate, first_sample, frame_count
-
-if TYPE_CHECKING:
-    pass
 
 
 class FrameGrid:

@@ -4,7 +4,8 @@ How the next format is made:
 
 1. Write a class with the methods of `FormatWriter` in a module of its own here; it is made with a `Target`, receives
    one `Part` after another, and keeps no frames in memory.
-2. Add its row to `FORMATS` in `tts2face.interchange.exports.table`: name, endings, summary, module and class.
+2. Add its row to `FORMATS` in `tts2face.interchange.exports.table`: name, endings, summary, module and class; HTTP
+   sends it if it `has_lines`, as the `media_type` of the row.
 3. Take frames from `Part.motion` and `Part.head`, phones and words from `tts2face.interchange.exports.labels`.
 4. Say in docs/exports.md what the file holds, and read it back in a test.
 """

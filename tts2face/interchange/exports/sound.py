@@ -1,13 +1,8 @@
 """The sound of a clip as a 16-bit .wav file."""
 
-from typing import TYPE_CHECKING
-
 from lexicon.errors import InputError
 from tts2face.interchange.exports.parts import Part, Target
 from tts2face.storage.wave_files import open_wave, pcm_bytes
-
-if TYPE_CHECKING:
-    pass
 
 MAX_SAMPLES = (2**32 - 64) // 2  # a .wav file states its size in bytes in 32 bits
 

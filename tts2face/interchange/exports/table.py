@@ -15,6 +15,8 @@ from lexicon.errors import BackendError, InputError
 from tts2face.plugins import EXPORTS, declared, load_plugin
 from tts2face.storage.output_paths import MOVIE_SUFFIXES
 
+JSON_LINES = "application/jsonl"
+
 
 @dataclass(frozen=True, slots=True)
 class FormatInfo:
@@ -39,8 +41,8 @@ class FormatInfo:
         Whether it expresses the channels by ARKit shapes, and whether it holds the mesh of the face.
     has_sound_beside
         Whether the sound is written to a .wav file beside it.
-    has_lines
-        Whether it consists of lines of text that can be sent while they are made.
+    has_lines, media_type
+        Whether it consists of lines of text that can be sent while they are made, and their type over HTTP.
     package
         Package that it needs besides those of tts2face.
     is_clip, is_sound
@@ -57,6 +59,7 @@ class FormatInfo:
     needs_mesh: bool = False
     has_sound_beside: bool = False
     has_lines: bool = False
+    media_type: str = JSON_LINES
     package: str | None = None
     is_clip: bool = False
     is_sound: bool = False
@@ -92,7 +95,7 @@ FORMATS = (
                ("track", "TrackWriter"), is_clip=True),
     FormatInfo("livelink", (".csv",), "ARKit-52 weights and head angles, as Live Link Face records them",
                ("livelink", "LiveLinkWriter"), has_frames=True, default_fps=LIVELINK_FPS, uses_shapes=True,
-               has_lines=True),
+               has_lines=True, media_type="text/csv"),
     FormatInfo("a2f", (".a2f.json",), "ARKit-52 weights as Audio2Face exports them",
                ("audio2face", "Audio2FaceWriter"), has_frames=True, uses_shapes=True),
     FormatInfo("glb", (".glb",), "mesh, morph targets, skeleton and animation (glTF 2.0)",

@@ -2,15 +2,11 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from lexicon.errors import InputError
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.interchange.exports.labels import AllLabels
 from tts2face.interchange.exports.parts import Part, Target
-
-if TYPE_CHECKING:
-    pass
 
 Interval = tuple[float, float, str]
 

@@ -1,13 +1,9 @@
 """Words of a clip with their times and confidence as JSON lines."""
 
 import json
-from typing import TYPE_CHECKING
 
 from tts2face.interchange.exports.labels import part_words
 from tts2face.interchange.exports.parts import Part, Target
-
-if TYPE_CHECKING:
-    pass
 
 
 class WordLinesWriter:

@@ -12,6 +12,7 @@ from fastapi import WebSocket
 from fastapi.responses import StreamingResponse
 
 from lexicon.errors import Tts2faceError
+from tts2face.interchange.exports.table import JSON_LINES
 from tts2face.processes.message import RESULT, Message
 from tts2face.serving.service.access import Permissions
 from tts2face.serving.service.errors import RefusedError, as_refused
@@ -26,7 +27,6 @@ from tts2face.serving.service.result_cache import CACHED_KINDS, ResultCache
 from tts2face.serving.service.scheduler import check_words
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.warm_process import work_call
-from tts2face.session.encoded_stream import LINES
 
 WARM_TEXT = "Hi."
 
@@ -216,7 +216,7 @@ class DataBytes:
 
     def failed(self, content: dict[str, Any]) -> bytes:
         """A line, after lines of JSON."""
-        return json_line(content) if self.media_type == LINES else b""
+        return json_line(content) if self.media_type == JSON_LINES else b""
 
 
 def error_event(content: dict[str, Any]) -> bytes:

@@ -1,5 +1,6 @@
 """HTTP, the command line and Python give byte-identical motion for the same request."""
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 import tts2face
 from cli.main import run
 from tests.running import RunningService
+from tts2face.session.named_models import Models
 
 TEXT = "Bob may move. We were away."
 LONG = (
@@ -35,8 +37,9 @@ REQUESTS: dict[str, dict[str, Any]] = {
     "talker and face": {"text": TEXT, "talker": "grid_s1", "face": "head"},
     "identity": {"text": TEXT, "identity": "kofi"},
     "idle": {"idle": 2.0, "seed": 3},
+    "switch": {"text": TEXT, "plain_delivery": True, "style": "depressed"},
 }
-MODELS = ("talker", "face", "identity", "palette")
+MODELS = tuple(one.name for one in fields(Models))
 
 
 @pytest.fixture(scope="module")
@@ -61,8 +64,11 @@ def of_python(options: dict[str, Any], out: Path) -> bytes:
 def of_command_line(options: dict[str, Any], out: Path) -> bytes:
     words = [options["text"]] if "text" in options else []
     for name, value in options.items():
-        if name != "text":
-            words += [f"--{name}", str(value)]
+        flag = name.replace("_", "-")
+        if isinstance(value, bool):
+            words.append(f"--{flag}" if value else f"--no-{flag}")
+        elif name != "text":
+            words += [f"--{flag}", str(value)]
     assert run([*words, "--quiet", "--out", str(out)]) == 0
     return out.read_bytes()
 

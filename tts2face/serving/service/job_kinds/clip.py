@@ -9,7 +9,7 @@ from tts2face.picture.options import Picture
 from tts2face.request import Request
 from tts2face.serving.service.clip_options import ClipRequest, divide_options
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.job_kinds.order import JobKind, JobOrder, refuse_second
+from tts2face.serving.service.job_kinds.order import FormPart, JobKind, JobOrder, refuse_second
 from tts2face.serving.work.clip_job import BACKGROUND, FILES
 
 
@@ -47,10 +47,10 @@ CLIP_KIND = JobKind(
     "speak",
     ClipRequest,
     {
-        "audio": ("Speech in place of a voice.", add_clip_file),
-        "background": ("Picture behind the face.", add_background),
-        "partner": ("Sound that the face listens to.", add_clip_file),
-        "timeline": ("Timeline of gestures, JSON.", add_clip_file),
+        "audio": FormPart("Speech in place of a voice.", add_clip_file),
+        "background": FormPart("Picture behind the face.", add_background),
+        "partner": FormPart("Sound that the face listens to.", add_clip_file),
+        "timeline": FormPart("Timeline of gestures, JSON.", add_clip_file),
     },
     prepare_clip,
 )

@@ -11,7 +11,7 @@ A new kind of jobs:
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import BaseModel
 from starlette.datastructures import UploadFile
@@ -45,6 +45,24 @@ class JobOrder:
 AddFile = Callable[[JobOrder, str, UploadFile, int], Awaitable[None]]
 
 
+class FormPart(NamedTuple):
+    """A part of a form with a file.
+
+    Parameters
+    ----------
+    description
+        Text for clients.
+    add
+        Checks a file and notes its path: gets the order, the part's name, the file and its number from 1.
+    is_list
+        Whether it is described as a list of files; `add` refuses those beyond the first where it takes one.
+    """
+
+    description: str
+    add: AddFile
+    is_list: bool = False
+
+
 @dataclass(frozen=True, slots=True)
 class JobKind:
     """A kind of jobs.
@@ -56,15 +74,14 @@ class JobKind:
     model
         Its options.
     parts
-        Parts of a form with its files, their descriptions, and what checks one file and notes its path: gets the
-        order, the part's name, the file and its number from 1.
+        Parts of a form with its files, by name.
     prepare
         Checks an order; JSON for the function that executes it.
     """
 
     scope: str
     model: type[BaseModel]
-    parts: Mapping[str, tuple[str, AddFile]]
+    parts: Mapping[str, FormPart]
     prepare: Callable[[JobOrder], Awaitable[dict[str, Any]]]
 
 

@@ -28,7 +28,7 @@ from tts2face.serving.service.clip_options import (
 )
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.job_kinds.clip import add_background
-from tts2face.serving.service.job_kinds.order import JobKind, JobOrder, refuse_second
+from tts2face.serving.service.job_kinds.order import FormPart, JobKind, JobOrder, refuse_second
 from tts2face.serving.work.subtitles_job import LINES
 
 BATCH_FIELDS = tuple(
@@ -179,10 +179,14 @@ SUBTITLES_KIND = JobKind(
     "speak",
     SubtitlesRequest,
     {
-        "subtitles": ("Subtitle files: SubRip, WebVTT, ASS, TTML; one or several.", add_subtitles),
-        "audio": ("A recording of each subtitle file in place of a voice, in the same order.", add_track),
-        "background": ("Picture behind the face.", add_background),
-        "lines": ("Table of rate, voice and offset of single lines, CSV.", add_lines),
+        "subtitles": FormPart(
+            "Subtitle files: SubRip, WebVTT, ASS, TTML; one or several.", add_subtitles, is_list=True
+        ),
+        "audio": FormPart(
+            "A recording of each subtitle file in place of a voice, in the same order.", add_track, is_list=True
+        ),
+        "background": FormPart("Picture behind the face.", add_background),
+        "lines": FormPart("Table of rate, voice and offset of single lines, CSV.", add_lines),
     },
     prepare_subtitles,
 )

@@ -23,11 +23,12 @@ def new_job_schema(names: Sequence[str]) -> dict[str, Any]:
             "examples": [json.dumps({"kind": names[0], "request": {}})],
         }
     }
-    for kind in (JOB_KINDS[name] for name in names):
-        for part, (text, _) in kind.parts.items():
-            file = {"type": "string", "format": "binary"}
-            several = {"type": "array", "items": file} if part in {"subtitles", "audio"} else file
-            parts.setdefault(part, {**several, "description": text})
+    asked = [(name, part) for kind in names for name, part in JOB_KINDS[kind].parts.items()]
+    lists = {name for name, part in asked if part.is_list}
+    file = {"type": "string", "format": "binary"}
+    for name, part in asked:
+        content = {"type": "array", "items": file} if name in lists else file
+        parts.setdefault(name, {**content, "description": part.description})
     form = {"multipart/form-data": {"schema": {"type": "object", "required": ["job"], "properties": parts}}}
     if all(name == TALKER for name in names):  # nothing without files
         return {"description": "A form with a job and its files.", "required": True, "content": form}

@@ -10,7 +10,7 @@ from starlette.datastructures import UploadFile
 
 from tts2face.models.consent import states_consent
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.job_kinds.order import JobKind, JobOrder
+from tts2face.serving.service.job_kinds.order import FormPart, JobKind, JobOrder
 from tts2face.serving.work.client import JobClient
 from tts2face.serving.work.jobs import OPEN_STATES
 from tts2face.serving.work.resource_check import TALKER
@@ -114,9 +114,9 @@ TALKER_KIND = JobKind(
     "build",
     TalkerRequest,
     {
-        "video": ("Recording of a person who speaks, with sound.", add_video),
-        "transcript": ("Spoken words, UTF-8 text; without words, phones are recognised.", add_words),
-        "subtitles": ("Spoken words with their times: SubRip or WebVTT.", add_words),
+        "video": FormPart("Recording of a person who speaks, with sound.", add_video),
+        "transcript": FormPart("Spoken words, UTF-8 text; without words, phones are recognised.", add_words),
+        "subtitles": FormPart("Spoken words with their times: SubRip or WebVTT.", add_words, is_list=True),
     },
     prepare_talker,
 )

@@ -226,7 +226,7 @@ async def _add_files(kind: JobKind, order: JobOrder, form: FormData) -> None:
         if not isinstance(file, UploadFile):
             raise RefusedError(422, "invalid_request", f"{part} must be a file with a file name")
         numbers[part] = numbers.get(part, 0) + 1
-        await kind.parts[part][1](order, part, file, numbers[part])
+        await kind.parts[part].add(order, part, file, numbers[part])
 
 
 def _submit(
