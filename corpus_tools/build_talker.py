@@ -168,10 +168,10 @@ def _learn_from_recordings(
     trained = add_phone_network(learnt, phrases, on_progress=stages(NETWORK_STAGE))
     stated = {name: known.metadata[name] for name in ("name", "pooled") if name in known.metadata}
     both = statements_of_both(metadata, known.metadata)
-    told = {**metadata, **both, "network_base": {**stated, "phrases": len(phrases)}}
+    known_metadata = {**metadata, **both, "network_base": {**stated, "phrases": len(phrases)}}
     shown = observations[:: math.ceil(len(observations) / N_SHOWN)]
     maps = carried_audio_maps(Base.of(known), shown, trained.model, BASE_ONLY) if known.audio_maps else {}
-    return replace(trained, metadata=told, audio_maps=maps)
+    return replace(trained, metadata=known_metadata, audio_maps=maps)
 
 
 def add_appearance(

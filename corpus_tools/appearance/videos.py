@@ -17,12 +17,12 @@ from tts2face.video.resampling import fill_gaps, resample_to_grid
 class AppearanceRecording:
     """One training recording of an appearance model.
 
-    ``points`` (T, 478, 2) pixels and ``landmarks`` (T, 478, 3) mm; frame i is the instant ``begin + i / fps`` of the
+    ``points`` (T, 478, 2) pixels and ``landmarks`` (T, 478, 3) mm; frame i is the instant ``start + i / fps`` of the
     video; ``shape`` (T, M) are parameters of the talker's shape model.
     """
 
     video: Path
-    begin: float
+    start: float
     fps: float
     points: NDArray[np.float32]
     landmarks: NDArray[np.float32]
@@ -45,7 +45,7 @@ class AppearanceRecording:
             n_given += 1
 
     def _frame_time(self, frame: int) -> float:
-        return self.begin + frame / self.fps
+        return self.start + frame / self.fps
 
 
 def build_appearance_recording(

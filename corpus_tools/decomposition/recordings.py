@@ -54,11 +54,11 @@ def read_video_recording(video: Path, tracker: CachedTracker) -> FaceRecording:
     )
 
 
-def read_sound_span(video: Path, begin: float, seconds: float) -> Waveform:
-    """Sound of a video from `begin`; silence before the video's sound."""
+def read_sound_span(video: Path, start: float, seconds: float) -> Waveform:
+    """Sound of a video from `start`; silence before the video's sound."""
     sound = read_sound(video, SOUND_RATE)
     samples = np.zeros(round(seconds * sound.rate), np.float32)
-    shift = round(begin * sound.rate)
+    shift = round(start * sound.rate)
     source = sound.samples[max(shift, 0) :][: len(samples) - max(-shift, 0)]
     samples[max(-shift, 0) :][: len(source)] = source
     return Waveform(samples, sound.rate)

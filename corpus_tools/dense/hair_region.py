@@ -27,7 +27,7 @@ BESIDE_SKIN = 0.3  # logarithm of luminance: no hair has so much darker and so m
 NEAR_HAIR, OFF_BACKGROUND = 0.35, 0.6
 WALL_MM = 150.0  # of height, over which a wall may change by a distance of 1
 N_GROWTHS = 6
-MIN_GROWTH = 1.5  # of the crown's cells: hair that grows less is not told from the wall
+MIN_GROWTH = 1.5  # of the crown's cells: hair that grows less cannot be distinguished from the wall
 EDGE_CELLS, MIN_ROW_CELLS = 4, 20
 INSIDE_MM = 4.0  # of the face's oval: no hair
 TEMPLE_MM, MIN_LOCK_MM = 36.0, 9.0  # hair beside the face, from the middle of it; thinner locks do not count
@@ -76,7 +76,7 @@ def portrait_grid(marks: FloatArray) -> FloatArray:
 def find_hair(portrait: Portrait, skin: FloatArray) -> SeenHair:
     """Hair in a portrait of a person with a skin colour (3,), `log_colour`.
 
-    The crown, which is inside the skull, tells hair from skin; cells beside it that are nearer to hair already found
+    Colours of the crown, inside the skull, separate hair from skin; neighbours that are nearer to hair already found
     than to the background at the picture's edges, and are not shaded skin, follow in turn.
     """
     across, up = np.meshgrid(ACROSS_MM, UP_MM)
@@ -103,8 +103,8 @@ def find_hair(portrait: Portrait, skin: FloatArray) -> SeenHair:
     colour: FloatArray = np.median(colours[region], axis=0)
     other = background | (known & (unlike < IS_HAIR))
     length = _length(region, portrait.marks, colour - skin)
-    is_told = region.sum() > MIN_GROWTH * seed.sum()
-    return SeenHair(length if is_told or length != "cropped" else "flat", region, other, colour)
+    is_distinct = region.sum() > MIN_GROWTH * seed.sum()
+    return SeenHair(length if is_distinct or length != "cropped" else "flat", region, other, colour)
 
 
 def _without_gloss(hair: Mask, light: FloatArray) -> Mask:
@@ -148,7 +148,7 @@ def _colour_space(colours: FloatArray, off: FloatArray) -> FloatArray:
 
 
 def _grow(space: FloatArray, seed: Mask, background: Mask, limits: tuple[Mask, Mask]) -> Mask:
-    """Cells of hair, connected with `seed`; `limits`: where hair may be, and where it is told from clothes strictly."""
+    """Cells of hair, connected with `seed`; `limits`: where hair may be, and where clothes are excluded strictly."""
     from scipy.ndimage import label
     from scipy.spatial import cKDTree
 
@@ -184,8 +184,8 @@ def _length(region: Mask, marks: FloatArray, off: FloatArray) -> str:
     chin, forehead = marks[CHIN, 1], marks[FOREHEAD, 1]
     beside = [(region & (side * ACROSS_MM > TEMPLE_MM)).sum(axis=1) * CELL_MM for side in (-1, 1)]
     ends = [UP_MM[np.flatnonzero(width >= MIN_LOCK_MM)].min(initial=forehead) for width in beside]
-    told = [end for end in ends if end < forehead - TEMPLE_HAIR_MM] or [forehead]
-    reach = chin - float(np.mean(told))
+    falling = [end for end in ends if end < forehead - TEMPLE_HAIR_MM] or [forehead]
+    reach = chin - float(np.mean(falling))
     if reach > BOB_MM:
         return "long" if reach > LONG_MM else "bob"
     middle = region[:, np.abs(ACROSS_MM) < TEMPLE_MM]

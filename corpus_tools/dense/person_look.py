@@ -147,9 +147,9 @@ class LookSampler:
             colour = hair_colour(neutral(seen, cast), most)
             code = "#{:02x}{:02x}{:02x}".format(*srgb_colour(colour).tolist())
         length, notes = hair.length or UNSEEN, [] if hair.length else ["top of the head not seen"]
-        is_told = eyes.radius_px >= MIN_IRIS_PX and np.isfinite(eyes.iris).all()
-        iris = srgb_colour(iris_colour(eyes, cast)) if is_told else parse_hex(NEUTRAL_IRIS)
-        notes += [] if is_told else ["eyes too small to tell their colour"]
+        is_visible = eyes.radius_px >= MIN_IRIS_PX and np.isfinite(eyes.iris).all()
+        iris = srgb_colour(iris_colour(eyes, cast)) if is_visible else parse_hex(NEUTRAL_IRIS)
+        notes += [] if is_visible else ["eyes too small to tell their colour"]
         brows = np.array([min(colour[0], eyes.skin[0] + BROW_LIGHT), *colour[1:]])
         return PersonLook(
             cast, eyes.skin, Hairdo(HAIRCUTS[length], code), length, iris, srgb_colour(brows),

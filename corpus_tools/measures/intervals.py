@@ -67,18 +67,18 @@ def estimate(pairs: PairedCurves) -> Mapping[str, IntervalEstimate]:
     return {name: interval_of(values) for name, values in figures.items()}
 
 
-def estimate_difference(one: PairedCurves, other: PairedCurves) -> Mapping[str, IntervalEstimate]:
-    """Figures of `one` minus those of `other` on the same utterances; both are resampled together.
+def estimate_difference(first: PairedCurves, second: PairedCurves) -> Mapping[str, IntervalEstimate]:
+    """Figures of `first` minus those of `second` on the same utterances; both are resampled together.
 
     Raises
     ------
     InputError
         The two have other numbers of utterances.
     """
-    if len(one.costs) != len(other.costs):
-        raise InputError(f"{len(one.costs)} utterances cannot be paired with {len(other.costs)}; use the same ones")
-    weights = draw_weights(len(one.costs))
-    ours, theirs = one.figures(weights), other.figures(weights)
+    if len(first.costs) != len(second.costs):
+        raise InputError(f"{len(first.costs)} utterances cannot be paired with {len(second.costs)}; use the same ones")
+    weights = draw_weights(len(first.costs))
+    ours, theirs = first.figures(weights), second.figures(weights)
     return {name: interval_of(ours[name] - theirs[name]) for name in ours}
 
 

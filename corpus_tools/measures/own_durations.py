@@ -80,7 +80,7 @@ def map_word_times(speech: Speech, phones: PhoneSequence, words: Sequence[WordSp
 
 
 def _word_edges(phones: PhoneSequence, words: Sequence[WordSpan]) -> NDArray[np.float64]:
-    """(2 W,) strictly increasing seconds at which words begin and end."""
+    """(2 W,) strictly increasing seconds: start and end of each word."""
     starts = np.array([phones.edges[word.first] for word in words])
     ends = np.array([phones.edges[word.last] for word in words])
     ends[:-1] = np.minimum(ends[:-1], starts[1:] - MIN_WORD_GAP_S)

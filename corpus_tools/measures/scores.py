@@ -64,7 +64,7 @@ class ClassScore:
 class Scores:
     """Scores of a method over all held-out utterances: r and range of pooled frames, means or shares otherwise.
 
-    r *within* is that of curves without the mean of their utterance, which no text tells (a smile). ``figures`` are
+    r *within* is that of curves without the mean of their utterance, which no text predicts (a smile). ``figures`` are
     those of `FIGURES` by name, ``free_cost`` only with a voice's own durations;
     ``real_time_factor`` is the synthesis time divided by the duration of the utterances.
     """
@@ -164,14 +164,14 @@ def compute_scores(
 
 
 def _utterance_statistics(comparison: UtteranceComparison, limits: Thresholds) -> UtteranceStatistics:
-    one, curves, n, here = comparison.real, comparison.curves, len(comparison.spread), comparison.real.evaluated
-    phones, fps = one.observation.phones, one.observation.fps
-    real, synthesised = one.parameters[here, :n], comparison.synthesised[here, :n]
-    peaks = [lip_measures.peak_times(curve, phones, fps) for curve in (one.curves.opening, curves.opening)]
+    recording, curves, n, here = comparison.real, comparison.curves, len(comparison.spread), comparison.real.evaluated
+    phones, fps = recording.observation.phones, recording.observation.fps
+    real, synthesised = recording.parameters[here, :n], comparison.synthesised[here, :n]
+    peaks = [lip_measures.peak_times(curve, phones, fps) for curve in (recording.curves.opening, curves.opening)]
     offsets = peaks[1] - peaks[0]
     return UtteranceStatistics(
-        curve_moments(one.curves.opening[here], curves.opening[here]),
-        curve_moments(one.curves.width[here], curves.width[here]),
+        curve_moments(recording.curves.opening[here], curves.opening[here]),
+        curve_moments(recording.curves.width[here], curves.width[here]),
         lip_measures.rmse_z(real, synthesised, comparison.spread),
         motion_measures.warping_cost(real, synthesised, comparison.spread, round(motion_measures.DTW_BAND_S * fps)),
         _free_cost(comparison),
@@ -252,10 +252,10 @@ def _weighted_medians(weights: FloatArray, offsets: Sequence[FloatArray]) -> Flo
 def _class_scores(comparisons: Sequence[UtteranceComparison]) -> list[ClassScore]:
     classes, errors, opening = [], [], []
     for each in comparisons:
-        one, here, n = each.real, each.real.evaluated, len(each.spread)
-        classes.append(one.classes[here])
-        errors.append((each.synthesised - one.parameters)[here, :n] / each.spread)
-        opening.append((each.curves.opening - one.curves.opening)[here])
+        recording, here, n = each.real, each.real.evaluated, len(each.spread)
+        classes.append(recording.classes[here])
+        errors.append((each.synthesised - recording.parameters)[here, :n] / each.spread)
+        opening.append((each.curves.opening - recording.curves.opening)[here])
     return _score_classes(np.concatenate(classes), np.concatenate(errors), np.concatenate(opening))
 
 
@@ -271,10 +271,10 @@ def _score_classes(classes: NDArray[np.str_], errors: NDArray[np.float32], openi
 
 
 def _utterance_score(tally: UtteranceStatistics, comparison: UtteranceComparison) -> UtteranceScore:
-    one, synthesised = comparison.real, comparison.curves
-    here, recorded = one.evaluated, one.curves
+    recording, synthesised = comparison.real, comparison.curves
+    here, recorded = recording.evaluated, recording.curves
     return UtteranceScore(
-        one.observation.name,
+        recording.observation.name,
         motion_measures.correlation(recorded.opening[here], synthesised.opening[here]),
         motion_measures.correlation(recorded.width[here], synthesised.width[here]),
         tally.rmse_z,

@@ -140,7 +140,7 @@ def _recordings_in_video(video: Path) -> Iterator[Recording]:
     except DataError:
         cues = ()
     for number, cue in enumerate(cues, start=1):
-        yield Recording(f"{video.stem}-{number:04d}", video, cue.text, span=(cue.begin, cue.end))
+        yield Recording(f"{video.stem}-{number:04d}", video, cue.text, span=(cue.start, cue.end))
     if not cues:
         yield Recording(video.stem, video, subtitles or find_transcript(video))
 

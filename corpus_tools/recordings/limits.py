@@ -232,7 +232,7 @@ def picture_measures(
     return {"crowded": crowded, "frozen_s": frozen, "frame_rate": rate}
 
 
-def light_measures(light: NDArray[np.floating], begin: float, end: float) -> dict[str, float]:
+def light_measures(light: NDArray[np.floating], start: float, end: float) -> dict[str, float]:
     """Medians of `corpus_tools.recordings.light.MEASURES` between two times in seconds; nothing without a face.
 
     Parameters
@@ -240,9 +240,9 @@ def light_measures(light: NDArray[np.floating], begin: float, end: float) -> dic
     light : (N, 5)
         As `corpus_tools.recordings.light.measure_light` returns it.
     """
-    here = light[(light[:, 0] >= begin) & (light[:, 0] < end)]
+    here = light[(light[:, 0] >= start) & (light[:, 0] < end)]
     if not len(here):  # shorter than the interval of the measures
-        here = light[[np.abs(light[:, 0] - begin).argmin()]] if len(light) else light
+        here = light[[np.abs(light[:, 0] - start).argmin()]] if len(light) else light
     return dict(zip(MEASURES, np.median(here[:, 1:], axis=0).tolist(), strict=True)) if len(here) else {}
 
 

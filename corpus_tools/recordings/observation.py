@@ -185,8 +185,8 @@ def _span_landmarks(
     return filled, first + start, n_filled
 
 
-def trim_to_picture(sound: AlignedSpeech, begin: float, stop: float) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
-    """Phones and words relative to `begin`, without the silence outside [begin, stop].
+def trim_to_picture(sound: AlignedSpeech, start: float, stop: float) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+    """Phones and words relative to `start`, without the silence outside [start, stop].
 
     Raises
     ------
@@ -195,25 +195,25 @@ def trim_to_picture(sound: AlignedSpeech, begin: float, stop: float) -> tuple[Ph
     """
     phones = list(sound.phones.phones)
     edges = sound.phones.edges.copy()
-    lead = 1 if phones[0] == SILENCE and edges[1] <= begin else 0
+    lead = 1 if phones[0] == SILENCE and edges[1] <= start else 0
     tail = len(phones) - (1 if phones[-1] == SILENCE and edges[-2] >= stop else 0)
     phones, edges = phones[lead:tail], edges[lead : tail + 1]
     spoken = [i for i, phone in enumerate(phones) if phone != SILENCE]
     first, last = spoken[0], spoken[-1] + 1
     if 0 < edges[last] - stop <= MAX_OUTSIDE_S and edges[last - 1] < stop:
         edges[last] = stop
-    is_outside = edges[first] < begin or edges[last] > stop
+    is_outside = edges[first] < start or edges[last] > stop
     edges = np.clip(edges, None, stop)
     if is_outside:
         raise DataError(
-            f"there is speech while no face is visible (visible: {begin:.2f} s to {stop:.2f} s); cut the video"
+            f"there is speech while no face is visible (visible: {start:.2f} s to {stop:.2f} s); cut the video"
         )
     if phones[0] == SILENCE:
-        edges[0] = begin
-    elif edges[0] > begin:  # the sound starts after the picture
-        phones, edges, lead = [SILENCE, *phones], np.concatenate([[begin], edges]), lead - 1
+        edges[0] = start
+    elif edges[0] > start:  # the sound starts after the picture
+        phones, edges, lead = [SILENCE, *phones], np.concatenate([[start], edges]), lead - 1
     words = tuple(word.shift(-lead) for word in sound.words)
-    return PhoneSequence(phones, edges - begin), words
+    return PhoneSequence(phones, edges - start), words
 
 
 def _fit_name(spoken: AlignedSpeech | Observation) -> str:

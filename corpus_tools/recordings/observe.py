@@ -268,10 +268,10 @@ class RecordingChecker:
             return (*limit_findings(measured), Finding(REFUSAL, UNUSABLE, str(reason)))
         sync = estimate_sync_by_video([seen])[seen.video]
         found = limit_findings(measured | sync.measures)
-        told = {finding.message for finding in found}
-        if sync.problem and sync.problem not in told:
+        stated = {finding.message for finding in found}
+        if sync.problem and sync.problem not in stated:
             return (*found, Finding(REFUSAL, OUT_OF_SYNC, sync.problem))
-        return (*found, *(Finding(WARNING, OUT_OF_SYNC, text) for text in sync.warnings if text not in told))
+        return (*found, *(Finding(WARNING, OUT_OF_SYNC, text) for text in sync.warnings if text not in stated))
 
 
 def check_recording(

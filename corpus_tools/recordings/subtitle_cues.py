@@ -14,7 +14,7 @@ CUE_MARGIN_S = 0.3  # before and after a cue; subtitles are rarely closer to the
 class SpokenCue:
     """Words spoken between two instants in seconds."""
 
-    begin: float
+    start: float
     end: float
     text: str
 

@@ -45,17 +45,17 @@ class MethodVideos:
 
     def render_tag(self, run: SplitResult, at: int) -> str:
         """Video of one utterance (HTML); empty if the recording is missing or too short."""
-        one = run.real[at]
-        observation = list(evaluated_pictures(one))
-        if len(observation) < one.evaluated.stop - one.evaluated.start:
+        recording = run.real[at]
+        observation = list(evaluated_pictures(recording))
+        if len(observation) < recording.evaluated.stop - recording.evaluated.start:
             return ""
-        speech = Trajectory(speech_channels(run.model), run.synthesised[self._method][at], one.observation.fps)
+        speech = Trajectory(speech_channels(run.model), run.synthesised[self._method][at], recording.observation.fps)
         weights = build_retargeter(run.talker, self._face).retarget(speech).values
         sides = [
             np.concatenate([letterbox(pixels), self._renderer.draw(row)], axis=1)
-            for pixels, row in zip(observation, weights[one.evaluated], strict=False)
+            for pixels, row in zip(observation, weights[recording.evaluated], strict=False)
         ]
-        return video_tag(sides, one.observation.fps, NOTE.format(method=self._method))
+        return video_tag(sides, recording.observation.fps, NOTE.format(method=self._method))
 
 
 def evaluated_pictures(utterance: ReferenceUtterance) -> Iterator[NDArray[np.uint8]]:

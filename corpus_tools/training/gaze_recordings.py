@@ -1,6 +1,6 @@
 """Fixations of people in remote conversations, and the looks at the partner's face and away that they form.
 
-Read are tables of fixations and passages as ``../shared/recordings/gaze_dialogue`` has them; its README tells how they
+Read are tables of fixations and passages as ``../shared/recordings/gaze_dialogue`` has them; its README says how they
 came about, what is missing and how places were inferred. The same measures apply to made fixations.
 """
 

@@ -47,7 +47,7 @@ WRONG_NAMES = {
     "one as a name": re.compile(r"^one$"),
 }
 EYES = re.compile(r"gaze|listening|presentation|timeline|gestures/stream")  # files in which eyes look
-BUILDERS = re.compile(r"corpus_tools/shipped/")  # a look is how a person is drawn
+BUILDERS = re.compile(r"corpus_tools/(?:shipped|dense)/")  # a look is how a person is drawn
 
 
 class Finding(NamedTuple):

@@ -74,7 +74,7 @@ def grid(folder: Path) -> Iterator[Case]:
     for path in sorted((folder / "align").glob("*.align"))[1::39][:N_GRID]:
         cues = read_word_times(path)
         words = pronounce_transcript(" ".join(cue.text for cue in cues), "en-us")
-        edges = tuple(np.array([cue.begin, cue.end]) for cue in cues)
+        edges = tuple(np.array([cue.start, cue.end]) for cue in cues)
         yield Case(read_sound(folder / "clips" / f"{path.stem}.mkv", RATE), words, edges, is_of_words=True)
 
 

@@ -58,8 +58,8 @@ def sounding(phones: PhoneSequence) -> PhoneSequence:
 def stated(words: Sequence[heart.LetteredWord], phones: Sequence[StatedPhone], duration: float) -> PhoneSequence:
     """Phones as the voice states them."""
     spoken = [one for one in phones if one.label != SILENCE]
-    end = spoken[-1].begin + spoken[-1].duration
-    edges = enforce_increasing(np.array([*(one.begin for one in spoken), min(end, duration)]))
+    end = spoken[-1].start + spoken[-1].duration
+    edges = enforce_increasing(np.array([*(one.start for one in spoken), min(end, duration)]))
     return PhoneSequence([one.label for one in spoken], edges)
 
 

@@ -100,7 +100,7 @@ def test_every_encoding_gives_the_same_text(write, encoding):
 def test_vtt_keeps_its_first_cue_with_and_without_header(write, header):
     cues = cues_of(write(".vtt", VTT.replace("WEBVTT\n\n", header)))
     assert [cue.text for cue in cues] == ["Place blue", "again"]
-    assert cues[1].begin < 3723.0 < cues[1].end
+    assert cues[1].start < 3723.0 < cues[1].end
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])

@@ -56,7 +56,7 @@ def test_every_sound_lies_in_a_phone_and_every_pause_in_a_silence(voice: NeuralV
 
 def test_what_the_voice_states_may_be_wrong(voice: NeuralVoice, classifier: PhoneClassifier) -> None:
     ((sound, _, stated),) = voice.parts(TEXT)
-    late = [stated[0], *(replace(one, begin=one.begin + 0.06) for one in stated[1:])]
+    late = [stated[0], *(replace(one, start=one.start + 0.06) for one in stated[1:])]
     assert np.median(np.abs(find_edges(sound, late, classifier) - find_edges(sound, stated, classifier))) < 0.005
 
 

@@ -170,11 +170,11 @@ class _Nod:
     time: float
     width: float
     direction: FloatArray
-    begin: float
+    start: float
 
     def curve(self, times: FloatArray) -> FloatArray:
         """(T,) shares of the nod's size at T times."""
         curve = np.zeros(len(times))
         for shift, share in NOD_PARTS:
             curve += share * np.exp(-0.5 * np.square((times - self.time - shift) / self.width))
-        return curve * smoothstep(times, self.begin, self.begin + ONSET_RAMP_S)
+        return curve * smoothstep(times, self.start, self.start + ONSET_RAMP_S)

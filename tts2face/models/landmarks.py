@@ -66,9 +66,9 @@ def lip_width(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
     return _normalised_distance(landmarks, MOUTH_CORNER_RIGHT, MOUTH_CORNER_LEFT)
 
 
-def _normalised_distance(landmarks: NDArray[np.floating], one: int, other: int) -> NDArray[np.float64]:
+def _normalised_distance(landmarks: NDArray[np.floating], first: int, second: int) -> NDArray[np.float64]:
     eyes = np.linalg.norm(landmarks[:, EYE_OUTER_LEFT] - landmarks[:, EYE_OUTER_RIGHT], axis=1)
-    return np.asarray(np.linalg.norm(landmarks[:, one] - landmarks[:, other], axis=1) / eyes, np.float64)
+    return np.asarray(np.linalg.norm(landmarks[:, first] - landmarks[:, second], axis=1) / eyes, np.float64)
 
 
 def inner_lip_gaps(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:

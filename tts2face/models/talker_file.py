@@ -126,7 +126,7 @@ class Recordings(StoredModel):
         named: Sequence[tuple[str, Any]],
         inventory: Sequence[str],
         spread: Float32Array,
-        looks: Float32Array | None,
+        appearances: Float32Array | None,
     ) -> Iterator[Utterance]:
         """The utterances, with their names and words, and appearance parameters (N, A)."""
         frames = np.concatenate([[0], np.cumsum(self.n_frames)])
@@ -137,7 +137,7 @@ class Recordings(StoredModel):
             sequence = PhoneSequence(labels, self.edges[phones[i] + i : phones[i + 1] + i + 1])
             spans = tuple(WordSpan(text, first, last) for text, first, last in words)
             span = slice(frames[i], frames[i + 1])
-            own = None if looks is None else looks[span]
+            own = None if appearances is None else appearances[span]
             yield Utterance(name, sequence, spans, shape[span], self.head[span], self.intensity[span], own)
 
 
@@ -221,12 +221,12 @@ def _talker_of(contents: Contents) -> Talker:
     arrays, header = contents.arrays, contents.header
     model, recordings = model_of(ShapeModel, contents), model_of(Recordings, contents)
     appearance = model_of(Appearance, contents, APPEARANCE) if has_part(contents, APPEARANCE) else None
-    looks = None if appearance is None else arrays["looks"] * (appearance.spread / STEPS_PER_PARAMETER)
+    appearances = None if appearance is None else arrays["looks"] * (appearance.spread / STEPS_PER_PARAMETER)
     fps = float(header["fps"])
     return Talker(
         fps=fps,
         model=model,
-        utterances=tuple(recordings.utterances(header["utterances"], header["inventory"], model.spread, looks)),
+        utterances=tuple(recordings.utterances(header["utterances"], header["inventory"], model.spread, appearances)),
         metadata={key: value for key, value in header.items() if key not in OF_FORMAT},
         appearance=appearance,
         network=model_of(PhoneNetwork, contents, NETWORK) if has_part(contents, NETWORK) else None,

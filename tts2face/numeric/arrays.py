@@ -70,14 +70,14 @@ def true_runs(values: NDArray[np.bool_]) -> NDArray[np.int64]:
 def connected_pieces(corners: NDArray[np.integer], n_vertices: int) -> NDArray[np.int32]:
     """(V,) number of the connected piece of each vertex of triangles (T, 3), by the first vertex of the pieces."""
     first = np.arange(n_vertices)
-    one, other = np.concatenate([corners[:, :2], corners[:, 1:]]).T
-    while len(one):
-        np.minimum.at(first, np.maximum(one, other), np.minimum(one, other))
+    left, right = np.concatenate([corners[:, :2], corners[:, 1:]]).T
+    while len(left):
+        np.minimum.at(first, np.maximum(left, right), np.minimum(left, right))
         while not np.array_equal(first, beyond := first[first]):
             first = beyond
-        one, other = first[one], first[other]
-        apart = one != other
-        one, other = one[apart], other[apart]
+        left, right = first[left], first[right]
+        apart = left != right
+        left, right = left[apart], right[apart]
     return np.unique(first, return_inverse=True)[1].astype(np.int32)
 
 

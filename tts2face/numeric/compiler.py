@@ -101,8 +101,8 @@ class KernelCompiler(CompilerBase):  # type: ignore[misc]
     def define_pipelines(self) -> list[Any]:
         """As numba asks for the passes."""
         passes = PassManager("kernel")
-        for one in self.PASSES:
-            passes.add_pass(one, one.__name__)
+        for step in self.PASSES:
+            passes.add_pass(step, step.__name__)
         passes.finalize()
         return [passes]
 
@@ -179,7 +179,7 @@ def _entry(context: Any, described: Any) -> tuple[Any, str, str]:
 
     def whole(kind: Any) -> Any:
         if isinstance(kind, BaseTuple):
-            return context.make_tuple(builder, kind, [whole(one) for one in kind])
+            return context.make_tuple(builder, kind, [whole(member) for member in kind])
         return next(values)
 
     whole_values = [whole(kind) for kind in described.argtypes]
@@ -200,7 +200,7 @@ def _entry(context: Any, described: Any) -> tuple[Any, str, str]:
 
 def _leaves(kind: Any) -> list[Any]:
     """Types that a type consists of."""
-    return [leaf for one in kind for leaf in _leaves(one)] if isinstance(kind, BaseTuple) else [kind]
+    return [leaf for member in kind for leaf in _leaves(member)] if isinstance(kind, BaseTuple) else [kind]
 
 
 def _argument_code(kind: Any) -> str:
@@ -275,8 +275,8 @@ def write_larger(_: Any, array: Any, at: Any, count: Any, value: Any, step: Any)
         entries = builder.gep(context.make_array(signature.args[0])(context, builder, held).data, [first])
         entries = builder.bitcast(entries, numbers.as_pointer())
         count, value, step = (
-            builder.shuffle_vector(builder.insert_element(none, one, ir.IntType(32)(0)), none, every)
-            for one in (n, start, more)
+            builder.shuffle_vector(builder.insert_element(none, number, ir.IntType(32)(0)), none, every)
+            for number in (n, start, more)
         )
         own = builder.add(value, builder.mul(step, index))
         own = builder.select(builder.icmp_signed("<", index, count), own, none)
@@ -293,7 +293,7 @@ INTRINSICS = {"flat_view": flat_view, "write_larger": write_larger}
 class _Compilations(event.Listener):  # type: ignore[misc]
     """Logs that functions are compiled: the first one, and now and then how many there have been.
 
-    Meanwhile no garbage is looked for: a compilation makes 100,000 of objects that live as long as it, and looking
+    Meanwhile no garbage is collected: a compilation makes 100,000 of objects that live as long as it, and searching
     through them takes a tenth of its time. numba lets one thread compile at a time.
     """
 

@@ -153,7 +153,7 @@ class Kernel(Generic[Arguments, Result]):
             except (OSError, ValueError):
                 found = importlib.import_module("tts2face.numeric.compiler").compile_kernel(self, tuple(arguments))
                 _keep(path, found)
-            types = [CODES[one] for one in found.arguments]
+            types = [CODES[code] for code in found.arguments]
             prototype = ctypes.CFUNCTYPE(ctypes.c_int, *types, *([ctypes.c_char_p] if found.results else []))
             function = prototype(load_object(found.code, ENTRY))
             self._loaded[key] = function, found.results, found.is_tuple
@@ -161,7 +161,7 @@ class Kernel(Generic[Arguments, Result]):
 
 
 def _flatten(values: Sequence[Any], flat: list[Any], seen: list[Any]) -> None:
-    """Append the arrays and numbers that arguments hold, and what tells their types apart; made to be fast."""
+    """Append the arrays and numbers that arguments hold, and what distinguishes their types; made to be fast."""
     for value in values:
         kind = type(value)
         if kind is np.ndarray:
@@ -184,7 +184,7 @@ def _flatten(values: Sequence[Any], flat: list[Any], seen: list[Any]) -> None:
 
 
 def _describe(values: Sequence[Any]) -> Iterator[int]:
-    """What code depends on: the types of arguments that `_flatten` takes, and the layout of arrays."""
+    """Types on which code depends: those of arguments that `_flatten` takes, and the layout of arrays."""
     for value in values:
         if isinstance(value, np.ndarray):
             layout, dtype = value.flags.num & LAYOUT, value.dtype
@@ -231,7 +231,7 @@ def _time_of_change(path: Path) -> float:
 
 @cache
 def _machine() -> str:
-    """What compiled code depends on besides its source: processor, compiler, and settings of the compiler."""
+    """Dependencies of compiled code besides its source: processor, compiler, and settings of the compiler."""
     compiler = Path(__file__).with_name("compiler.py").read_bytes()
     settings = sorted(item for item in os.environ.items() if item[0].startswith("NUMBA_") and item[0] != CACHE_VARIABLE)
     versions = []

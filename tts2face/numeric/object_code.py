@@ -68,7 +68,7 @@ def _load(code: bytes, name: str) -> int:
     return addresses[names.index(name)]
 
 
-def _find_symbols(code: bytes, sections: list[Section], begins: dict[int, int]) -> tuple[list[str], list[int]]:
+def _find_symbols(code: bytes, sections: list[Section], starts: dict[int, int]) -> tuple[list[str], list[int]]:
     """Names and addresses of the symbols of an object whose sections begin at known addresses; 0 where there is none.
 
     Common symbols have none: they are numba's, for calls of the interpreter, and nothing in a kernel refers to them.
@@ -77,8 +77,8 @@ def _find_symbols(code: bytes, sections: list[Section], begins: dict[int, int]) 
     texts, names, addresses = sections[table.link].at, [], []
     for at_name, section, value in struct.iter_unpack(SYMBOL, code[table.at : table.at + table.size]):
         names.append(code[texts + at_name : code.index(b"\0", texts + at_name)].decode())
-        if section in begins:
-            addresses.append(begins[section] + value)
+        if section in starts:
+            addresses.append(starts[section] + value)
         else:
             addresses.append(_address(names[-1]) if section == UNDEFINED and names[-1] else 0)
     return names, addresses
@@ -101,12 +101,12 @@ def _arrange(sections: list[Section]) -> tuple[dict[int, int], int, int]:
 
 def _relocate(memory: Any, at: tuple[int, int], table: bytes, addresses: list[int]) -> None:
     """Write the addresses that a section refers to; `at` is the memory's address and the section's place in it."""
-    base, begin = at
+    base, start = at
     for offset, kind, symbol, addend in struct.iter_unpack(RELOCATION, table):
         if kind not in FIELDS or not addresses[symbol]:
             raise UnknownObject
         size, is_relative = FIELDS[kind]
-        place = begin + offset
+        place = start + offset
         value = addresses[symbol] + addend - (base + place if is_relative else 0)
         if size == 4 and not -(2**31) <= value < 2**31:
             raise UnknownObject

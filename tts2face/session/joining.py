@@ -37,7 +37,7 @@ def join_utterances(speeches: Sequence[Speech], gaps: Sequence[float]) -> tuple[
     -------
     speech
         The utterances in sequence.
-    begins
+    starts
         N offsets in seconds from times of the utterances to times of the whole.
     """
     parts: list[Speech] = []
@@ -101,7 +101,7 @@ class Excerpt:
 
 
 def excerpt_of_speech(speech: Speech, start: float, end: float) -> Speech:
-    """Speech from `begin` to `end` seconds, faded there, with the phones and whole words within; see `word_bounds`."""
+    """Speech from `start` to `end` seconds, faded there, with the phones and whole words within; see `word_bounds`."""
     sound, edges = speech.waveform, speech.phones.edges
     first, last = round(start * sound.rate), max(round(end * sound.rate), round(start * sound.rate) + 1)
     gains = _fade_gains(last - first, sound.rate, first > 0, last < len(sound.samples))
@@ -276,14 +276,14 @@ class SentenceTimes:
 
     firsts: tuple[int, ...]
     word_times: tuple[WordTimes, ...]
-    begins: tuple[float, ...]
+    starts: tuple[float, ...]
 
     def onset(self, letter: int) -> float:
         """Start in seconds of the word at or after a letter."""
         at = max(bisect_right(self.firsts, letter) - 1, 0)
-        return self.begins[at] + self.word_times[at].onset(letter)
+        return self.starts[at] + self.word_times[at].onset(letter)
 
     def end(self, letter: int) -> float:
         """End in seconds of the word before a letter."""
         at = max(bisect_left(self.firsts, letter) - 1, 0)
-        return self.begins[at] + self.word_times[at].end(letter)
+        return self.starts[at] + self.word_times[at].end(letter)

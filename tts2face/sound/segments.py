@@ -46,7 +46,7 @@ class StatedPhone:
 
     Parameters
     ----------
-    begin, duration
+    start, duration
         In seconds.
     may_be_skipped
         Whether it is a silence that the sound may lack.
@@ -55,7 +55,7 @@ class StatedPhone:
     """
 
     label: str
-    begin: float
+    start: float
     duration: float = 0.0
     may_be_skipped: bool = False
     is_marked: bool = False
@@ -78,7 +78,7 @@ class Segments(NamedTuple):
         Log probabilities of durations of 0 to D - 1 frames; there is no limit where the first one is above zero.
     bounds : (J, 2)
         Earliest and latest frame of each joint.
-    begins, ends : (N, W)
+    starts, ends : (N, W)
         Log probabilities that a segment begins and ends in each frame after the earliest one of its joint.
     """
 
@@ -89,7 +89,7 @@ class Segments(NamedTuple):
     taken: FloatArray
     durations: FloatArray
     bounds: IntArray
-    begins: FloatArray
+    starts: FloatArray
     ends: FloatArray
 
 
@@ -162,7 +162,7 @@ def _search(sums, segments, found, space):  # type: ignore[no-untyped-def]
         so_far = score[source, : latest - earliest + 1]
         starts = space.starts[: len(so_far)]
         for at in range(len(starts)):  # whole arrays would take long to compile
-            starts[at] = so_far[at] + segments.taken[n] + segments.begins[n, at] - sums[earliest + at, label]
+            starts[at] = so_far[at] + segments.taken[n] + segments.starts[n, at] - sums[earliest + at, label]
         if segments.durations[n, 0] > 0.0:
             _end_unlimited(starts, (earliest, low, high), segments.shortest[n], space)
         else:
@@ -214,7 +214,7 @@ def find_edges(sound: Waveform, stated: Sequence[StatedPhone], classifier: Phone
         The first and the last one are silences.
     """
     probabilities = classifier.log_probabilities(frame_features(sound))[:-1]
-    starts = np.array([0.0, *(phone.begin for phone in stated[1:])])
+    starts = np.array([0.0, *(phone.start for phone in stated[1:])])
     found = divide(SCORE_WEIGHT * probabilities, _stated_segments(stated, starts, len(probabilities), classifier))
     if not found:
         return enforce_increasing(np.append(starts, sound.duration))

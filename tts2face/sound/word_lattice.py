@@ -160,7 +160,7 @@ def _weighted(
         taken=taken,
         durations=likely,
         bounds=bounds,
-        begins=starts,
+        starts=starts,
         ends=ends,
     )
 

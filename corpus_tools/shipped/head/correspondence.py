@@ -120,9 +120,9 @@ def _nearest_point(point: FloatArray, corners: FloatArray) -> tuple[int, FloatAr
 
 def _plane_weights(point: FloatArray, corners: FloatArray) -> FloatArray:
     """(F, 3) barycentric weights of a point's orthogonal projection onto each triangle's plane."""
-    one, two, there = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], point - corners[:, 0]
-    d11, d12, d22 = (one * one).sum(axis=1), (one * two).sum(axis=1), (two * two).sum(axis=1)
-    d1, d2 = (there * one).sum(axis=1), (there * two).sum(axis=1)
+    u, v, there = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], point - corners[:, 0]
+    d11, d12, d22 = (u * u).sum(axis=1), (u * v).sum(axis=1), (v * v).sum(axis=1)
+    d1, d2 = (there * u).sum(axis=1), (there * v).sum(axis=1)
     area = np.maximum(d11 * d22 - d12 * d12, 1e-30)
     second, third = (d22 * d1 - d12 * d2) / area, (d11 * d2 - d12 * d1) / area
     return np.stack([1.0 - second - third, second, third], axis=1)

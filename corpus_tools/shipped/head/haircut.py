@@ -155,9 +155,9 @@ def border_points(cards: Cards) -> FloatArray:
     pairs, count = np.unique(ends, axis=0, return_counts=True)
     places = np.zeros((int(cards.weld.max()) + 1, 3))
     places[cards.weld] = cards.vertices
-    one, two = places[pairs[count == 1]].transpose(1, 0, 2)
+    start, end = places[pairs[count == 1]].transpose(1, 0, 2)
     along = np.linspace(0, 1, 41)[:, None, None]
-    points: FloatArray = (one + along * (two - one)).reshape(-1, 3)
+    points: FloatArray = (start + along * (end - start)).reshape(-1, 3)
     return points
 
 

@@ -120,8 +120,8 @@ def _rims(vertices: FloatArray, edges: NDArray[np.int64], columns: FloatArray, s
     for at, x in enumerate(columns):
         crossed = (ends[:, 0, 0] <= x) != (ends[:, 1, 0] <= x)
         if crossed.any():
-            one, two = ends[crossed, 0], ends[crossed, 1]
-            points = one + ((x - one[:, 0]) / (two[:, 0] - one[:, 0]))[:, None] * (two - one)
+            start, end = ends[crossed, 0], ends[crossed, 1]
+            points = start + ((x - start[:, 0]) / (end[:, 0] - start[:, 0]))[:, None] * (end - start)
             points = points[points[:, 2] > points[:, 2].max() - DEPTH_MM]
             rims[at] = points[np.argmin(sign * points[:, 1]), 1:]
     return rims

@@ -97,13 +97,13 @@ def intersect_ray(origin: FloatArray, ray: FloatArray, corners: FloatArray) -> t
     A ray without intersection gives the nearest corner and 0; one that grazes an outline first gives the corner there.
     Source: Moeller and Trumbore 1997.
     """
-    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    across, off = np.cross(ray, two), origin - corners[:, 0]
-    determinant = (one * across).sum(axis=1)
+    to_second, to_third = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    across, off = np.cross(ray, to_third), origin - corners[:, 0]
+    determinant = (to_second * across).sum(axis=1)
     determinant[np.abs(determinant) < 1e-12] = np.inf
-    beside = np.cross(off, one)
+    beside = np.cross(off, to_second)
     second, third = (off * across).sum(axis=1) / determinant, beside @ ray / determinant
-    depth = (beside * two).sum(axis=1) / determinant
+    depth = (beside * to_third).sum(axis=1) / determinant
     inside = (second >= 0) & (third >= 0) & (second + third <= 1) & (depth > 0)
     if not inside.any():
         distances = np.linalg.norm(np.cross(off, ray), axis=1)
@@ -114,7 +114,7 @@ def intersect_ray(origin: FloatArray, ray: FloatArray, corners: FloatArray) -> t
     distances = np.linalg.norm(np.cross(off[grazed], ray), axis=1)
     if distances.size and distances.min() < GRAZE_MM[0]:  # past the outline of the face onto what lies far behind it
         return corners[grazed][int(distances.argmin()), 0], 1.0
-    normal = np.cross(one[first], two[first])
+    normal = np.cross(to_second[first], to_third[first])
     return origin + depth[first] * ray, -float(normal @ ray) / max(float(np.linalg.norm(normal)), 1e-30)
 
 

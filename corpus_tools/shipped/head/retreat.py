@@ -71,9 +71,9 @@ def front_depth(places: FloatArray, vertices: FloatArray, triangles: NDArray[np.
     area = np.where(np.abs(area) < 1e-9, np.inf, area)
     front = np.full(len(places), np.inf)
     for number, (x, y) in enumerate(places):
-        one = ((x - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (y - a[:, 1])) / area
-        two = ((b[:, 0] - a[:, 0]) * (y - a[:, 1]) - (x - a[:, 0]) * (b[:, 1] - a[:, 1])) / area
-        inside = (one >= 0) & (two >= 0) & (one + two <= 1)
+        second = ((x - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (y - a[:, 1])) / area
+        third = ((b[:, 0] - a[:, 0]) * (y - a[:, 1]) - (x - a[:, 0]) * (b[:, 1] - a[:, 1])) / area
+        inside = (second >= 0) & (third >= 0) & (second + third <= 1)
         if inside.any():
-            front[number] = (a[:, 2] + one * (b - a)[:, 2] + two * (c - a)[:, 2])[inside].max()
+            front[number] = (a[:, 2] + second * (b - a)[:, 2] + third * (c - a)[:, 2])[inside].max()
     return front

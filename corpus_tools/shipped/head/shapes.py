@@ -81,10 +81,10 @@ def neighbour_means(skin: HeadSkin) -> sparse.csr_array:
     n, m = len(weld), int(weld.max()) + 1
     sides = weld[np.stack([skin.quads, np.roll(skin.quads, -1, axis=1)], axis=-1).reshape(-1, 2)]
     pairs = np.unique(np.concatenate([sides, sides[:, ::-1]]), axis=0)
-    one = sparse.csr_array((np.ones(len(pairs)), pairs.T), shape=(m, m))
+    adjacency = sparse.csr_array((np.ones(len(pairs)), pairs.T), shape=(m, m))
     first = np.zeros(m, np.int64)
     first[weld] = np.arange(n)
-    mean = sparse.csr_array(sparse.diags_array(1.0 / one.sum(axis=1)) @ one).tocoo()
+    mean = sparse.csr_array(sparse.diags_array(1.0 / adjacency.sum(axis=1)) @ adjacency).tocoo()
     rows = sparse.csr_array((mean.data, (mean.row, first[mean.col])), shape=(m, n))
     return sparse.csr_array(rows[weld])
 

@@ -76,9 +76,9 @@ def _cut_triangles(points: FloatArray, triangles: IntArray, inside: FloatArray) 
     faces: list[tuple[int, int, int]] = []
     for a, b, c in triangles[(n_in > 0) & (n_in < 3)].tolist():
         turns = ((a, b, c), (b, c, a), (c, a, b))
-        odd, one, two = next(turn for turn in turns if is_in[turn[0]] != is_in[turn[1]] == is_in[turn[2]])
-        to_one, to_two = crossing(odd, one), crossing(odd, two)
-        faces += [(odd, to_one, to_two)] if is_in[odd] else [(to_one, one, two), (to_one, two, to_two)]
+        odd, following, last = next(turn for turn in turns if is_in[turn[0]] != is_in[turn[1]] == is_in[turn[2]])
+        first, second = crossing(odd, following), crossing(odd, last)
+        faces += [(odd, first, second)] if is_in[odd] else [(first, following, last), (first, last, second)]
     cut = np.array(faces, np.int64).reshape(-1, 3)
     return np.concatenate([points, np.array(new_points).reshape(-1, points.shape[1])]), np.concatenate(
         [triangles[n_in == 3], cut]

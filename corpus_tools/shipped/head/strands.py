@@ -146,12 +146,12 @@ def strand_tangents(cards: Cards, angles: FloatArray) -> FloatArray:
     """(N, 3) unit vectors along the strands, downwards, of cards whose texture has the directions `angles` (H, W)."""
     vertices, triangles, uv, weld = cards.vertices, cards.triangles, cards.uv, cards.weld
     height, width = angles.shape
-    one, two = (vertices[triangles[:, k]] - vertices[triangles[:, 0]] for k in (1, 2))
+    to_second, to_third = (vertices[triangles[:, k]] - vertices[triangles[:, 0]] for k in (1, 2))
     first, second = ((uv[triangles[:, k]] - uv[triangles[:, 0]]) * [width, height] for k in (1, 2))
     determinant = first[:, 0] * second[:, 1] - second[:, 0] * first[:, 1]
     determinant = np.where(np.abs(determinant) < 1e-6, 1e-6, determinant)[:, None]
-    along_u = (one * second[:, 1:] - two * first[:, 1:]) / determinant
-    along_v = (two * first[:, :1] - one * second[:, :1]) / determinant
+    along_u = (to_second * second[:, 1:] - to_third * first[:, 1:]) / determinant
+    along_v = (to_third * first[:, :1] - to_second * second[:, :1]) / determinant
     texel = np.clip((uv[triangles].mean(axis=1) * [width, height]).astype(np.int64), 0, [width - 1, height - 1])
     angle = angles[texel[:, 1], texel[:, 0]][:, None]
     flow = unit_vectors(along_u * np.cos(angle) + along_v * np.sin(angle))

@@ -36,14 +36,14 @@ N_UNITS, N_EPOCHS = 128, 12
 N_UNITS_OF_RECORDINGS = 192
 LEARNING_RATES = (1.5e-3, 7.5e-5)  # in the first and the last epoch
 LEAST_SPREAD, WEIGHT_DECAY = 0.05, 1e-4
-TEST_SHARE = 20  # every twentieth text tells the accuracy
+TEST_SHARE = 20  # every twentieth text measures the accuracy
 PRIOR_SHARE = 0.6  # of the log frequencies of phones that is taken out: the search knows which phones are there
 LEAST_DURATION_S, LEAST_DEVIATION = 0.02, 0.3
 EPOCHS_OF_RECORDINGS = (12, 12, 12, 20)  # of rounds in which edges of other speech and the classifier are found
 N_DAMAGED = 2  # times that each text is learnt
 FRAME_SHARE, SILENCE_SHARE = 0.45, 0.33  # of frames, and of the silent ones among them, that are learnt
 SURE = 0.5  # of a spike whose delay is measured
-Told = Callable[[str], None]
+Report = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,8 +55,8 @@ class Frames:
     is_test: NDArray[np.bool_]
 
 
-def train_voice_classifier(*, on_progress: Progress, report: Told) -> PhoneClassifier:
-    """Classifier of the voice ``heart``; `report` is told its accuracy on texts that it has not learnt."""
+def train_voice_classifier(*, on_progress: Progress, report: Report) -> PhoneClassifier:
+    """Classifier of the voice ``heart``; `report` receives its accuracy on texts that it has not learnt."""
     voice, texts = NeuralVoice({}), training_texts()
     parts: list[tuple[Waveform, Sequence[StatedPhone], bool]] = []
     for at, text in enumerate(texts):
@@ -74,7 +74,7 @@ def train_voice_classifier(*, on_progress: Progress, report: Told) -> PhoneClass
     return replace(classifier, durations=_durations(classifier.inventory, aligned))
 
 
-def train_recording_classifier(recordings: Path, *, on_progress: Progress, report: Told) -> PhoneClassifier:
+def train_recording_classifier(recordings: Path, *, on_progress: Progress, report: Report) -> PhoneClassifier:
     """Classifier of recordings of anybody.
 
     Parameters
@@ -118,7 +118,7 @@ def phone_labels(phones: PhoneSequence, n_frames: int) -> NDArray[np.str_]:
 def _stated_sequence(stated: Sequence[StatedPhone], duration: float) -> PhoneSequence:
     """Phones as the voice states them; pauses without punctuation are left out."""
     kept = [item for item in stated if item.is_marked or not item.may_be_skipped]
-    edges = np.array([0.0, *(recording.begin for recording in kept[1:]), duration])
+    edges = np.array([0.0, *(recording.start for recording in kept[1:]), duration])
     return PhoneSequence([recording.label for recording in kept], enforce_increasing(np.minimum(edges, duration)))
 
 
@@ -129,7 +129,7 @@ def _found_sequence(sound: Waveform, stated: Sequence[StatedPhone], classifier: 
     return PhoneSequence([stated[at].label for at in kept], [*edges[kept], sound.duration])
 
 
-def _fit(frames: Frames, size: tuple[int, int], report: Told) -> PhoneClassifier:
+def _fit(frames: Frames, size: tuple[int, int], report: Report) -> PhoneClassifier:
     """Classifier of frames by a number of units, in a number of epochs; durations and delays are not known yet."""
     from sklearn.neural_network import MLPClassifier
 
@@ -155,9 +155,9 @@ def _fit_lessons(
     known: Sequence[PhoneSequence | None],
     delays: Mapping[str, float],
     n_epochs: int,
-    report: Told,
+    report: Report,
 ) -> PhoneClassifier:
-    """Classifier of damaged speech whose phones are known; it tells them as if most of them were equally frequent."""
+    """Classifier of damaged speech whose phones are known; it weighs them as if most of them were equally frequent."""
     rng, parts = np.random.default_rng(0), []
     for lesson in lessons:
         if (phones := known[lesson.number]) is not None:

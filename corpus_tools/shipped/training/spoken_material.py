@@ -99,4 +99,4 @@ def _recorded(folder: Path) -> Iterator[WordedSpeech]:
         words = pronounce_transcript(" ".join(cue.text for cue in cues), "en-us")
         if len(words) == len(cues):
             sound = read_sound(folder / "clips" / f"{path.stem}.mkv", RATE)
-            yield WordedSpeech(sound, words, [(cue.begin, cue.end) for cue in cues])
+            yield WordedSpeech(sound, words, [(cue.start, cue.end) for cue in cues])

@@ -31,7 +31,7 @@ WEIGHT_DECAY, LEAST_SPREAD = 1e-3, 0.05
 SPREAD_EXPONENT = 0.5  # as `corpus_tools.training.network_audio_map.NetworkMapOptions` has it
 N_DAMAGED = 8  # times that each sound is learnt
 GAINS_DB = (-18.0, 6.0)
-TEST_SHARE = 20  # every twentieth sound tells the error
+TEST_SHARE = 20  # every twentieth sound measures the error
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +46,7 @@ class _Lesson:
 def learn_voices_map(
     talker: Talker, recordings: Path, *, on_progress: Progress, report: Callable[[str], None]
 ) -> AudioMap:
-    """Audio map of a talker for any voice; `report` is told its correlation on sounds that it has not learnt.
+    """Audio map of a talker for any voice; `report` receives its correlation on sounds that it has not learnt.
 
     Parameters
     ----------

@@ -128,15 +128,15 @@ def _sentences(result: Evaluation, runs: Sequence[SplitResult], method: str, pla
 
 
 def _curves(run: SplitResult, at: int, names: Sequence[str]) -> str:
-    one = run.real[at]
-    times = np.arange(len(one.parameters)) / one.observation.fps
+    recording = run.real[at]
+    times = np.arange(len(recording.parameters)) / recording.observation.fps
     unit = "/ eyes" if run.scale is None else "(z)"
     synthesised = {name: run.curves(name, at) for name in names}
     plots = []
     for label, curve in ((f"lip gap {unit}", "opening"), (f"mouth width {unit}", "width")):
-        values = {"real": getattr(one.curves, curve)}
+        values = {"real": getattr(recording.curves, curve)}
         values |= {name: getattr(curves, curve) for name, curves in synthesised.items()}
-        plots.append(curves_plot(times, values, label, one.observation.phones))
+        plots.append(curves_plot(times, values, label, recording.observation.phones))
     return "\n".join(plots)
 
 

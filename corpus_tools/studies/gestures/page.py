@@ -121,9 +121,13 @@ def spectrum_panel(style: StyleStudy, moving: FeatureComparison) -> Panel:
 
 def autocorrelation_panel(style: StyleStudy, feature: str) -> Panel:
     """Autocorrelation of ten minutes over the lag."""
-    one, title = style.long_run.repetition[feature], f"{feature}: autocorrelation"
+    repetition, title = style.long_run.repetition[feature], f"{feature}: autocorrelation"
     lags = np.arange(FROM_S, LAGS_S) + 0.5
-    kinds = ("recordings, shuffled", one.real), ("field, speech", one.speech), ("field, silence", one.silence)
+    kinds = (
+        ("recordings, shuffled", repetition.real),
+        ("field, speech", repetition.speech),
+        ("field, silence", repetition.silence),
+    )
 
     def draw(axes: "Axes") -> None:
         for (name, values), (colour, dash) in zip(kinds, SERIES, strict=False):

@@ -64,18 +64,18 @@ class TableComparison:
 
 
 def compare_tables(
-    one: SimilarityTable, two: SimilarityTable, other: str, stream: np.random.Generator
+    first: SimilarityTable, second: SimilarityTable, other: str, stream: np.random.Generator
 ) -> TableComparison:
     """Compare two talkers' tables; `other` is the second one's name."""
-    common = tuple(phone for phone in one.phones if phone in two.phones)
+    common = tuple(phone for phone in first.phones if phone in second.phones)
     if len(common) < LEAST_PHONES:
         raise InputError(
             f"the talkers have {len(common)} phones in common; a comparison needs {LEAST_PHONES}; choose another talker"
         )
-    a, b = _select_phones(one, common), _select_phones(two, common)
+    a, b = _select_phones(first, common), _select_phones(second, common)
     difference = a - b
     per_phone = np.abs(difference).sum(axis=1) / (len(common) - 1)
-    apart = sorted({*one.phones, *two.phones} - set(common))
+    apart = sorted({*first.phones, *second.phones} - set(common))
     return TableComparison(other, common, difference, per_phone, mantel(a, b, stream), tuple(apart))
 
 

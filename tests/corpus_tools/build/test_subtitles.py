@@ -30,8 +30,8 @@ def test_cues_are_read_and_widened_up_to_their_neighbours(name: str, content: by
     first, second = read_cues(path)
     assert first.text == "Hello there."
     assert second.text == "It is £5."
-    assert (first.begin, first.end) == pytest.approx((0.7, 2.05))
-    assert (second.begin, second.end) == pytest.approx((2.05, 3.8))
+    assert (first.start, first.end) == pytest.approx((0.7, 2.05))
+    assert (second.start, second.end) == pytest.approx((2.05, 3.8))
 
 
 @pytest.mark.parametrize(

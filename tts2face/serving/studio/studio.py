@@ -157,8 +157,8 @@ class Studio:
         return partial(data_of, self.state, key)
 
     async def _face_file(self, project: Project, work: Work, make: Callable[[Work], Awaitable[bytes]]) -> Path:
-        looks = [asdict(project.models), dict(work.models), project.request.has_gestures, __version__]
-        name = hashlib.sha256(json.dumps(looks, default=str, sort_keys=True).encode()).hexdigest()[:24]
+        parts = [asdict(project.models), dict(work.models), project.request.has_gestures, __version__]
+        name = hashlib.sha256(json.dumps(parts, default=str, sort_keys=True).encode()).hexdigest()[:24]
         path = self._folder / "faces" / f"{name}.glb.gz"
         async with self._making.setdefault(name, asyncio.Lock()):
             if not path.is_file():

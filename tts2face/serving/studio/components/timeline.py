@@ -31,7 +31,7 @@ class TimelineElement(Element, component="timeline.js", esm={MODULES: str(COMPON
     Notes
     -----
     Also emits ``pick`` with a clicked word or phone (``kind``, ``name``, ``begin``, ``end``, ``index`` in the sentence,
-    ``text`` and ``occurrence`` of the sentence), and ``range`` with the selection as [begin, end] in seconds, or null.
+    ``text`` and ``occurrence`` of the sentence), and ``range`` with the selection as [start, end] in seconds, or null.
     """
 
     def __init__(  # noqa: PLR0913 - one parameter a prop
