@@ -93,6 +93,7 @@ def _vowel_target(phone: Phone) -> VisibleTarget:
 
 
 def _consonant_target(phone: Phone) -> VisibleTarget:
+    # closed lips hide the tongue
     if phone.place == "bilabial":
         return VisibleTarget(opening=0.0, lip_contact=1.0)
     out, up = _tongue_tip(phone)
@@ -103,6 +104,7 @@ def _consonant_target(phone: Phone) -> VisibleTarget:
         flare=None if is_free else float(phone.rounding == "protruded"),
         spreading=spreading,
         opening=None if is_free else 0.0,
+        # the lower lip touches the teeth in /f v/, but not in the approximant ʋ
         incisor_contact=float(phone.place == "labiodental" and phone.manner != "approximant"),
         tongue_out=out,
         tongue_up=up,

@@ -9,12 +9,16 @@ import re
 import unicodedata
 from collections.abc import Callable
 
+# 3½ is two words: NFKC would make 31/2 of it
 _VULGAR = re.compile(r"(?<=[0-9])\s*([¼-¾⅐-⅞↉])")
+# (212) 555-1234: brackets become commas otherwise
 _AREA_CODE = re.compile(r"\(([0-9]{2,4})\) ?(?=[0-9]{3}[ .-][0-9]{4})")
 _SINGLE_QUOTES = "‘’‚‛′`´ʹʻʼʽˈ"
 _DOUBLE_QUOTES = '“”„‟«»″‹›"「」『』〈〉《》'
 _BRACKETS = "()[]{}"
+# powers: NFKC would make 10⁶ the number 106; ² and ³ are in the table of characters
 _SUPERSCRIPT = re.compile(r"(?<=[0-9A-Za-z)])(?:⁻[⁰¹²³⁴-⁹]+|[⁰¹²³⁴-⁹]{2,}|[⁰⁴-⁹])|(?<=[0-9])¹")
+# ~5 is about 5; other tildes are dropped as markup
 _ABOUT = re.compile(r"(?<![\w~])[~≈] ?(?=[0-9])")
 _DROPPED_CHARACTERS = "™®*_~|\\•·●○◦▪▫■□★☆◆◇►▶◀»※†‡\u20e3"
 _FULL_STOPS = "。｡।॥۔።"
@@ -38,6 +42,7 @@ _STEPS: tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...]
     (re.compile(r"(?<!\.)\.{2,}+(?= ?\n?[a-z])"), ","),
     (re.compile(r"\.{2,}"), "."),
     (re.compile(r"[ \n]{2,}|\n"), lambda run: ". " if run.group().count("\n") > 1 else " "),
+    # a dash between numbers is a range, elsewhere a pause
     (re.compile(r"(?<=[0-9]) ?– ?(?=[0-9$£€])"), "–"),
     (re.compile(r"–(?![0-9$£€])|(?<![0-9])–|--+"), ", "),
     (re.compile(r"(?<![0-9]) -(?= )|(?<= )-(?= ?[^0-9$£€¥.\s-])|-(?![\w$£€¥.])"), ", "),
@@ -59,8 +64,10 @@ def _replacement(code: int) -> int | str:
         return "\n"
     is_mute = (category[0] == "P" or category == "Sk") and chr(code) not in _SPOKEN_PUNCTUATION
     if code == 9 or category[0] == "Z" or is_mute:
+        # skin tones of emoji are no words of their own
         return " " if not 0x1F3FB <= code <= 0x1F3FF else ""
     if category[0] in "CM":
+        # FE00 to FE0F choose a glyph, as of an emoji
         return "" if category[0] == "C" or 0xFE00 <= code <= 0xFE0F else code
     if category == "No" and unicodedata.normalize("NFKC", chr(code)) == chr(code):
         value = unicodedata.numeric(chr(code))
@@ -93,6 +100,7 @@ def canonical_text(text: str, *, keep_marks: bool = False) -> str:
     text = _ABOUT.sub("about ", _AREA_CODE.sub(r"\1-", text))
     text = _SUPERSCRIPT.sub(lambda run: "^" + unicodedata.normalize("NFKC", run.group()).replace("−", "-"), text)
     text = _VULGAR.sub(r" \1", text).translate(_translation_table())
+    # translated before and after: NFKC itself makes characters of the table, and would lose superscripts
     text = unicodedata.normalize("NFKC", text).translate(_translation_table())
     if not keep_marks:
         text = unicodedata.normalize("NFKC", _MARKS.sub("", text)).translate(_translation_table())

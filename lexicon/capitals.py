@@ -33,6 +33,7 @@ _NAMES = frozenset({"MAX", "MIN"})  # abbreviations of small letters that are na
 _DOTLESS = frozenset({"MR", "MRS", "MS", "DR"})  # without a full stop, as in British English
 _ENDINGS = frozenset({"S", "ST", "ND", "RD", "TH", "AM", "PM"})  # after digits
 _TITLES_ALONE = frozenset({"Dr", "Mr", "Mrs", "Ms", "St"})  # also without a name after them
+# as `english.MAX_SPELLED_LETTERS`: FBI is spelled, NASA is not
 _MAX_SPELLED_LETTERS = 3
 _MIN_WORD_LETTERS = 4  # a text with such a word in capitals holds more than initialisms
 
@@ -214,6 +215,7 @@ def _spelling(text: str, word: re.Match[str], before: str, after: str) -> str:
     if stem is not None and _is_spelled(stem[1], before, after) and not _is_word(letters):
         return stem[1] + letters[stem.end(1) :].lower()
     is_kept = len(letters) == 1 or not _is_capital(letters) or _is_spelled(letters, before, after)
+    # I'm, I'll
     return letters if is_kept else letters.lower().replace("i'", "I'", letters.startswith("I'"))
 
 

@@ -91,7 +91,7 @@ def _split_sentence(sentence: str, limit: int) -> Iterator[str]:
 
 
 def _cut_position(text: str, start: int, limit: int) -> int:
-    """Index at which a text whose rest from `begin` is longer than the limit is split."""
+    """Index at which a text whose rest from `start` is longer than the limit is split."""
     end = start + limit
     clauses = [match.end() for match in _CLAUSE.finditer(text, start + limit // 3, end)]
     if clauses:
@@ -99,6 +99,7 @@ def _cut_position(text: str, start: int, limit: int) -> int:
     space = text.rfind(" ", start + 1, end + 1)
     if space > 0:
         return space
+    # scripts without spaces may be cut between any two characters
     if not (text[end - 1].isascii() and text[end].isascii()):
         return end
     longest = start + max(limit, _MAX_UNDIVIDED_CHARACTERS)

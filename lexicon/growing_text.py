@@ -9,6 +9,7 @@ from lexicon.values.files import LARGEST_TEXT_BYTES
 
 _MAY_END = re.compile(r"[.!?…。！？｡।॥؟۔\n]|.{300}", re.DOTALL)
 _OPEN_MARK = re.compile(r"\[[^\]\[]{0,200}\Z|<[^<>]{0,1000}\Z")  # a mark or tag that is not yet complete
+# the longest tag of `_OPEN_MARK`, and its bracket
 _MAX_OPEN_CHARACTERS = 1001
 _SPACES = re.compile(r"\s{2,}")
 
@@ -37,6 +38,7 @@ class GrowingText:
             return []
         open_mark = _OPEN_MARK.search(self._text, max(len(self._text) - _MAX_OPEN_CHARACTERS, 0))
         end = open_mark.start() if open_mark else len(self._text)
+        # the last one may go on: the next part may bring small letters or an abbreviation
         complete = list(split_chunks(self._text[:end], MAX_SENTENCE_CHARACTERS, self._language))[:-1]
         self._drop(sum(n_letters(chunk) for chunk in complete))
         return complete

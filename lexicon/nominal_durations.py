@@ -26,6 +26,7 @@ def nominal_phones(pronunciation: Pronunciation) -> tuple[PhoneSequence, tuple[W
         first = len(phones)
         for phone, stress in zip(word.phones, word.stress, strict=True):
             phones.append(phone)
+            # microseconds: sums of decimals have rests in their last bits
             edges.append(round(edges[-1] + NOMINAL_S[PHONES[phone].kind] * (STRESS_FACTOR if stress else 1.0), 6))
         spans.append(WordSpan(word.text, first, len(phones)))
         pause = max(word.pause_s, LEADING_SILENCE_S if word is pronunciation.words[-1] else 0.0)

@@ -72,6 +72,7 @@ def ordinal_words(value: int) -> str:
 def year_words(value: int) -> str:
     """1999 is nineteen ninety-nine, 2005 two thousand five, 1905 nineteen oh five, 1900 nineteen hundred."""
     century, rest = divmod(value, 100)
+    # 2000 to 2009 are two thousand and so on, other years two halves
     if value < 1000 or value > 9999 or (value % 1000 < 10):
         return cardinal_words(value)
     if not rest:
@@ -93,6 +94,7 @@ def decade_year_words(value: int) -> str:
 
 def fraction_words(top: int, bottom: int) -> str:
     """1/2 is one half, 3/4 three quarters, 5/8 five eighths; others are read with over."""
+    # no ordinal for these: 5/0, 1/128, 0/4
     if bottom in {0, 1} or bottom > 100 or top == 0:
         return f"{cardinal_words(top)} over {cardinal_words(bottom)}"
     part = {2: "half", 4: "quarter"}.get(bottom) or ordinal_words(bottom)
@@ -107,6 +109,7 @@ def roman_value(numeral: str) -> int:
     for letter, following in zip(numeral, [*numeral[1:], ""], strict=True):
         amount = _ROMAN[letter]
         value += -amount if following and _ROMAN[following] > amount else amount
+    # IIII or IC are no numerals: only the standard spelling of the value is
     return value if 0 < value < 4000 and _roman_numeral(value) == numeral else 0
 
 

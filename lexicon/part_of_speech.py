@@ -46,7 +46,9 @@ class _Model:
     def weights(self, feature: str) -> dict[str, float]:
         """Weight of each tag for a feature; empty for an unknown feature."""
         name = json.dumps(feature, ensure_ascii=False).encode() + b":"
+        # text with an index: 15 MB and 0.2 s in place of 45 and 0.7 as a dictionary (decision 120)
         at = int(np.searchsorted(self.hashes, hash(name)))
+        # two features may have one hash
         if at == len(self.hashes) or not self.text.startswith(name, start := int(self.places[at])):
             return {}
         start += len(name)

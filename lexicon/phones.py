@@ -215,6 +215,7 @@ def _articulatory_features(phone: Phone) -> dict[str, float]:
     tongue = PLACES.get(phone.place, 0.0)
     opening = _OPENINGS.get(phone.manner, 0.0)
     if phone.kind == "vowel":
+        # vowels lie between the palate (.5) and the uvula (.85) of `PLACES`
         tongue = 0.5 + 0.35 * BACKNESSES[phone.backness]
         opening = _OPENING_OF_CLOSE_VOWEL + (1 - _OPENING_OF_CLOSE_VOWEL) * HEIGHTS[phone.height]
     return {
@@ -279,6 +280,7 @@ def phone_distance(a: str, b: str) -> float:
 
 
 def _nearest_phone(label: str, available: Collection[str]) -> str:
+    # sorted: of equally near phones always the same one, whatever the order of a set
     return min(sorted(available), key=lambda other: phone_distance(label, other))
 
 
@@ -301,6 +303,7 @@ def nearest_phones(label: str, available: Collection[str]) -> tuple[str, ...]:
     whole = _nearest_phone(label, candidates)
     if not phone.parts:
         return (whole,)
+    # a part of a diphthong is replaced by a single phone, if there is one
     simple = {other for other in candidates if not PHONES[other].parts} or candidates
     parts = tuple(_nearest_phone(part, simple) for part in phone.parts)
     apart = math.hypot(*(phone_distance(part, own) for part, own in zip(parts, phone.parts, strict=True))) / math.sqrt(

@@ -134,6 +134,7 @@ def _pronounce_in_context(words: list[_WordDraft], language: str) -> None:
     spoken = phonemize([" ".join(word.text for word in clause) for clause in clauses], language)
     unmatched: list[_WordDraft] = []
     for clause, written in zip(clauses, spoken, strict=True):
+        # espeak-ng joins and splits words (tout le monde); their phones cannot be assigned then
         if len(clause) == len(written):
             for word, part in zip(clause, written, strict=True):
                 word.segments = parse_espeak_word(part, language)
@@ -143,6 +144,7 @@ def _pronounce_in_context(words: list[_WordDraft], language: str) -> None:
 
 
 def _is_english_onset(onset: tuple[str, ...]) -> bool:
+    # no English syllable starts with ŋ
     return (len(onset) == 1 and onset[0] != "ŋ") or onset in ENGLISH_ONSETS
 
 
@@ -294,6 +296,7 @@ def _reduce_function_words(
     own: Dictionary,
 ) -> list[tuple[IpaPhone, ...]]:
     """Replace the citation forms of function words, from the last word to the first."""
+    # backwards: a reduced form depends on the first sound of the next word, which may be reduced itself
     for at in reversed(range(len(texts))):
         is_letter = forms[at] == "A" and _is_letter(forms, marks, at)
         is_spelled = is_letter or (len(forms[at]) > 1 and is_initialism(forms[at]))

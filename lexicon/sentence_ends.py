@@ -133,4 +133,5 @@ def _unlisted_ends_sentence(word: str, after: str, *, is_english: bool, is_first
     is_dotted = _DOTTED.fullmatch(word) is not None and word[-1].isupper()
     if not is_initial and not is_dotted:
         return True
+    # "J. Smith" goes on, "in the U.S. The army" does not; only English has a table of such words
     return is_english and not is_first and starts_sentence(after)

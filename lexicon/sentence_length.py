@@ -106,6 +106,7 @@ def _dividing_place(chunk: str, start: int, given: Sequence[PhoneMark], pauses: 
     places = [at for at, character in enumerate(chunk) if not character.isspace()]
     middle = start + bisect_left(places, middle_place(chunk))
     at = min((mark.at for mark in pauses), key=lambda place: abs(place - middle), default=middle)
+    # a word with given phones stays whole
     at = next((mark.at if mark.at > start else mark.end for mark in given if mark.at < at < mark.end), at)
     return places[at - start] if start < at < start + len(places) else 0
 

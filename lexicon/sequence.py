@@ -121,6 +121,7 @@ def concatenate_phones(
                 f"concatenated sequences must begin at 0 s, but one begins at {part.start} s; shift it first"
             )
         offset = edges[-1]
+        # two silences side by side are one pause for the networks of the lips
         if phones and phones[-1] == SILENCE == part.phones[0]:
             phones.pop()
             edges.pop()
@@ -139,6 +140,7 @@ def enforce_increasing(edges: NDArray[np.float64]) -> NDArray[np.float64]:
     n = len(edges) - 1
     first, last = float(edges[0]), float(edges[-1])
     if (last - first) <= n * MIN_PHONE_S:
+        # too short for all phones: equal ones, so that the edges still increase
         return np.linspace(first, last, n + 1)
     room = np.arange(n + 1) * MIN_PHONE_S
     slack = np.clip(np.maximum.accumulate(edges - room), first, last - n * MIN_PHONE_S)

@@ -84,6 +84,7 @@ class _SsmlReader:
         self._base = language
         self._language: str | None = None
         parser = expat.ParserCreate()
+        # else expat gives the words between two tags in several parts, and a mark may be cut
         parser.buffer_text = True
         parser.StartDoctypeDeclHandler = self._doctype
         parser.ProcessingInstructionHandler = self._instruction
@@ -114,6 +115,7 @@ class _SsmlReader:
 
     def read(self, text: str) -> MarkedText:
         """Parse the whole document."""
+        # XML allows nothing before its declaration
         self._parser.Parse(text.removeprefix("\ufeff").lstrip(), True)
         return self._builder.build(self._language, base_language=self._base)
 

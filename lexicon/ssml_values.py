@@ -81,6 +81,7 @@ def parse_rate(written: str) -> float:
 def parse_volume(written: str) -> float:
     """Factor of the volume from a name or decibels (+6dB)."""
     if match := _DECIBEL.fullmatch(written.strip()):
+        # 1,000 dB is refused by the limits as well, and does not overflow
         return float(10.0 ** (min(float(match[1]), 1e3) / 20))
     if written.strip() not in NAMED_VOLUMES:
         raise InputError(

@@ -55,6 +55,7 @@ def guess_language(text: str, default: str = DEFAULT_LANGUAGE) -> str:
 
 
 def _of_script(text: str, scripts: "Counter[str]") -> str:
+    # Japanese has more Chinese characters than kana, Chinese no kana
     if scripts["HIRAGANA"] or scripts["KATAKANA"]:
         return "ja"
     language = LANGUAGE_OF_SCRIPT[scripts.most_common(1)[0][0]]

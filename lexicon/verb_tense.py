@@ -68,6 +68,7 @@ def tense_tag(tags: Sequence[str], lower: Sequence[str], at: int) -> str:
 
 def _after_auxiliary(before: str, lower: Sequence[str]) -> str:
     if before in _HAD_OR_WOULD:
+        # I'd is I had (read it before), or I would (if I could)
         return "VB" if {"if", "could", "would"} & set(lower) else "VBN"
     if before in _FORMS_OF_HAVE or before in _BE:
         return "VBN"

@@ -220,6 +220,7 @@ def interpolate_cubic(values: NDArray[np.float32], at: NDArray[np.float64]) -> N
     part = (at - low)[:, None].astype(np.float32)
     before, here, after, beyond = (values[np.clip(low + k, 0, len(values) - 1)] for k in (-1, 0, 1, 2))
     slope_here, slope_after = (after - before) / 2, (beyond - here) / 2
+    # Hermite form: coefficients of the second and third power
     bend, twist = 3 * (after - here) - 2 * slope_here - slope_after, 2 * (here - after) + slope_here + slope_after
     return np.asarray(here + part * (slope_here + part * (bend + part * twist)), np.float32)
 
@@ -243,6 +244,7 @@ def interpolate_columns(values: NDArray[np.floating], times: NDArray[Any], at: N
 
 def decode_srgb(srgb: NDArray[np.floating]) -> NDArray[np.float64]:
     """Linear light of sRGB values, both in [0, 1]."""
+    # IEC 61966-2-1
     linear: NDArray[np.float64] = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
     return linear
 

@@ -114,6 +114,7 @@ def compile_kernel(kernel: Any, arguments: tuple[Any, ...]) -> Compiled:
         try:
             found = _overload(_dispatcher(kernel, _allocates(kernel)), signature)
         except NumbaError as error:
+            # kernels are compiled without numba's runtime; those that make arrays need it
             if "NRT required" not in str(error):
                 raise
             found = _overload(_dispatcher(kernel, True), signature)
@@ -172,6 +173,7 @@ def _entry(context: Any, described: Any) -> tuple[Any, str, str]:
     )
     leaves = [leaf for given in described.argtypes for leaf in _leaves(given)]
     results = _leaves(described.restype) if described.restype != types.none else []
+    # an array is passed as numpy's object, whose fields the entry reads (decision 199)
     passed = [pointer if isinstance(leaf, types.Array) else context.get_argument_type(leaf) for leaf in leaves]
     entry = ir.Function(module, ir.FunctionType(ir.IntType(32), [*passed, *([pointer] if results else [])]), ENTRY)
     builder = ir.IRBuilder(entry.append_basic_block())

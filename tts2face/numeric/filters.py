@@ -26,6 +26,7 @@ def moving_minimum(values: FloatArray, width: int, beyond: float) -> FloatArray:
     """(n,) least of an odd number of values around each of (n,) values, with `beyond` before and after them."""
     padded = np.pad(values, width // 2, constant_values=beyond)
     covered = 1
+    # log2(width) passes in place of width
     while covered < width:  # the least of two runs that overlap
         step = min(covered, width - covered)
         padded, covered = np.minimum(padded[:-step], padded[step:]), covered + step

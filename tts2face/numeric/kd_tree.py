@@ -87,6 +87,7 @@ def _partition(places, order, axis, wanted):  # type: ignore[no-untyped-def]
     while low < high:
         pivot = places[order[(low + high) // 2], axis]
         i, j = low, high
+        # equal values are exchanged, too: many equal ones would else make one side empty
         while i <= j:
             while places[order[i], axis] < pivot:
                 i += 1

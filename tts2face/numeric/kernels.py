@@ -150,6 +150,7 @@ class Kernel(Generic[Arguments, Result]):
             try:
                 found = _read(path)
                 self.n_from_cache += 1
+            # not in the cache, or damaged: compiled again
             except (OSError, ValueError):
                 found = importlib.import_module("tts2face.numeric.compiler").compile_kernel(self, tuple(arguments))
                 _keep(path, found)
@@ -194,6 +195,7 @@ def _describe(values: Sequence[Any]) -> Iterator[int]:
             is_same = value.dtype.itemsize == 8 and value.dtype.kind in "if"  # as Python's own
             yield SCALARS[type(value.item())] if is_same or value.dtype.kind == "b" else -4 - value.dtype.num
         elif isinstance(value, tuple):
+            # below all codes of types
             yield -64 - len(value)
             yield from _describe(value)
         else:
@@ -324,6 +326,7 @@ def _private_folder() -> Path:
     except OSError:
         return Path(tempfile.mkdtemp(prefix="tts2face-kernels-"))
     is_private = stat.S_ISDIR(status.st_mode) and not status.st_mode & 0o077
+    # code in another user's folder could be exchanged before it is loaded
     if hasattr(os, "getuid") and (status.st_uid != owner or not is_private):
         return Path(tempfile.mkdtemp(prefix="tts2face-kernels-"))
     return folder

@@ -12,6 +12,7 @@ from tts2face.processes.parent import END_S, OnEvent, answer_of, child_command, 
 from tts2face.processes.program import Program
 
 PAUSE_BYTES = 1 << 20  # of a call that its caller has not read yet, beyond which it is paused; some seconds of a movie
+# a quarter of `PAUSE_BYTES`: a call is not paused and continued with each message
 GO_BYTES = 256 << 10
 
 Inputs = AsyncIterator[tuple[Mapping[str, Any], bytes]]  # of a call that goes on: contents and payloads
@@ -22,6 +23,7 @@ async def receive_message(stream: asyncio.StreamReader) -> Message | None:
     try:
         head = parse_head(await stream.readline())
         return None if head is None else message_of(head, await stream.readexactly(head["n_bytes"]))
+    # the process is damaged or gone: both end it
     except (ValueError, asyncio.IncompleteReadError, ConnectionError):  # a line that is too long, or half a message
         return None
 
@@ -64,6 +66,7 @@ class _Running:
     async def send(self, message: Message) -> None:
         """Write a message, and wait until the process has read most of what was written."""
         self.write(message)
+        # it has ended, which its messages say
         with suppress(ConnectionError):
             await self.process.stdin.drain()  # type: ignore[union-attr]
 
@@ -98,6 +101,7 @@ class _Running:
         await asyncio.wait({self.reading})
 
     def _kill(self) -> None:
+        # it has ended by itself
         with suppress(ProcessLookupError):
             self.process.kill()
 

@@ -76,6 +76,7 @@ class Call:
         sent = [(0, 0)]
 
         def report(done: int, of: int) -> None:
+            # equal reports would wake the parent for nothing
             if (done, of) != sent[0]:
                 sent[0] = (done, of)
                 self.event({"stage": name, "done": done, "of": of})
@@ -161,6 +162,7 @@ def _ending_with_errors() -> Iterator[None]:
         yield
     except BaseException:  # noqa: BLE001 - whatever it is
         traceback.print_exc()
+        # `os._exit` writes no buffer
         sys.stderr.flush()
         os._exit(1)  # the thread that reads holds standard input
 

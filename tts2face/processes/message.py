@@ -17,7 +17,9 @@ EVENT = "event"
 RESULT = "result"
 ERROR = "error"
 
+# of the JSON of a message
 MAX_LINE_BYTES = 16 << 20
+# of the bytes behind it; what names more is a damaged pipe
 MAX_PAYLOAD_BYTES = 256 << 20
 
 

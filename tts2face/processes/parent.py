@@ -24,6 +24,7 @@ from tts2face.processes.message import (
 from tts2face.processes.program import Program
 
 CHECK_S = 1.0  # between two checks of a caller who waits
+# between tries to end a child that another thread is about to start
 KILL_AGAIN_S = 0.05
 END_S = 1.0  # until a process that has closed its output must have ended
 MAX_SHOWN_CHARACTERS = 300  # of the standard error of a child that ended
@@ -123,6 +124,7 @@ class Child:
             self._n_calls += 1
             is_answered = is_ended = False
             try:
+                # a pipe may be closed between two statements
                 with suppress(OSError, ValueError):  # it ended, which its messages tell
                     child.stdin.write(Message(kind, content, payload, self._n_calls).encoded())  # type: ignore[union-attr]
                     child.stdin.flush()  # type: ignore[union-attr]
@@ -186,6 +188,7 @@ class Child:
             child.kill()
         try:
             code = child.wait(None if is_killed else END_S)
+        # a process that has closed its output may still hang
         except subprocess.TimeoutExpired:
             child.kill()
             code = child.wait()

@@ -47,6 +47,7 @@ def limit_process(limits: ProcessLimits) -> None:
     resource.setrlimit(resource.RLIMIT_NOFILE, (limits.n_files, limits.n_files))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     if sys.platform.startswith("linux"):
+        # a new user owns a new network without devices; no rights are needed
         ctypes.CDLL(None).unshare(NEW_USERS | NEW_NETWORK)  # refused in some containers
 
 

@@ -66,6 +66,7 @@ def file_state(path: Path) -> Hashable:
     """State that changes when a file or folder is written again or replaced; without one, its path alone."""
     try:
         status = path.stat()
+    # a ValueError: a path with a zero byte
     except (OSError, ValueError):  # whoever reads it says what is wrong
         return str(path)
     return os.path.realpath(path), status.st_mtime_ns, status.st_size, status.st_ino

@@ -75,6 +75,7 @@ class Prefetch(Generic[Item]):
 
     def _put(self, item: ItemOrError) -> None:
         while not self._stopped.is_set():
+            # a consumer that has stopped never takes an item: the wait has an end
             with contextlib.suppress(queue.Full):
                 return self._queue.put(item, timeout=POLL_INTERVAL_S)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from lexicon.errors import BackendError
 
+# of one wheel, on a slow line
 MAX_DOWNLOAD_S = 600.0
 
 

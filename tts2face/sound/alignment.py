@@ -24,6 +24,7 @@ from tts2face.sound.spikes import NEVER, UNSAID, find_spikes
 from tts2face.sound.word_lattice import PlacedPhone, PronouncedWords, Pronunciations, place_phones, word_segments
 from tts2face.types import Waveform
 
+# seconds around a frame at which the recogniser's output is read: its spikes are late by 35 ms (mean)
 CONTEXT_S = (-0.12, -0.08, -0.05, -0.03, -0.015, 0.0, 0.015, 0.03, 0.045, 0.06, 0.08, 0.11, 0.15, 0.19)
 LEAST_LOG, LOG_SPREAD = -10.0, 5.0  # log probabilities of the recogniser as features
 # Chosen on a voice that the classifier has not heard, in noise; docs/decisions/193-alignment.md
@@ -31,6 +32,7 @@ FRAME_WEIGHT = 0.15  # of log probabilities of frames: neighbouring ones are not
 LEAST_FRAME, PASSED_OVER = -12.0, -6.0  # of a frame; of one of a silence in which something else is heard
 OF_ITS_CLASS, SOUNDING = 0.1, 0.01  # shares of a phone in the probability of those like it, and of all sound
 SONORANTS = frozenset({"nasal", "lateral", "approximant", "tap", "trill"})
+# seconds and level of the noise around a sound: an abrupt start is heard as a stop
 PADDING_S, PADDING_LEVEL = 0.1, 3e-4
 USUAL_DELAY_S = 0.035  # of spikes behind the middles of phones
 LEAST_FIT = 0.6  # of a right text; docs/decisions/193-alignment.md
@@ -203,12 +205,14 @@ class Aligner:
         known = sound if isinstance(sound, HeardSound) else self.hear(sound)
         duration = known.sound.duration
         if words is None:
+            # without a transcript the heard phones are placed as those of a text (decision 194)
             words = [(f"/{''.join(word)}/", [word]) for word in known.words()]
         if not words:
             raise DataError("the sound contains no speech; give a recording of a person who speaks")
         labels = (*FEATURES, *sorted(_phones_in(words) - ENGLISH))
         heard = known.heard.log_probabilities(labels)
         english = heard[:, [*range(len(FEATURES)), len(labels)]]
+        # the last frame has its middle at the end of the sound
         frames = self._classifier.log_probabilities(recording_features(_padded(known.sound), english))[:-1]
         number = {label: at for at, label in enumerate(labels)}
         columns = [[[number[phone] for phone in phones] for phones in alternatives] for _, alternatives in words]
@@ -220,6 +224,7 @@ class Aligner:
         if not chosen:
             raise DataError(f"the sound of {duration:.2f} s is too short for {len(words)} words; check the words")
         phones, spans = _sequence(chosen, [text for text, _ in said], confidence[kept], duration)
+        # times count from the sound, which begins after the padding
         places = spike_times(heard) - PADDING_S
         lengths = np.array([len(alternatives[0]) for _, alternatives in words])
         fit = Fit(float(lengths.sum()), float(lengths @ confidence), float(len(places)))
@@ -252,7 +257,9 @@ def _lenient(frames: FloatArray, inventory: Sequence[str]) -> FloatArray:
     sounds = classes != SILENCE
     alike = (classes[:, None] == classes) & sounds
     shares = OF_ITS_CLASS * alike + SOUNDING * (sounds[:, None] & sounds)
+    # a phone counts whole; others of its class and all sound by their shares (decision 197)
     np.fill_diagonal(shares, 1.0)
+    # `@` would add in an order that depends on the threads of BLAS (decision 022)
     found: FloatArray = np.log(ordered_product(np.exp(frames), shares) + np.finfo(np.float64).tiny)
     return found
 

@@ -49,6 +49,7 @@ MAX_CLOSURE_S = 0.06  # the event of a stop marks its burst; the closure before 
 CLOSED_LEVEL = 0.006  # relative to full scale; closures are digital silence after the decay of the previous phone
 QUIET_LEVEL = 0.03  # relative to full scale; residual level of the previous phone in a pause
 LEVEL_WINDOW_S = 0.001
+# seconds; a shorter start without a phone belongs to the first phone
 MIN_EVENT_PAUSE_S = 0.03
 MAX_WORD_PHONES = 80  # espeak-ng crashes on words of 300
 EDGE_SILENCE_S = 0.25  # silence added at both ends, because lips start to move before the sound does
@@ -287,6 +288,7 @@ def _segment_mnemonic(segment: IpaPhone) -> str:
 def _run_child(request: Mapping[str, Any]) -> tuple[dict[str, Any], NDArray[np.int16]]:
     try:
         answer = subprocess.run(
+            # a process for each sentence: the library is not repeatable within one (decision 005)
             [sys.executable, "-I", str(CHILD)],
             input=json.dumps(request).encode(),
             capture_output=True,
@@ -295,6 +297,7 @@ def _run_child(request: Mapping[str, Any]) -> tuple[dict[str, Any], NDArray[np.i
         )
     except subprocess.TimeoutExpired as late:
         raise BackendError(f"espeak-ng did not answer within {CHILD_TIMEOUT_S:.0f} s; try a shorter text") from late
+    # a crash of the library ends the child alone
     if answer.returncode < 0:
         raise BackendError(
             f"espeak-ng crashed (signal {-answer.returncode}) on {str(request['text'])[:40]!r}; "
@@ -315,6 +318,7 @@ def _closure_start(sound: NDArray[np.float32], burst: int, rate: int) -> float:
     window = max(1, round(LEVEL_WINDOW_S * rate))
     earliest = max(0, burst - round(MAX_CLOSURE_S * rate))
     at = burst
+    # the event marks the burst, and the closure belongs to the stop (decision 005)
     while at - window >= earliest and float(np.abs(sound[at - window : at]).max()) < CLOSED_LEVEL:
         at -= window
     return at / rate
@@ -333,6 +337,7 @@ def _phone_sequence(
         starts = [0.0]
         owners = [-1]
     for event, end in zip(events, ends, strict=True):
+        # marks without duration join the phone before them (decision 005)
         if end <= event.start or (event.phones == (SILENCE,) and labels[-1:] == [SILENCE]):
             continue
         length = (end - event.start) / len(event.phones)
@@ -341,6 +346,7 @@ def _phone_sequence(
             starts.append(event.start + number * length)
             owners.append(event.word if phone != SILENCE else -1)
     edges = np.array([*starts, duration])
+    # a first phone within `MIN_EVENT_PAUSE_S` starts with the sound
     edges[0] = 0.0
     spans = []
     for word in sorted(set(owners) - {-1}):

@@ -17,6 +17,7 @@ from typing import Any
 SYNCHRONOUS = 2
 PHONEME_EVENTS = 0x0001
 IPA_EVENTS = 0x0002
+# without it the library ends the process where its data are missing
 DO_NOT_EXIT = 0x8000
 WORD_EVENT, PHONEME_EVENT = 1, 7
 CHARACTERS_UTF8 = 1
@@ -68,6 +69,7 @@ def _start_library() -> tuple[Any, int]:
     import espeakng_loader
 
     library = ctypes.CDLL(espeakng_loader.get_library_path())
+    # ctypes passes a number without a type as a C int, which is shorter than size_t
     library.espeak_Synth.argtypes = [
         ctypes.c_char_p, ctypes.c_size_t, ctypes.c_uint, ctypes.c_int, ctypes.c_uint, ctypes.c_uint, ctypes.c_void_p,
         ctypes.c_void_p,
@@ -82,6 +84,7 @@ def _decode_event(event: _Event) -> tuple[int, int, Any] | None:
         name = bytes(event.name.string).split(b"\0")[0]  # espeak-ng cuts it after 8 bytes, also within a character
         return PHONEME_EVENT, event.sample, name.decode("utf-8", "ignore")
     if event.type == WORD_EVENT:
+        # espeak-ng counts characters from 1
         return WORD_EVENT, event.sample, (event.text_position - 1, event.length)
     return None
 
@@ -103,6 +106,7 @@ def speak(request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
         if count > 0:
             chunks.append(ctypes.string_at(samples, 2 * count))
         at = 0
+        # the list ends with an event of type 0 (espeakEVENT_LIST_TERMINATED)
         while found[at].type != 0:
             event = _decode_event(found[at])
             if event:
@@ -110,12 +114,14 @@ def speak(request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
             at += 1
         return 0
 
+    # ctypes frees a callback to which no name refers
     callback = _Callback(collect)
     library.espeak_SetSynthCallback(callback)
     voice = _Voice(languages=request["language"].encode(), gender=request["gender"])
     if rate <= 0 or library.espeak_SetVoiceByProperties(ctypes.byref(voice)) != 0:
         return {"error": f"espeak-ng does not speak {request['language']}"}, b""
     library.espeak_SetParameter(RATE_PARAMETER, request["words_per_minute"], 0)
+    # espeak_Synth reads up to a zero byte
     text = request["text"].encode() + b"\0"
     flags = CHARACTERS_UTF8 | (PHONEMES_IN_BRACKETS if request["has_phonemes"] else 0)
     if library.espeak_Synth(text, len(text), 0, POSITION_IN_CHARACTERS, 0, flags, None, None) != 0:
@@ -128,6 +134,7 @@ def _exit_without(parent: int) -> None:
     """Exit when the parent has ended: an orphan gets another parent process id (POSIX)."""
     while os.getppid() == parent:
         time.sleep(POLL_INTERVAL_S)
+    # `sys.exit` would end this thread alone
     os._exit(1)
 
 

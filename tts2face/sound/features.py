@@ -22,6 +22,7 @@ WINDOW_SAMPLES = 1361  # odd; twice the window length, at which Praat truncates 
 HALF_WINDOW_SAMPLES = WINDOW_SAMPLES // 2  # samples needed after a frame's time
 N_MFCC = 12
 LPC_ORDER = 16  # two for each kHz of the rate
+# Praat's default
 PRE_EMPHASIS_HZ = 50.0
 N_FORMANT_POLES = 8  # formants up to half the rate, one for each kHz; the first four are returned
 NEUTRAL_TUBE_HZ = (500.0, 1500.0, 2500.0, 3500.0)  # formants of a neutral vocal tract, for frames without formants
@@ -35,7 +36,9 @@ FEATURE_KINDS = ("formants", "mfcc", "lpc", "lsf", "level", "mel")
 # and a microphone. It is found at once, and follows slowly.
 N_BANDS = 24
 BAND_LIMITS_HZ = (80.0, 7600.0)
+# samples: 25 ms
 BAND_WINDOW = 400
+# samples: the window, and zeros up to a power of two
 BAND_TRANSFORM = 512
 BAND_OFFSETS = (-213, 0, 213)  # samples from the frame
 # natural logarithms
@@ -101,6 +104,7 @@ def analysis_windows(samples: NDArray[np.float32], centres: NDArray[np.int64]) -
     available = samples[first:last]
     part[WINDOW_SAMPLES : WINDOW_SAMPLES + len(available)] = available
     starts = np.clip(centres - HALF_WINDOW_SAMPLES - first + WINDOW_SAMPLES, 0, len(part) - WINDOW_SAMPLES)
+    # the same in each window: blocks of a stream and a whole file have equal features
     noise = np.random.default_rng(0).normal(0.0, NOISE_LEVEL, WINDOW_SAMPLES)
     return np.asarray(part[starts[:, None] + np.arange(WINDOW_SAMPLES)] + noise, np.float64)
 
@@ -202,6 +206,7 @@ def mel(windows: AnalysisWindows) -> NDArray[np.float64]:
     starts = [HALF_WINDOW_SAMPLES + offset - BAND_WINDOW // 2 for offset in BAND_OFFSETS]
     parts = np.stack([windows[:, start : start + BAND_WINDOW] for start in starts], axis=1) * taper
     powers = np.square(np.abs(np.fft.rfft(parts, BAND_TRANSFORM))) / np.square(taper).sum()
+    # `@` would add in an order that depends on the threads of BLAS (decision 022)
     bands = np.log(ordered_product(powers, mel_bands(N_BANDS, BAND_LIMITS_HZ, BAND_TRANSFORM)) + LEAST_BAND_POWER)
     return bands.reshape(len(windows), -1)
 

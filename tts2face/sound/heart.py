@@ -144,6 +144,7 @@ class NeuralVoice:
             from hibari.voices import voice_path
         except ImportError as missing:
             raise BackendError("the voice heart needs hibari-tts; run: pip install hibari-tts") from missing
+        # with other numbers of threads ONNX Runtime's convolutions give other bits
         self._model: Any = hibari.Hibari(voice="heart", model=IDENTITY_NETWORK, threads=1)
         self._network = _Network(open_network(Path(voice_path("heart")).read_bytes()), run)
         self._model.sess = self._network
@@ -278,6 +279,7 @@ def _optimised(model: bytes) -> NDArray[np.uint8]:
     """Bytes (N,) of the model with the durations among its outputs, optimised for any machine."""
     import onnxruntime
 
+    # the layouts of ORT_ENABLE_ALL are those of one processor (decision 160)
     level = onnxruntime.GraphOptimizationLevel.ORT_ENABLE_EXTENDED
     with TemporaryDirectory(prefix="tts2face-") as folder:
         path = Path(folder, "graph.onnx")
@@ -290,8 +292,10 @@ def _session(model: bytes, level: Any, written: Path | None = None) -> Any:
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
+    # one thread: convolutions give other bits at other numbers of threads
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 3  # errors
+    # an arena keeps up to 100 MB after a sentence (decision 073)
     options.enable_cpu_mem_arena = options.enable_mem_pattern = False
     options.graph_optimization_level = level
     if written is not None:

@@ -51,6 +51,7 @@ def normalise_loudness(sounds: Sequence[Waveform]) -> list[Waveform]:
     Since the limiter reduces the loudness, the gain is iterated on the measured loudness of the limited sound.
     """
     loudness = integrated_loudness(sounds)
+    # silence: no gain would bring it to the target
     if loudness <= ABSOLUTE_GATE_LUFS:
         return list(sounds)
     peaks = [oversampled_peaks(sound.samples) for sound in sounds]

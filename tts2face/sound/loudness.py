@@ -15,9 +15,11 @@ from tts2face.numeric.arrays import FloatArray
 from tts2face.numeric.kernels import kernel
 from tts2face.types import Waveform
 
+# BS.1770-4, annex 1: blocks below it do not count
 ABSOLUTE_GATE_LUFS = -70.0
 BLOCK_S, STEP_S = 0.4, 0.1  # gating blocks overlap by 75 % (BS.1770-4, annex 1)
 OFFSET_LUFS = -0.691  # cancels the gain of the K-weighting at 997 Hz
+# BS.1770-4, annex 1: of the mean of the blocks above the absolute gate
 RELATIVE_GATE_LU = -10.0
 OVERSAMPLING = 4  # annex 2: at least four times, for a peak that is read at most 0.6 dB too low
 LOWEST_RATE = 8000  # Hz; the shelving filter needs its frequency well below half of it

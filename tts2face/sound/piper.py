@@ -37,6 +37,7 @@ from tts2face.sound.voice import (
 from tts2face.types import Speech, Waveform
 
 MODEL_INPUTS = frozenset({"input", "input_lengths", "scales"})
+# letters that each Piper voice wants before a sentence, behind each letter, and at the end
 START = "^"
 PADDING = "_"
 END = "$"
@@ -84,6 +85,7 @@ class PiperNetwork:
             "scales": np.array([0.0, 1.0 / rate, 0.0], np.float32),  # noise, length, noise of durations
         }
         if self._n_speakers > 1:
+            # the network of several speakers needs the number of one: the first
             inputs["sid"] = np.zeros(1, np.int64)
         text = "".join(letters)
         try:
@@ -166,6 +168,7 @@ def _is_flap(segments: Sequence[IpaPhone], at: int) -> bool:
 
 def phone_letters(phone: str) -> str:
     """Characters of a phone in the alphabet of Piper, which separates diacritics."""
+    # the alphabet of Piper has this letter alone composed
     return unicodedata.normalize("NFD", phone) if phone != "ç" else phone
 
 
@@ -174,8 +177,10 @@ def _load_session(path: Path) -> Any:
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
+    # one thread: convolutions give other bits at other numbers of threads
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 4  # fatal errors; others are raised
+    # an arena keeps up to 100 MB after a sentence (decision 073)
     options.enable_cpu_mem_arena = options.enable_mem_pattern = False
     try:
         session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
@@ -232,6 +237,7 @@ class PiperVoice:
         sound = self._synthesise(sentences, rate)
         try:
             found = self._align(sound, words)
+        # hundreds of equal words have no alignment, but their sound is right
         except DataError:
             return Speech(sound, *nominal_phones_in(words, sound.duration))
         return Speech(sound, found.phones, found.words)
@@ -281,6 +287,7 @@ class PiperVoice:
 
     def _pronounce(self, word: SpokenWord) -> list[SpokenWord]:
         """The spoken words of a written one without given phones."""
+        # a written word may be several spoken ones (numbers, units)
         *others, last = self._words(word.text) or [SpokenWord("", ())]
         after = "".join(re.findall("[.,;:!?]+$", word.text)) + word.after
         return [*others, SpokenWord(last.text, last.segments, after)] if last.segments else []

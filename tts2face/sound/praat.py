@@ -11,6 +11,7 @@ from tts2face.types import Waveform
 LOUDNESS_WINDOW_S, STEP_S = 0.064, 0.008  # analysis window and interval of Praat for a pitch of 100 Hz or more
 THRESHOLD_POWER = 4e-10  # square of 20 micropascals
 MIN_INTENSITY_DB = 0.0  # threshold of hearing, for digital silence, which has no level
+# approximations 9.8.1 and 9.8.2 of Abramowitz and Stegun, which Praat uses: one bit would change gestures
 BESSEL_BORDER = 3.75
 BESSEL_SMALL = (1.0, 3.5156229, 3.0899424, 1.2067492, 0.2659732, 0.0360768, 0.0045813)
 BESSEL_LARGE = (
@@ -68,7 +69,6 @@ def intensity_track(sound: Waveform) -> IntensityTrack:
         part, weights = samples[start:end], window[start - centre + half : end - centre + half]
         rest = part - np.add.reduce(part) / len(part)
         powers[frame] = np.dot(rest * rest, weights) / (whole if len(weights) == len(window) else weights.sum())
-    levels = 10.0 * np.log10(np.maximum(powers / THRESHOLD_POWER, 10 ** (MIN_INTENSITY_DB / 10)))
     levels = 10.0 * np.log10(np.maximum(powers / THRESHOLD_POWER, 10 ** (MIN_INTENSITY_DB / 10)))
     return IntensityTrack(centres, levels)
 

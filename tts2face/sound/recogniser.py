@@ -20,6 +20,7 @@ from lexicon.ipa import parse_ipa
 from lexicon.phones import ARPABET, nearest_phones
 from tts2face.types import Waveform
 
+# seconds between frames of the network's output
 FRAME_S = 0.02
 RATE = 16_000  # Hz
 PART_S, CONTEXT_S = 24.0, 1.0  # of a sound in one call, whose memory grows with its length

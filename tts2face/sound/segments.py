@@ -163,6 +163,7 @@ def _search(sums, segments, found, space):  # type: ignore[no-untyped-def]
         starts = space.starts[: len(so_far)]
         for at in range(len(starts)):  # whole arrays would take long to compile
             starts[at] = so_far[at] + segments.taken[n] + segments.starts[n, at] - sums[earliest + at, label]
+        # no log probability is positive: this marks a segment of any duration
         if segments.durations[n, 0] > 0.0:
             _end_unlimited(starts, (earliest, low, high), segments.shortest[n], space)
         else:
@@ -220,7 +221,9 @@ def find_edges(sound: Waveform, stated: Sequence[StatedPhone], classifier: Phone
         return enforce_increasing(np.append(starts, sound.duration))
     edges = np.full(len(stated) + 1, sound.duration)
     for segment, start, _ in found:
+        # an edge lies between the last frame of a phone and the first of the next one
         edges[segment] = max((start - 0.5) * STEP_S, 0.0)
+    # backwards: what follows a skipped one may be skipped, too
     for segment in range(len(stated) - 1, 0, -1):
         if stated[segment].may_be_skipped and segment not in {number for number, *_ in found}:
             edges[segment] = edges[segment + 1]
@@ -242,11 +245,14 @@ def _stated_segments(
     expected = np.maximum(durations, STEP_S)
     seconds = np.maximum(np.arange(round(LONGEST_SHARE * expected.max() / STEP_S) + 1), 1) * STEP_S
     likely = -0.5 * np.square(np.log(seconds / expected[:, None]) / DURATION_SPREAD)
+    # marks silences as segments of any duration
     likely[is_silence, 0] = 1.0
     times = bounds[:-1, :1] + np.arange((bounds[:, 1] - bounds[:, 0]).max() + 1)
     apart = (times - frames[:, None]) / (START_SPREAD_S * slowness / STEP_S)
+    # a Cauchy distribution, as some stated starts are far off
     near = np.where(is_silence[:, None], 0.0, -np.log1p(0.5 * apart * apart))
     shortest = np.where(is_silence, SHORTEST_SILENCE, SHORTEST)
+    # the sound may start and end with a phone: the outer silences last a frame at least
     shortest[[0, -1]] = 1
     numbers = np.arange(len(stated))
     return Segments(

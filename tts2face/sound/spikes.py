@@ -59,6 +59,7 @@ class _States:
             for phones in pronunciations:
                 reached = self.ends
                 for at, column in enumerate(phones):
+                    # between two equal phones the network is silent, else they would be one (CTC)
                     phone = self._add(column, [state for state in reached if self.columns[state] != column])
                     self.phones.append(phone)
                     if at + 1 < len(phones):

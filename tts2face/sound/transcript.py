@@ -53,9 +53,11 @@ def _parts(text: str, language: str) -> Iterator[tuple[str, str]]:
 
 
 def _pronunciations(word: Word, language: str, own: Dictionary | None) -> Pronunciations:
+    # what the user's dictionary says is the only pronunciation
     if not language.startswith("en") or (own is not None and own.lookup(word.text) is not None):
         return (word.phones,)
     alternatives = [word.phones]
+    # CMUdict numbers further pronunciations: read, read(2), read(3)
     for number in count(1):
         found = cmudict_lookup(word.text if number == 1 else f"{word.text}({number})")
         if found is None:
@@ -100,6 +102,7 @@ def align_recording(
     heard = []
     for at, part in enumerate(parts, start=1):
         heard.append(aligner.hear(part))
+        # each part is heard first and aligned later: two steps of progress
         tell(at, 2 * n_parts)
     recognised = [[phone for word in sentence.words() for phone in word] for sentence in heard]
     if not any(recognised):

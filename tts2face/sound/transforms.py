@@ -32,6 +32,7 @@ def import_hibari() -> ModuleType:
     finally:
         sys.meta_path.remove(missing)
     dsp: Any = import_module("hibari.dsp")
+    # NumPy's transforms give other bits than SciPy's (decision 200)
     if dsp.FFT_BACKEND == "numpy":
         dsp.rfft = lambda values, axis: code.r2c(values, (axis,), True, UNSCALED, None, 1)
         dsp.irfft = lambda values, n, axis: code.c2r(values, (axis,), n, False, BY_LENGTH, None, 1)

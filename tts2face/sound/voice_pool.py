@@ -229,6 +229,7 @@ class VoicePool:
             self._loading[key] = thread.submit(
                 lambda: self._put_back(key, load_voice(name, language, dictionary, self._align, self._native_run))
             )
+            # the thread ends with its only task
             thread.shutdown(wait=False)
 
     @cached_property

@@ -144,6 +144,7 @@ def _weighted(
     taken = np.full(len(phones), PAUSE)
     taken[[0, -1]] = LEADING_PAUSE
     for at, phone in enumerate(phones):
+        # a positive value marks a segment of any duration (`segments._search`)
         likely[at, 0] = 1.0 if phone is None else LEAST_DURATION
         if phone is None:
             continue

@@ -61,6 +61,7 @@ def read_cached(kind: str, version: int, name: str) -> dict[str, NDArray[Any]] |
 def write_cached(kind: str, version: int, name: str, arrays: Arrays) -> None:
     """Keep arrays under a name; a folder that cannot be written costs the next run the same time."""
     cache = _cache(kind)
+    # without a cache the next run computes again
     with suppress(BackendError, OSError):
         cache.folder.mkdir(parents=True, exist_ok=True)
         write_tensors(cache.path(name), kind, version, arrays, {"checksum": _checksum(arrays)})
@@ -75,6 +76,7 @@ def read_kept(
 
     A DataError or KeyError of `build` says that it is damaged.
     """
+    # a damaged file of the cache is as none
     with suppress(InputError, DataError, KeyError):
         return build(*read_tensors(path, kind, version))
     return None
@@ -83,6 +85,7 @@ def read_kept(
 def _checksum(arrays: Arrays) -> int:
     """CRC-32 of the bytes of arrays, by which a damaged file is noticed."""
     found = 0
+    # names in one order: a file may list its arrays in another
     for name in sorted(arrays):
         found = zlib.crc32(np.ascontiguousarray(arrays[name]).reshape(-1).view(np.uint8).data, found)
     return found

@@ -145,6 +145,7 @@ class BucketStore:
 
     def delete(self, name: str) -> None:
         """Remove an object, if there is one."""
+        # another process has removed it
         with contextlib.suppress(FileNotFoundError), self._errors():
             self._obstore.delete(self._store, self._prefix + name)
 
@@ -207,4 +208,5 @@ def _client_options() -> dict[str, Any]:
 
 def _first_line(error: Exception) -> str:
     """Start of a message, without the queries of URLs, which may be signatures."""
+    # queries of signed addresses are credentials
     return re.sub(r"\?\S+", "", str(error).split("\n")[0])[:160]

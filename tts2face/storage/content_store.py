@@ -186,6 +186,7 @@ class FolderStore:
         except FileNotFoundError:
             return
         for entry in found:
+            # folders named by the first two letters of the hash
             if not within and len(entry.name) == len("ab") and entry.is_dir():
                 yield from self._files(f"{entry.name}/")
             elif NAME_INFIX not in entry.name and entry.is_file():

@@ -51,6 +51,7 @@ def inflate(content: NDArray[Any], size: int, what: str, path: Path) -> bytes:
         found = zlib.decompressobj().decompress(content.tobytes(), size + 1)
     except zlib.error as error:
         raise DataError(f"{path}: the {what} cannot be inflated ({error}); build or copy the file again") from error
+    # the size is checked while inflating: a small file can unpack to any number of bytes
     if not size or len(found) != size:
         raise DataError(f"{path}: the {what} is not of {size} bytes; build or copy the file again")
     return found
@@ -115,6 +116,7 @@ def _sums(content: NDArray[np.uint8], kind: np.dtype[Any], shape: list[int], axi
     numbers = first.astype(unsigned)
     for place, plane in enumerate(others, 1):
         if plane.any():
+            # low bytes first: high ones are mostly 0, and deflate to nothing (decision 167)
             numbers |= np.left_shift(plane, 8 * place, dtype=unsigned)
     sums = ((numbers >> 1) ^ -(numbers & 1)).reshape(shape[::-1])
     np.cumsum(sums, axis=LAST - axis, out=sums)

@@ -114,6 +114,7 @@ def refuse_overwriting(outputs: Mapping[str, AnyPath], inputs: Mapping[str, AnyP
 
 
 def _is_same(path: Path, other: Path) -> bool:
+    # links, and file systems without capitals, give one file two names
     if path.exists() and other.exists():
         return path.samefile(other)
     return os.path.realpath(path) == os.path.realpath(other)

@@ -75,6 +75,7 @@ def open_picture(
                 yield picture
     except too_large as error:
         raise DataError(f"{name} is too large; {limit}") from error
+    # Pillow's decoders raise any of these for damaged files (SyntaxError for PNG)
     except (UnidentifiedImageError, OSError, EOFError, SyntaxError, ValueError) as error:
         if isinstance(error, DataError):
             raise

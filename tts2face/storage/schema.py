@@ -182,6 +182,7 @@ def refuse(what: str, kind: str = "file") -> NoReturn:
 def _abbreviate(value: Any) -> str:
     if isinstance(value, list | dict):
         return f"a {'list' if isinstance(value, list) else 'n object'} of {len(value)}".replace("a n ", "an ")
+    # Python refuses to write numbers of more than 4,300 digits
     if isinstance(value, int) and value.bit_length() > 200:
         return "a number of more than 60 digits"
     shown = repr(value[: MAX_SHOWN_CHARACTERS + 1] if isinstance(value, str) else value)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 MAX_MEMORY_BYTES = 1 << 20  # rows beyond it go to a temporary file
+# of one step of a copy
 COPY_BYTES = 1 << 20
 
 

@@ -71,6 +71,7 @@ class Temporary:
                 try:
                     os.replace(self.path, target)
                 except BaseException:
+                    # back to its place: the folder stays whole whatever happens
                     os.replace(earlier.path, target)
                     raise
         else:

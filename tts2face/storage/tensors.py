@@ -48,9 +48,11 @@ def write_tensors(
 
 def _sort_header(content: bytes) -> bytes:
     """File content with the keys of its header sorted; the library writes them in random order."""
+    # a safetensors file begins with the length of its header
     start = 8 + int.from_bytes(content[:8], "little")
     text = json.dumps(json.loads(content[8:start]), ensure_ascii=False, sort_keys=True, separators=(",", ":"))
     header = text.encode()
+    # the format aligns its data to 8 bytes
     header += b" " * (-len(header) % 8)
     return len(header).to_bytes(8, "little") + header + content[start:]
 

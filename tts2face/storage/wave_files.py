@@ -7,6 +7,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+# of 16 bits; -32768 stays unused, so that both directions are alike
 FULL_SCALE = 32767
 
 

@@ -33,6 +33,7 @@ class CaptureDevice:
         if not self._device.isOpened():
             raise InputError(f"there is no camera {source!r}; give a camera's number (0 is the first) or its address")
         stated = float(self._device.get(cv2.CAP_PROP_FPS) or 0.0)
+        # many cameras and streams state 0 or the rate of their time base
         self.fps = stated if 0 < stated <= 120 else 30.0
         self._pace = 0.0 if source.isdecimal() or "://" in source else 1.0 / self.fps
         self._newest: TimedFrame | None = None
@@ -73,6 +74,7 @@ class CaptureDevice:
             if not is_read:
                 break
             n_read += 1
+            # a file would be read at once: it is shown at its own rate
             time.sleep(max(0.0, self._began + n_read * self._pace - time.monotonic()) if self._pace else 0.0)
             upright = cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB)
             with self._frame_arrived:

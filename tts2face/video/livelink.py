@@ -51,6 +51,7 @@ def read_livelink(path: Path) -> FaceCapture:
     head = np.zeros((n_frames, len(HEAD_CHANNELS)))
     if all(name in names for name in HEAD_COLUMNS):
         turns = read[:, [names.index(name) for name in HEAD_COLUMNS]]
+        # angles from the median: the telephone need not stand straight before the face
         head[:, :3] = HEAD_SIGNS * (turns - np.median(turns, axis=0))
     return FaceCapture(Trajectory(channels, read[:, shapes], fps), Trajectory(HEAD_CHANNELS, head, fps))
 

@@ -68,6 +68,7 @@ def read_media_info(path: Path) -> MediaInfo:
         context = stream.codec_context
         sound = _first_decodable(container.streams.audio)
         return MediaInfo(
+            # FFmpeg counts the duration of a file in microseconds
             (container.duration or 0) / 1e6,
             _frame_rate(container, stream, path),
             context.width,
@@ -166,6 +167,7 @@ def _open_container(path: Path) -> Iterator["InputContainer"]:
     if not os.path.lexists(path):
         raise InputError(f"there is no recording {path}; check the path")
     check_regular_file(path)
+    # FFmpeg says "invalid data" of an empty file
     if path.stat().st_size == 0:
         raise DataError(f"{path} is empty (0 bytes); copy or record it again")
     try:
@@ -198,6 +200,7 @@ def _first_decodable(streams: Sequence[Stream]) -> Stream | None:
 def _frame_rate(container: "InputContainer", stream: "VideoStream", path: Path) -> float:
     """Frame rate stated by the file; counted from the frames if it states none, or the rate of its time base."""
     stated = float(stream.average_rate or stream.guessed_rate or 0)
+    # some containers state the rate of their time base (90,000) in place of a frame rate
     if 0 < stated <= MAX_FPS:
         return stated
     times = [packet.pts * packet.time_base for packet in container.demux(stream) if packet.pts and packet.time_base]
@@ -215,6 +218,7 @@ def _presentation_time(frame: "VideoFrame", path: Path) -> float:
 
 def _upright_pixels(frame: "VideoFrame") -> NDArray[np.uint8]:
     pixels = frame.to_ndarray(format="rgb24").astype(np.uint8, copy=False)
+    # telephones film upright by turning the picture when it is shown
     turns = round(frame.rotation / QUARTER_TURN_DEG) % 4
     return np.ascontiguousarray(np.rot90(pixels, turns)) if turns else pixels
 
@@ -243,6 +247,7 @@ def _mix_to_mono(frame: "AudioFrame") -> NDArray[np.float32]:
         samples = samples.reshape(-1, channels).T
     mean: NDArray[np.float64] = samples.astype(np.float64).mean(axis=0)
     if samples.dtype == np.uint8:
+        # 8-bit sound is unsigned
         mean = (mean - 128.0) / 128.0
     elif np.issubdtype(samples.dtype, np.integer):
         mean = mean / -float(np.iinfo(samples.dtype).min)

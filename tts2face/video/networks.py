@@ -139,6 +139,7 @@ def _interpreter_class() -> Any:
 @contextlib.contextmanager
 def _silence_stderr() -> Iterator[None]:
     """Discard what native code writes to standard error, such as LiteRT's start-up message."""
+    # what Python has buffered must go out before the descriptor is replaced
     sys.stderr.flush()
     kept = os.dup(2)
     silent = os.open(os.devnull, os.O_WRONLY)

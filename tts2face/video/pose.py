@@ -131,6 +131,7 @@ def similarity_transforms(
 
 def head_angles(rotations: NDArray[np.floating]) -> NDArray[np.float64]:
     """(T, 3) pitch, yaw, roll in radians of (T, 3, 3) rotations: roll about z first, then pitch about x, then yaw."""
+    # rounding may exceed 1
     pitch = -np.arcsin(np.clip(rotations[:, 1, 2], -1.0, 1.0))
     yaw = np.arctan2(rotations[:, 0, 2], rotations[:, 2, 2])
     roll = np.arctan2(rotations[:, 1, 0], rotations[:, 1, 1])

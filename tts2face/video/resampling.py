@@ -27,6 +27,7 @@ def resample_to_grid(
     DataError
         Times do not increase.
     """
+    # two frames at one instant have no order, and no rate
     if (np.diff(times) <= 0).any():
         raise DataError("the times of the frames do not increase; convert the recording with ffmpeg")
     first = int(np.ceil((times[0] - SAME_INSTANT_S) * fps))

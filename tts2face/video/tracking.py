@@ -131,6 +131,7 @@ class FaceTracker:
     def detect_faces(self, pixels: NDArray[np.uint8]) -> list[Crop]:
         """Crops around the faces of a picture, the most certain first; overlaps are merged by `SAME_FACE_DISTANCE`."""
         boxes, scores, shift, scale = self._detections(pixels)
+        # BlazeFace: centre, size, and six points of the face
         rows = boxes.reshape(len(boxes), 8, 2)
         centres, sizes = rows[:, 0] + self._anchors * DETECTOR_SIZE, rows[:, 1].max(axis=1)
         kept: list[int] = []
@@ -158,6 +159,7 @@ class FaceTracker:
         shift = np.array([DETECTOR_SIZE - scale * width, DETECTOR_SIZE - scale * height]) / 2
         affine = np.array([[scale, 0, shift[0]], [0, scale, shift[1]]])
         small = self._cv.warpAffine(pixels, affine, (DETECTOR_SIZE, DETECTOR_SIZE), flags=self._cv.INTER_AREA)
+        # BlazeFace reads pixels from -1 to 1, the mesh network from 0 to 1
         boxes, logits = self._detector((small.astype(np.float32) / 127.5 - 1.0)[None])
         return boxes[0], logits[0, :, 0], shift, scale
 
@@ -220,6 +222,7 @@ def smooth_crops(crops: Sequence[Crop | None], fps: float) -> list[Crop | None]:
     present = np.array([crop is not None for crop in crops])
     for first, last in true_runs(present):
         rows = np.array([astuple(crop) for crop in crops[first:last] if crop is not None])
+        # an angle near 180 degrees would be smoothed to 0
         rows[:, 3] = np.unwrap(rows[:, 3])
         rows = gaussian_filter1d(rows, CROP_SMOOTHING_S * fps, axis=0, mode="nearest")
         smooth[first:last] = [Crop(*(float(value) for value in row)) for row in rows]

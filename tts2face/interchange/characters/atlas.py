@@ -15,6 +15,7 @@ BORDER = 4  # pixels around each image that repeat its edge, so that neighbours 
 CLEAR, FULL = 32, 224  # of 255: pixels with less coverage count as holes, with more as covered
 LEVELS = (0.3, 0.55, 0.8, 1.0)  # opacities in which translucent triangles are drawn
 CUTOUT = 2.0  # opacity of triangles that are drawn where the coverage of the texture is
+# of linear light: finer than an 8-bit step in the dark
 TABLE_STEPS = 4096
 
 
@@ -43,6 +44,7 @@ def build_atlas(materials: dict[int, Material]) -> Atlas:
     images = {number: _coloured(material) for number, material in materials.items() if material.image is not None}
     if not images:
         return Atlas(None, None, {})
+    # highest first: rows of images of like heights leave little room unused
     order = sorted(images, key=lambda number: (-images[number].shape[0], number))
     reduction = 1
     while True:
@@ -71,6 +73,7 @@ def triangle_opacity(material: Material, corners: FloatArray) -> FloatArray:
     if material.alpha_mode == OPAQUE:
         return np.ones(len(corners))
     covered = coverage(material)
+    # texture coordinates of a stranger's file may be infinite
     if material.image is None or not np.isfinite(corners).all():
         return np.full(len(corners), _level(float(covered.mean()) / 255.0))
     height, width = covered.shape
@@ -124,6 +127,7 @@ def _coloured(material: Material) -> NDArray[np.uint8]:
     """Image (H, W, 4) of a material: its colours times the material's colour, and its coverage."""
     image = np.zeros((1, 1, 4), np.uint8) if material.image is None else material.image
     factor = np.array(material.colour[:3])
+    # alpha is coverage, which `coverage` reads
     colours = image[:, :, :3]
     if not (factor > 0.999).all():
         tables = [srgb(linear_light(np.arange(256, dtype=np.uint8)).astype(np.float64) * share) for share in factor]
@@ -141,6 +145,7 @@ def fill_uncovered(colours: NDArray[np.uint8], covered: NDArray[np.uint8]) -> ND
         return colours
     sums = np.dstack([colours, np.ones(covered.shape, np.uint8)]) * (covered >= FULL)[:, :, None].astype(np.float32)
     levels = [sums]
+    # a pyramid: colours of near pixels come from its fine levels, of far ones from coarse ones
     while min(levels[-1].shape[:2]) > 1:
         height, width = levels[-1].shape[:2]
         even = np.pad(levels[-1], ((0, height % 2), (0, width % 2), (0, 0)))

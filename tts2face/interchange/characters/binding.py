@@ -62,6 +62,7 @@ def read_binding(face: Face) -> CharacterBinding:
     found = face.metadata.get(KEY)
     if not isinstance(found, dict):
         raise InputError("the face was not imported from a character's file; import one with `tts2face face import`")
+    # faces of .obj folders have no file to write to
     if not found.get("sha256"):
         raise InputError("the face was imported from .obj files, which hold no animation; import a .glb file instead")
     try:

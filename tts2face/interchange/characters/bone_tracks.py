@@ -17,6 +17,7 @@ HEAD_NODE = "tts2face_head"
 # Share of the head's rotation that the neck bone takes, a convention of character rigs. The spine below the second
 # vertebra takes 19 % (standard deviation 7 %) of a turn to the side, and more of a nod (In vivo primary and coupled
 # segmental motions of the healthy female head-neck complex during dynamic head axial rotation, 2021, C2 to T1).
+# between the 19 % of turns that the lower spine takes and its larger share of nods (decision 080)
 NECK_SHARE = 0.4
 MAX_OFFSET_MM = 2.0  # between the origin of an eye bone and the centre of its eyeball, up to which it only rotates
 
@@ -66,6 +67,7 @@ class BoneTracks:
         The head's orientation is that of the pose; the neck takes `NECK_SHARE` of it where it is a parent of the head.
         """
         rotations = np.stack([head_rotation(*(float(x) for x in pose[:3])) for pose in head.values])
+        # a neck beside the head's bone would not carry it
         if "head" in self._character.bones and self._has_neck():
             neck = np.stack([share_of_rotation(rotation, NECK_SHARE) for rotation in rotations])
             rest = np.einsum("tji,tjk->tik", neck, rotations)

@@ -34,6 +34,7 @@ def cut_triangles(triangles: IntArray, heights: FloatArray) -> Cut:
     above = heights >= 0
     is_above = above[triangles]
     n_above = is_above.sum(axis=1)
+    # triangles across the plane: one corner is alone on its side
     rows = np.flatnonzero((n_above > 0) & (n_above < 3))
     odd = np.where(n_above[rows] == 1, is_above[rows].argmax(axis=1), is_above[rows].argmin(axis=1))
     alone, after, before = (triangles[rows, (odd + step) % 3] for step in range(3))

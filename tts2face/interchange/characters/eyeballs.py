@@ -26,6 +26,7 @@ def mark_eyeballs(head: HeadMesh, character: Character) -> HeadMesh:
     marked = _by_bones(head, character)
     if not marked.any():
         marked = _by_spheres(head)
+    # eyes that shapes turn would turn twice
     if not marked.any() or _moved_by_gaze(head, marked):
         return head
     whole = marked[head.triangles]
@@ -111,6 +112,7 @@ def _by_spheres(head: HeadMesh) -> NDArray[np.int8]:
 def _components(head: HeadMesh) -> NDArray[np.int32]:
     """Number (V,) of the connected part that each vertex belongs to; vertices at one place are connected."""
     size = float(np.ptp(head.vertices, axis=0).max())
+    # vertices along a seam of the texture lie at one place, to rounding
     _, place = np.unique(np.rint(head.vertices / size * 1e5).astype(np.int64), axis=0, return_inverse=True)
     return connected_pieces(place.ravel()[head.triangles], int(place.max()) + 1)[place.ravel()]
 

@@ -25,6 +25,7 @@ def place_face(face: Face, character: Character, head: HeadMesh, provisional: Pl
     """Face in mm with its origin between the eyes and the pivot of its head."""
     model = default_head()
     distance = eye_distance(face)
+    # glTF counts in metres; other sizes of eyes are stylised or in other units
     metres = distance / provisional.scale * 1000.0
     low, high = TRUE_EYE_DISTANCES_MM
     scale = (metres if low <= metres <= high else eye_distance(model)) / distance

@@ -47,6 +47,7 @@ def read_gltf_character(path: Path) -> Character:
 
 def _expressions(file: GltfFile) -> tuple[Expressions, bool]:
     """Expressions of a VRM file as weights of morph targets, and whether the file is VRM 0."""
+    # VRM 1; VRM 0 has another extension, and weights in percent
     if (recent := file.root.extension("VRMC_vrm")) is not None:
         return _vrm1_expressions(file, recent.child("expressions")), False
     if (earlier := file.root.extension("VRM")) is not None:
@@ -76,6 +77,7 @@ def _vrm0_expressions(file: GltfFile, fields: Fields) -> Expressions:
         for bind in group.children("binds"):
             mesh = bind.index("mesh", file.count("meshes"), "meshes")
             if mesh is not None:
+                # VRM 0 states weights from 0 to 100
                 binds[MorphTarget(mesh, bind.integer("index"))] = bind.number("weight", 100.0) / 100.0
         preset = group.text("presetName")
         found[preset if preset not in ("", "unknown") else group.text("name")] = binds

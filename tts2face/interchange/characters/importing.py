@@ -228,6 +228,7 @@ def _find_front(
         placement = _provisional_placement(head)
         views = CharacterViews(build_face(head, character, placement), model)
         scored.append((views.frontal_score(), (head, placement, views)))
+        # a face that the tracker reads: the other fronts need not be drawn
         if scored[-1][0] >= MIN_SCORE:
             break
     return max(scored, key=lambda found: found[0])[1]

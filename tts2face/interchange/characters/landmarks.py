@@ -99,6 +99,7 @@ def locate_landmarks(views: CharacterViews) -> LocatedLandmarks:
     numbers, points = np.arange(N_MESH_LANDMARKS), _medoids(readings, face.vertices)
     opened = _opened_weights(face)
     if opened:
+        # medians at rest put inner lips 2 mm inside the mouth; they are read open (decision 078)
         inner = np.array(sorted({*INNER_LIP_UPPER, *INNER_LIP_LOWER}))
         lips, _ = _readings(views, opened, skin, inner)
         if lips:

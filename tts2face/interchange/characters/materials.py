@@ -18,6 +18,7 @@ from tts2face.interchange.gltf.fields import Fields
 from tts2face.interchange.gltf.reader import GltfFile
 from tts2face.storage.pictures import MAX_DECODING_BYTES, decoding_bytes
 
+# checked before decoding: a small file can declare any size
 MAX_IMAGE_PIXELS = 8192 * 8192
 MAX_IMAGE_SIDE = 2048  # pixels; larger images are reduced
 FORMATS = ("PNG", "JPEG", "WEBP")
@@ -59,6 +60,7 @@ class MaterialReader:
         colour = holder.numbers(colour_key, 4, (1.0, 1.0, 1.0, 1.0))
         texture = holder.child(image_key)
         index = texture.index("index", self._file.count("textures"), "textures") if holder.has(image_key) else None
+        # VRM 0 names the image of a toon material in its own extension
         if index is None and toon is not None and toon.child("textureProperties").has("_MainTex"):
             index = toon.child("textureProperties").index("_MainTex", self._file.count("textures"), "textures")
         image = None if index is None else self._texture(index)
@@ -95,6 +97,7 @@ class MaterialReader:
         """Pixels (H, W, 4) of an image, at most `MAX_IMAGE_SIDE` on a side; None with a note if it cannot be read."""
         view = fields.index("bufferView", self._file.count("bufferViews"), "buffer views")
         content = self._file.uri(fields.text("uri"), fields) if view is None else self._file.view(view).tobytes()
+        # no package on PyPI decodes KTX2 (decision 078)
         if content[:8] == KTX2[:8]:
             self._notes.append(
                 f"{fields.place} is a KTX2 image, which is not read: its material has one colour; "

@@ -16,6 +16,7 @@ from tts2face.interchange.gltf.nodes import NodeTree
 from tts2face.interchange.gltf.reader import DRACO, GltfFile
 from tts2face.numeric.arrays import FloatArray, IntArray
 
+# modes of a primitive (glTF 2.0, 3.7.2.1); lower ones are points and lines
 TRIANGLES = 4
 STRIP = 5
 FAN = 6
@@ -81,6 +82,7 @@ class _Primitive:
             if (moved := targets[number]) is not None:
                 places = places + weight * moved
         matrices, bones = self._skinning(tree, len(places))
+        # a negative scale turns the order of corners, and the surface inside out
         if np.median(np.linalg.det(matrices[..., :3, :3])) < 0:  # a mirrored mesh
             triangles = triangles[:, ::-1]
         morphs = {
@@ -142,6 +144,7 @@ class _Primitive:
         """Matrix (4, 4) or matrices (N, 4, 4) from mesh to world, and the node that each vertex follows most (N,)."""
         nodes, skins = self._file.entries("nodes"), self._file.entries("skins")
         number = nodes[self._node].index("skin", len(skins), "skins")
+        # a second set for vertices that follow more than four bones
         weights = [self._attribute(f"WEIGHTS_{n}", (4,), count) for n in (0, 1)]
         joints = [self._attribute(f"JOINTS_{n}", (4,), count) for n in (0, 1)]
         if number is None or weights[0] is None or joints[0] is None:
@@ -169,6 +172,7 @@ class _Primitive:
                 raise DataError(
                     f"{skin.place}: has {len(values)} bind matrices for {len(bones)} bones; export it again"
                 )
+            # glTF stores matrices column by column
             inverse = values[: len(bones)].reshape(-1, 4, 4).transpose(0, 2, 1)
         missing = [bone for bone in bones if int(bone) not in tree.world]
         if missing:

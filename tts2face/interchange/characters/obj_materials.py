@@ -46,6 +46,7 @@ def read_libraries(folder: Path, libraries: Iterable[str]) -> dict[str, Material
             key, _, rest = line.strip().partition(" ")
             if key == "newmtl":
                 if name:
+                    # of two libraries with one name the first counts
                     found.setdefault(name, _material(name, fields, folder))
                 name, fields = rest.strip(), {}
             else:
@@ -103,6 +104,7 @@ def _number(cell: str) -> float:
 
 def _beside(folder: Path, name: str) -> Path | None:
     relative = Path(name)
+    # a stranger's file must not name files outside its folder
     if not name or "\0" in name or relative.is_absolute() or ".." in relative.parts:
         return None
     path = folder / relative

@@ -22,6 +22,7 @@ def read_obj_folder(folder: Path) -> Character:
     neutral = folder / NEUTRAL
     if not neutral.is_file():
         raise DataError(f"{folder} has no {NEUTRAL}; name the face at rest so")
+    # sorted: folders list their files in any order
     shapes = sorted(path for path in folder.glob("*.obj") if path.name != NEUTRAL)
     if len(shapes) > MAX_SHAPES:
         raise DataError(f"{folder} has {len(shapes)} shapes; reduce them to at most {MAX_SHAPES}")
@@ -83,6 +84,7 @@ class _ObjFile:
         unique, places = np.unique(table, axis=0, return_inverse=True)
         uv = None
         if len(unique) and (unique[:, 1] >= 0).all() and int(unique[:, 1].max()) < len(self._uv):
+            # .obj counts v from the lower edge, faces and glTF from the upper one
             uv = self._uv[unique[:, 1]] * [1.0, -1.0] + [0.0, 1.0]
         return MaterialPiece(
             name=self.materials[material],

@@ -54,6 +54,7 @@ def guess_mapping(names: Iterable[str]) -> ShapeMapping:
             for shape in guess(name):
                 named.setdefault(shape, []).append(ShapeSource(name, 1.0))
         found = {shape: _preferred(shape, sources) for shape, sources in named.items()} | found
+    # a character without ARKit's jaw speaks by visemes (VRM: A, I, U, E, O)
     if "jawOpen" not in found:
         found |= _viseme_shapes(given)
     return with_sides({shape: tuple(sources) for shape, sources in sorted(found.items())})

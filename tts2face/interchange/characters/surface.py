@@ -73,6 +73,7 @@ def unwrap(head: HeadMesh, character: Character) -> HeadMesh:
         rows, transform = piece_of_vertex == number, character.materials[piece.material].transform
         uv[rows] = uv[rows] @ transform[:, :2].T + transform[:, 2]
     lowest = uv[head.triangles].min(axis=1)
+    # repeated textures: whole images are taken off, so that an atlas can hold them
     shift = np.where(np.isfinite(lowest), np.floor(lowest + 1e-6), 0.0)
     shift = np.clip(shift, -1e6, 1e6).astype(np.int64)
     corners = np.column_stack([head.triangles.reshape(-1), np.repeat(shift, 3, axis=0)])
@@ -101,6 +102,7 @@ def build_face(head: HeadMesh, character: Character, placement: Placement) -> Fa
         raise DataError("no triangle of the character is visible; check the alpha of its materials")
     kind_of = np.array([kinds[n] for n in range(len(character.pieces))])[head.piece_of]
     kind_of[head.eye_of[head.triangles].min(axis=1) > 0] = "eyes"
+    # opaque first, skin first among these: what is translucent is drawn over what is behind it
     order = np.lexsort((material_of, kind_of != "skin", -np.where(opacity == CUTOUT, 0.999, opacity)))
     order = order[opacity[order] > 0]
     keys = [(str(kind_of[t]), int(material_of[t]), float(opacity[t])) for t in order]
@@ -154,6 +156,7 @@ def _kinds(head: HeadMesh, character: Character) -> dict[int, str]:
         name = f"{piece.name} {character.materials[piece.material].name}"
         by_name = next((kind for kind, pattern in _KINDS.items() if pattern.search(name)), None)
         corners = head.triangles[head.piece_of == number]
+        # what shapes of speech move is no eyeball, whatever its name
         if by_name == "eyes" and spoken[corners].any():
             by_name = None
         kinds[number] = by_name or ("skin" if moved[corners].any() else "other")

@@ -49,6 +49,7 @@ def points_under_pixels(
         hit = projection.hit(pixel)
         vertex = projection.outline_vertex(pixel, np.inf if hit is None else hit.depth)
         cosines[number] = 0.0 if hit is None else 1.0 if vertex is not None else hit.facing
+        # beside the outline: the surface is sought towards the middle of the face
         if vertex is not None and projection.distance(vertex, pixel) > MAX_VERTEX_MM:
             steps = (projection.hit(pixel + share * (middle - pixel)) for share in INWARD_STEPS)
             depth = projection.depth(vertex) + GRAZES[0][1]
@@ -81,6 +82,7 @@ class _Projection:
         self._flat = self._there[:, :2] / np.maximum(self._there[:, 2:], 1e-6) * focal + [middle_x, middle_y]
         a, b, c = (self._flat[triangles[:, corner]] for corner in range(3))
         area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+        # back faces are not under a pixel
         is_facing = area < -1e-9  # y points down, so counter-clockwise triangles have negative area
         self._triangles = triangles[is_facing] if is_facing.any() else triangles
         self._corners = self._flat[self._triangles]

@@ -112,6 +112,7 @@ def arkit_projection(channels: tuple[str, ...], face: Face | None, name: str) ->
     ])  # fmt: skip
     if not len(helpers):
         return ArkitProjection(columns, others, helpers, none, none)
+    # the products of a face's shapes are the same for each clip of it
     products = _PRODUCTS.setdefault(face, {})
     if channels not in products:
         products[channels] = _inner_products(face, columns[helpers], others)

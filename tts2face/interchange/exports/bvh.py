@@ -37,6 +37,7 @@ class BvhWriter:
 
     def add(self, part: Part) -> None:
         """Append frames."""
+        # BVH has degrees; its readers take lengths for centimetres
         units = np.array([1 / MM_PER_CM] * 3 + [180 / np.pi] * 3)
         rows = part.head[:, _ORDER].astype(np.float64) * units
         pattern = " ".join(["%.6f"] * len(_ORDER)) + "\n"

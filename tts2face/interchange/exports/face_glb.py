@@ -162,6 +162,7 @@ def _mesh(
             opaque = np.column_stack([colours[own], np.ones(len(own))])
             steps = np.rint(opaque * 0xFFFF).astype("<u2")
             attributes["COLOR_0"] = buffer.add_accessor(steps, VERTICES, normalized=True)
+        # glTF reserves the largest index of a type (primitive restart)
         kind = "<u2" if len(own) < 0xFFFF else "<u4"
         shapes = [(shape / MM_PER_M).astype("<f4") for shape in targets.displacements(face, own)]
         primitives.append({
@@ -191,6 +192,7 @@ def _nodes(skeleton: Skeleton, buffer: GltfBuffer) -> dict[str, Any]:
     """Nodes of mesh and joints, and the skin that ties them."""
     places = skeleton.places / MM_PER_M
     inverse = np.tile(np.eye(4, dtype="<f4").ravel(), (len(places), 1))
+    # joints have no rotation at rest: the inverse is a shift
     inverse[:, 12:15] = -places  # column-major
     joints = list(range(FIRST_JOINT, FIRST_JOINT + len(places)))
     nodes: list[dict[str, Any]] = [{"name": "face", "mesh": 0, "skin": 0}]

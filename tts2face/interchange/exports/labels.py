@@ -32,6 +32,7 @@ class PhoneLabels:
         starts = [shift + float(edge) for edge in phones.edges]
         yield from self._reach(starts[0], half_sample)
         for text, start, end in zip(phones.phones, starts[:-1], starts[1:], strict=True):
+            # the silence at the end of a part and that at the start of the next are one pause
             if self._pending is not None and text == SILENCE == self._pending.text:
                 self._pending = Label(SILENCE, self._pending.start, end)
                 continue

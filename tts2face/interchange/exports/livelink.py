@@ -18,6 +18,7 @@ DEFAULT_TIMECODE_RATE = 60  # for other frame rates, with fractions of frames
 HEAD_SIGNS = {"yaw": -1.0, "pitch": 1.0, "roll": 1.0}
 # Angles of the eyes at weight 1 of the gaze shapes: pitch follows eyeLookDown, yaw eyeLookIn of the left and
 # eyeLookOut of the right eye; slopes of a recorded capture of 20 s (correlations 0.98 and 0.99).
+# turns of an eye at weight 1 of ARKit's eyeLook shapes
 EYE_PITCH_RAD, EYE_YAW_RAD = 0.50, 0.64
 
 

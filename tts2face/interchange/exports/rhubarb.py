@@ -24,6 +24,7 @@ def mouth_cues(labels: AllLabels) -> list[Cue]:
             continue
         for viseme in viseme_labels(phone, "rhubarb"):
             start, end = f"{viseme.start:.2f}", f"{viseme.end:.2f}"
+            # Rhubarb writes two decimals: a cue may vanish by rounding
             if cues and (cues[-1][2] == viseme.text or start == end):
                 cues[-1][1] = end
             else:

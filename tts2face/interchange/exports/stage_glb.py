@@ -107,6 +107,7 @@ def _rows(face: Face, surface: Surface, skeleton: Skeleton, fields: NDArray[np.f
     quantised = np.rint(np.clip(fields / FIELD_SCALE, -1, 1) * 127).astype(np.int8)
     joint = skeleton.joints[:, 1]
     skin = np.column_stack([joint, np.rint(skeleton.weights[:, 1] * 0xFFFF)]).astype(np.uint16)
+    # four: accessors are aligned to 4 bytes (glTF 2.0, 3.6.2.4)
     strands = np.zeros((len(face.vertices), 4), np.int8)
     strands[surface.strands.vertices, :3] = np.rint(surface.strands.tangents * 127)
     return _Rows(quantised, strands, skin, np.rint(linear_colours(face) * 0xFFFF).astype(np.uint16))
@@ -122,6 +123,7 @@ def _primitive(
         "POSITION": buffer.add_accessor(places, VERTICES, **bounds),
         "_SKIN": buffer.add_accessor(rows.skin[own], VERTICES),
     }
+    # WebGL has attributes of at most four numbers
     for column in range(0, rows.fields.shape[1], 4):
         four = np.ascontiguousarray(rows.fields[own, column : column + 4])
         attributes[f"_LIGHT{column // 4}"] = buffer.add_accessor(four, VERTICES, normalized=True)
@@ -133,6 +135,7 @@ def _primitive(
         attributes["COLOR_0"] = buffer.add_accessor(colours, VERTICES, normalized=True)
     if surface.part.kind == STRANDS:
         attributes["_TANGENT"] = buffer.add_accessor(rows.strands[own], VERTICES, normalized=True)
+    # glTF reserves the largest index of a type (primitive restart)
     kind = "<u2" if len(own) < 0xFFFF else "<u4"
     return {
         "attributes": attributes,

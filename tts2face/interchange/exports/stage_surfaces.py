@@ -119,6 +119,7 @@ def _along_curve(face: Face, surface: ExportSurface) -> ExportSurface:
     low, high = middle.min(axis=0), middle.max(axis=0)
     cells = ((middle - low) / np.maximum(high - low, 1e-6) * 1023).astype(np.int64)
     code = np.zeros(len(cells), np.int64)
+    # Morton code of 3 x 10 bits: triangles near each other in space stay near in the file
     for bit in range(10):
         for axis in range(3):
             code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)

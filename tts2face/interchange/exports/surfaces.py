@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tts2face.models.face import Face, FacePart
 from tts2face.numeric.arrays import decode_srgb
 
+# glTF counts in metres
 MM_PER_M = 1000.0
 OPPOSITE = "Minus"  # ending of the name of a target for negative weights
 
@@ -87,6 +88,7 @@ def morph_targets(face: Face, channels: tuple[str, ...]) -> MorphTargets:
     rows = []
     for at, (name, (low, high)) in enumerate(zip(channels, face.limits[: len(channels)].tolist(), strict=True)):
         rows.append((name, at, max(high, 1.0), low < 0))
+        # a shape that goes both ways gets a second target: Blender clamps weights to 0 to 1 (decision 075)
         if low < 0:
             rows.append((f"{name}{OPPOSITE}", at, -max(-low, 1.0), True))
     return MorphTargets(

@@ -138,6 +138,7 @@ def all_formats() -> tuple[FormatInfo, ...]:
 def _listed(name: str) -> FormatInfo:
     try:
         return _by_name(name)
+    # a damaged plug-in is listed with its reason, and the other formats work
     except BackendError as broken:
         return FormatInfo(name, (), str(broken), ("", ""), package="a package that cannot be loaded")
 
@@ -156,6 +157,7 @@ def _is_name(name: str) -> bool:
 
 def _by_suffix(name: str) -> dict[str, FormatInfo]:
     """Formats by their suffixes: those of other packages, too, for a name with an ending that is none of ours."""
+    # other packages are asked only for endings that are none of ours
     if "." not in name or name.lower().endswith((*_BY_SUFFIX, *MOVIE_SUFFIXES)):
         return _BY_SUFFIX
     return {suffix: info for info in reversed(all_formats()) for suffix in info.suffixes}

@@ -82,6 +82,7 @@ class TextGridWriter:
         sequence = PhoneSequence([phone.text for phone in phones], edges)
         words = []
         for word in self._labels.words:
+            # inside the phone: the edge itself may lie on either side by rounding
             first = sequence.index_at(word.start + sequence.durations.min() / 4)
             last = sequence.index_at(word.end - sequence.durations.min() / 4) + 1
             words.append(WordSpan(word.text, first, last, word.confidence))

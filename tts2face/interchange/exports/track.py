@@ -95,6 +95,7 @@ class TrackWriter:
 
     def _write_rows(self, values: NDArray[np.float32]) -> None:
         rows = frame_rows(values, FLOAT32_FORMAT)
+        # -0.0 and 0.0 are written alike, but the track is lossless
         if (np.signbit(values) & (values == 0)).any():
             rows = (_NEGATIVE_ZERO.sub("-0.0", row) for row in rows)
         self._file.write(",".join(f"[{row}]" for row in rows))
@@ -196,6 +197,7 @@ def _parse_piece(piece: Any, header: Mapping[str, Any], name: str) -> TrackPiece
             ),
             check_type("text", piece["text"], str),
         )
+    # a track may come from anybody
     except (TypeError, ValueError) as wrong:  # InputError, wrong base64, rows of unequal length
         raise DataError(f"{name}: {wrong}; export the track again") from wrong
 

@@ -25,6 +25,7 @@ from tts2face.models.face import Face
 from tts2face.numeric.arrays import decode_srgb
 from tts2face.storage.spool import Spool
 
+# millimetres, as faces have them
 METRES_PER_UNIT = 0.001
 ROOT_PATH = "/Face"
 

@@ -48,6 +48,7 @@ class OculusWriter(_VisemeLines):
     inventory = "oculus"
 
     def _record(self, viseme: Label, phone: str) -> dict[str, Any]:
+        # nanoseconds: sums of seconds have rests in their last bits
         times = {"start": round(viseme.start, 9), "end": round(viseme.end, 9)}
         return times | {"viseme": viseme.text, "id": OCULUS.index(viseme.text), "phone": phone}
 

@@ -12,6 +12,7 @@ from lexicon.phones import look_up_phone
 from tts2face.interchange.exports.labels import Label
 
 OCULUS = ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "I", "O", "U")  # index = id
+# Azure numbers its visemes 0 to 21
 AZURE = tuple(str(number) for number in range(22))
 RHUBARB = ("A", "B", "C", "D", "E", "F", "G", "H", "X")
 INVENTORIES: Mapping[str, tuple[str, ...]] = MappingProxyType({"oculus": OCULUS, "azure": AZURE, "rhubarb": RHUBARB})

@@ -146,6 +146,7 @@ class ExportWriter:
         try:
             for file in self._files:
                 file.open()
+        # also an interruption: the temporary files must go
         except BaseException:
             self._clear()
             raise
@@ -168,6 +169,7 @@ class ExportWriter:
             file.add(clip, text)
 
     def _complete(self) -> None:
+        # an empty export would be a file without a frame
         if self._files and not self._n_clips:
             raise InputError(f"there is no clip to write to {self._files[0].path}")
         for file in self._files:

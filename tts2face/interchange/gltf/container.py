@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from tts2face.storage.spool import Spool
 
+# of the header (glTF 2.0, 4.4.2)
 MAGIC, VERSION = b"glTF", 2
 JSON_CHUNK, BINARY_CHUNK = b"JSON", b"BIN\0"
 MAX_FILE_BYTES = 2**32 - 1  # the container states its size in 32 bits
@@ -114,6 +115,7 @@ class GltfBuffer:
         whole = {**root, "buffers": buffers, "bufferViews": self.views, "accessors": self.accessors}
         text = json.dumps(whole, ensure_ascii=False, separators=(",", ":")).encode()
         text += b" " * (-len(text) % ALIGNMENT)
+        # header, and the heads of both chunks
         size = 12 + 8 + len(text) + 8 + self._n_bytes
         if size > MAX_FILE_BYTES:
             raise InputError(f"{name} would have {size / 1e9:.1f} GB; a .glb file holds 4 GB, export shorter clips")

@@ -7,6 +7,7 @@ from typing import Any
 from lexicon.errors import DataError, Tts2faceError
 from lexicon.values.checks import Check, Place, check_that, flag, is_object, whole
 
+# JavaScript writes no larger whole number exactly
 MAX_INTEGER = 2**53
 MAX_NUMBER = 1e12
 

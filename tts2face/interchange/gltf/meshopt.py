@@ -16,8 +16,10 @@ TRIANGLES = "TRIANGLES"
 INDICES = "INDICES"
 NO_FILTER, EXPONENTIAL = "NONE", "EXPONENTIAL"
 GROUP = 16  # elements whose deltas share one width
+# bytes and elements of a block (EXT_meshopt_compression, appendix A)
 MAX_BLOCK_BYTES, MAX_BLOCK = 8192, 256
 TAIL_BYTES = 32  # least size of the attributes' tail
+# first byte of a bitstream: its kind, and its version in the low four bits
 ATTRIBUTES_HEADER = 0xA0
 TRIANGLES_HEADER = 0xE1
 INDICES_HEADER = 0xD1
@@ -122,8 +124,10 @@ class _IndexStream:
 
     def number(self) -> int:
         value = shift = 0
+        # five bytes of seven bits hold 32 bits; more are damage
         while shift < 35:
             byte = self.byte()
+            # the eighth bit says that another byte follows
             value |= (byte & 127) << shift
             if byte < 128:
                 return value
@@ -168,6 +172,7 @@ class _TriangleDecoder:
 
     def _on_edge(self, edge: int, vertex: int) -> tuple[int, int, int]:
         a, b = self._edges[1 + edge]
+        # codes 13 and 14: the index before or after the last one; 15: written out
         if vertex >= 13:
             c = self._stream.index() if vertex == 15 else self._stream.last + (-1 if vertex == 13 else 1)
             self._stream.last = c
@@ -182,7 +187,9 @@ class _TriangleDecoder:
     def _apart(self, code: int) -> tuple[int, int, int]:
         packed = self._table[code & 15] if code < 0xFE else self._stream.byte()
         second, third = packed >> 4, packed & 15
+        # 0xFE and 0xFF have a second byte instead of the table
         first = 15 if code == 0xFF else 0
+        # the encoder starts numbering again
         if code >= 0xFE and packed == 0:
             self._next = 0
         a = self._new() if first == 0 else 0

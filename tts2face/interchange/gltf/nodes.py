@@ -55,10 +55,12 @@ def read_nodes(root: Fields) -> NodeTree:
     parents: dict[int, int] = {}
     for number, below in enumerate(children):
         for child in below:
+            # nodes are trees (glTF 2.0, 3.5.2); a circle would never end
             if child in parents or child == number:
                 raise DataError(f"{nodes[child].place}: has two parents; export the character again")
             parents[child] = number
     world: dict[int, FloatArray] = {}
+    # without recursion: a hostile file may nest deeper than Python's stack
     waiting = [(number, np.eye(4)) for number in _scene_roots(root, len(nodes), parents)]
     while waiting:
         number, above = waiting.pop()
@@ -73,6 +75,7 @@ def local_matrix(node: Fields) -> FloatArray:
     """Matrix (4, 4) of a node's transform relative to its parent."""
     matrix = node.numbers("matrix", 16)
     if matrix is not None:
+        # glTF stores matrices column by column
         return np.array(matrix).reshape(4, 4).T
     shift = node.numbers("translation", 3, (0.0, 0.0, 0.0))
     scale = node.numbers("scale", 3, (1.0, 1.0, 1.0))
@@ -87,6 +90,7 @@ def find_bones(root: Fields, tree: NodeTree) -> dict[str, int]:
     """Nodes of `BONES`: from the humanoid of a VRM file, otherwise by the names of nodes."""
     found = _humanoid_bones(root, len(tree.names))
     joints = {joint for skin in root.children("skins") for joint in skin.indices("joints", len(tree.names), "nodes")}
+    # joints of skins first: meshes are named "head", too
     for number in sorted(tree.world, key=lambda number: (number not in joints, number)):
         for bone, pattern in _BONE_NAMES.items():
             is_possible = number in joints or bone not in BONES[:2]  # a group named head is not its pivot

@@ -26,10 +26,12 @@ from tts2face.numeric.arrays import FloatArray
 MAX_FILE_BYTES = 512_000_000  # a film character with 4k textures has about 100 MB
 MAX_DECODED_BYTES = 1_000_000_000  # of all compressed or sparse arrays of a file
 MAX_COUNT = 30_000_000  # elements of an accessor: 52 shapes of 50,000 vertices are 2.6 million
+# glTF allows 252; EXT_meshopt_compression 256
 MAX_STRIDE = 256
 MAX_VALUE = 1e9  # of positions and other numbers: beyond it no single-precision geometry works
 SUFFIXES = (".glb", ".gltf", ".vrm")
 COMPONENTS: dict[int, type[np.integer[Any] | np.floating[Any]]] = {
+    # componentType (glTF 2.0, 3.6.2.2)
     5120: np.int8,
     5121: np.uint8,
     5122: np.int16,
@@ -97,6 +99,7 @@ class GltfFile:
         count = fields.integer("count", low=1, high=MAX_COUNT)
         shape = (count, WIDTHS[kind])
         view = fields.index("bufferView", self.count("bufferViews"), "buffer views")
+        # before the array is made: a small file can declare any count
         self._reserve(8 * count * shape[1], fields)
         if view is None:
             values = np.zeros(shape, component)
@@ -129,6 +132,7 @@ class GltfFile:
             except (binascii.Error, ValueError) as error:
                 raise DataError(f"{fields.place}: the data URI is damaged; export the character again") from error
         relative = Path(unquote(text))
+        # a stranger's file must not name files outside its folder, or addresses
         if "\0" in text or ":" in text or relative.is_absolute() or ".." in relative.parts:
             raise DataError(
                 f"{fields.place}: {text[:60]!r} is not a file beside {self.path.name}; export it as one .glb file"
@@ -203,6 +207,7 @@ class GltfFile:
             length = fields.integer("byteLength", low=1)
             if fields.has("uri"):
                 content = self.uri(fields.text("uri"), fields)
+            # only the first buffer may be the binary chunk (glTF 2.0, 4.4.3.3)
             elif number == 0 and self.binary is not None:
                 content = self.binary
             else:
@@ -258,7 +263,9 @@ def _split_glb(content: bytes, path: Path) -> tuple[bytes, bytes | None]:
         (length,), kind = struct.unpack_from("<I", content, at), content[at + 4 : at + 8]
         if at + 8 + length > len(content):
             raise DataError(f"{path} ends within a chunk; copy the file again")
+        # unknown chunks are ignored, as the standard demands
         chunks.setdefault(kind, content[at + 8 : at + 8 + length])
+        # chunks are aligned to 4 bytes, whatever length is stated
         at += 8 + length + (-length % ALIGNMENT)
     if JSON_CHUNK not in chunks:
         raise DataError(f"{path} has no JSON chunk; export the character again")
@@ -269,6 +276,7 @@ def _check_extensions(root: Fields) -> None:
     for name in root.texts("extensionsRequired"):
         if name == DRACO:
             raise DataError(f"{root.place} is compressed with Draco ({DRACO}); export it again without compression")
+        # without an extension of materials a character looks plainer; others change its mesh
         if name not in READABLE and not name.startswith(MATERIAL_EXTENSION):
             raise DataError(f"{root.place} requires the glTF extension {name[:60]}; export it again without it")
 
@@ -283,4 +291,5 @@ def _as_numbers(values: NDArray[Any], fields: Fields) -> NDArray[np.float64] | N
     if not fields.flag("normalized"):
         return values.astype(np.int64)
     scaled: FloatArray = values.astype(np.float64) / float(np.iinfo(values.dtype.str).max)
+    # signed integers have one more negative value: -128 is -1, too
     return np.maximum(scaled, -1.0)

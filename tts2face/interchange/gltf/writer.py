@@ -35,6 +35,7 @@ class GlbWriter:
             "bufferView": view, "componentType": COMPONENTS["<f4"], "count": len(rows), "type": TYPES[rows.shape[1]],
         }  # fmt: skip
         if rows.shape[1] == 1:
+            # glTF demands limits of times
             accessor |= {"min": [float(rows.min())], "max": [float(rows.max())]}
         return self._append("accessors", accessor)
 
@@ -87,6 +88,7 @@ class GlbWriter:
         kept: list[dict[str, Any]] = []
         for number, fields in enumerate(self._file.entries("buffers")):
             is_embedded = number == 0 and self._file.binary is not None
+            # without content: the fallback of compressed views
             if not fields.has("uri") and not is_embedded:
                 kept.append(dict(fields.content))
                 places[number] = (len(kept), 0)

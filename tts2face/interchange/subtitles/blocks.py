@@ -65,6 +65,7 @@ def _without_unspoken(lines: Sequence[str]) -> list[str]:
     for at, line in enumerate(lines):
         if not line.strip():
             is_inside = False
+        # NOTE, STYLE and REGION begin blocks; within a cue they are words
         elif _UNSPOKEN_BLOCK.match(line) and (at == 0 or not lines[at - 1].strip()):
             is_inside = True
         kept.append("" if is_inside else line)
@@ -76,6 +77,7 @@ def _blocks(lines: Sequence[str], warnings: list[SubtitleWarning], *, are_ids_wo
     block = _Block(0)
     for number, line in enumerate(lines, start=1):
         match = TIMING.match(line)
+        # a line with an arrow begins a cue even where its times are damaged
         if match is None and not HAS_ARROW.search(line):
             block.lines.append(line)
             continue
@@ -107,6 +109,7 @@ def _take_label(block: _Block, following: _Block, *, are_ids_words: bool) -> Non
     if following.starts_after_blank:
         while lines and not lines[-1].strip():
             lines.pop()
+        # some programs write a blank line between number and times
         if not (lines and _NUMBER.fullmatch(lines[-1])):  # times directly after a blank line
             return
     has_blank_before = not lines[-2].strip() if len(lines) > 1 else block.begin_s is None

@@ -12,6 +12,7 @@ HAS_ARROW = re.compile(r"-{1,2}\s?>|[–—]>|→")
 
 def clock_seconds(sign: str | None, hours: str | None, minutes: str, seconds: str, fraction: str | None) -> float:
     """Seconds of a clock reading; the fraction is decimal, whatever its number of digits."""
+    # hours may be missing (WebVTT), and have any number of digits
     whole = int(hours or 0) * 3600 + int(minutes) * 60 + int(seconds)
     value = whole + float(f"0.{fraction or 0}")
     return -value if sign else value

@@ -15,6 +15,7 @@ _BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )  # in this order: the mark of UTF-32-LE begins with that of UTF-16-LE
 # UTF-16 without a mark: the high byte of digits, line ends and arrows, which every subtitle file contains, is 0.
+# of the bytes of one parity: Latin letters in UTF-16 have a zero byte each
 _ZERO_SHARE = 0.2
 
 
@@ -66,6 +67,7 @@ def _decode(content: bytes, path: Path, encoding: str | None) -> str:
         try:
             return content.decode("utf-8")
         except UnicodeDecodeError:
+            # Windows 1252 is what old subtitle programs of the West wrote
             return content.decode(fallback)
     except UnicodeDecodeError as broken:
         if encoding is not None:
@@ -77,6 +79,7 @@ def _decode(content: bytes, path: Path, encoding: str | None) -> str:
 
 def _guess_wide(content: bytes) -> str | None:
     """UTF-16 without a byte order mark, by the places of its zero bytes; None for other text."""
+    # UTF-16 has pairs of bytes
     if len(content) % 2:
         return None
     half = max(len(content) // 2, 1)

@@ -111,6 +111,7 @@ def _ordered(written: Sequence[WrittenCue], warnings: list[SubtitleWarning]) -> 
             cue = replace(cue, begin_s=0.0)  # noqa: PLW2901 - the corrected cue
         if cue.begin_s < latest:
             warnings.append(SubtitleWarning(cue.line, "this cue begins before the one above it; cues are sorted"))
+        # milliseconds, as files have them
         key = (round(cue.begin_s, 3), cue.text)
         if key in seen:
             warnings.append(SubtitleWarning(cue.line, "this cue repeats another one; it is left out"))
@@ -132,6 +133,7 @@ def _timed(written: Sequence[WrittenCue], warnings: list[SubtitleWarning]) -> tu
             if end is not None:
                 warnings.append(SubtitleWarning(cue.line, "the cue ends before it begins; its end is estimated"))
             end = _estimated_end(cue.begin_s, following, text.spoken or text.shown)
+        # an end that is the next start differs by rounding at most
         elif following is not None and end is not None and end > following + 1e-6:
             message = f"this cue overlaps the next one by {end - following:.2f} s"
             warnings.append(SubtitleWarning(cue.line, message))

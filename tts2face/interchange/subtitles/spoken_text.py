@@ -109,6 +109,7 @@ def _speaker_of(line: str, *, has_dashes: bool) -> tuple[str | None, str]:
     match = _LABEL.match(line)
     if match:
         label = " ".join(match["label"].split())
+        # "JOHN:" is a speaker, "Remember:" begins a sentence
         if label == label.upper() and label != label.lower():
             return label, line[match.end() :]
     dash = _DASH.match(line)

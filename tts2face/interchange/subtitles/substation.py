@@ -34,6 +34,7 @@ def read_substation(lines: Sequence[str]) -> tuple[list[WrittenCue], list[Subtit
         if heading:
             section = heading[1].strip().lower()
             if section in {"v4 styles", "v4+ styles"}:
+                # a file without a Format line has the fields of its version
                 fields = SSA_FIELDS if section == "v4 styles" else ASS_FIELDS
             continue
         kind, colon, rest = line.strip().partition(":")
@@ -50,6 +51,7 @@ def read_substation(lines: Sequence[str]) -> tuple[list[WrittenCue], list[Subtit
 
 def _format_fields(written: str, number: int, warnings: list[SubtitleWarning]) -> tuple[str, ...] | None:
     fields = tuple("name" if cell.strip().lower() == "actor" else cell.strip().lower() for cell in written.split(","))
+    # the text is the last field, as it may contain commas
     if {"start", "end", "text"} <= set(fields) and fields[-1] == "text":
         return fields
     warnings.append(SubtitleWarning(number, "this Format line lacks Start, End or Text at its end; it is not used"))

@@ -57,6 +57,7 @@ class _TtmlReader:
         self._agents: dict[str, str] = {}
         self._agent = ""
         self._is_name = False
+        # without ttp:frameRate and ttp:tickRate (TTML 2, 7.2)
         self._frame_rate, self._tick_rate = Fraction(30), Fraction(1)
         self._cues: list[WrittenCue] = []
         self._warnings: list[SubtitleWarning] = []
