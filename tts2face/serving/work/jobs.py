@@ -7,16 +7,28 @@ from typing import Any, Literal, get_args
 
 from lexicon.errors import BackendError, InputError
 from tts2face.serving.work.connection import JobDatabase, Transaction, create_tables
-from tts2face.serving.work.queues import WORKFLOWS
+from tts2face.serving.work.queues import JOB_WORKFLOW, WORKFLOWS
 
 State = Literal["waiting", "running", "done", "failed", "cancelled"]  # of jobs, and of the studio's background work
 WAITING, RUNNING, DONE, FAILED, CANCELLED = STATES = get_args(State)
 OPEN_STATES = (WAITING, RUNNING)
+ENDINGS = (DONE, FAILED, CANCELLED)
 COLUMNS = (
     "id", "key_name", "kind", "state", "request", "body_hash", "created", "started", "finished", "n_done", "n_all",
     "error", "webhook", "webhook_state", "webhook_tries",
 )  # fmt: skip
 INPUT, OUTPUT = "input", "output"  # roles of files
+# The column has the ending, which belongs to the results and is written with them. Of an open job it has one word for
+# ever (workers of earlier versions write another): whether it waits or runs is what DBOS says, and a begun job whose
+# workflow has ended without it counts as running until `JobRunner.end_abandoned`.
+IS_OPEN = "finished IS NULL"  # condition of a query
+_STATE = f"""CASE WHEN NOT {IS_OPEN} THEN state
+    WHEN EXISTS (SELECT 1 FROM {{workflows}} WHERE workflow_uuid = tts2face_jobs.id AND (status = 'PENDING'
+        OR started > 0 AND status NOT IN ('ENQUEUED', 'DELAYED'))) THEN 'running' ELSE 'waiting' END"""
+# Of thousands that wait, those that may run are few: they are read by indexes, in this order of tables (CROSS JOIN).
+_RUNNING = f"""(SELECT id AS begun FROM tts2face_jobs WHERE {IS_OPEN} AND started > 0 UNION
+    SELECT workflow_uuid FROM {{workflows}} WHERE status = 'PENDING' AND name = '{JOB_WORKFLOW}') AS may_run
+    CROSS JOIN tts2face_jobs WHERE id = begun AND {IS_OPEN} AND {_STATE} = 'running'"""
 _TABLES = (
     """CREATE TABLE IF NOT EXISTS tts2face_jobs (
     id VARCHAR(64) PRIMARY KEY, key_name VARCHAR(200) NOT NULL, kind VARCHAR(40) NOT NULL, state VARCHAR(10) NOT NULL,
@@ -33,17 +45,17 @@ _TABLES = (
     PRIMARY KEY (job_id, number))""",
     """CREATE TABLE IF NOT EXISTS tts2face_job_segments (
     job_id VARCHAR(64) NOT NULL, address VARCHAR(64) NOT NULL, PRIMARY KEY (job_id, address))""",
+    # The list of jobs is read in its order, whatever is asked for.
+    "CREATE INDEX IF NOT EXISTS tts2face_jobs_by_time ON tts2face_jobs (created)",
+    "CREATE INDEX IF NOT EXISTS tts2face_jobs_by_key ON tts2face_jobs (key_name, created)",
     "CREATE INDEX IF NOT EXISTS tts2face_jobs_by_state ON tts2face_jobs (state, created)",
+    "CREATE INDEX IF NOT EXISTS tts2face_jobs_by_key_state ON tts2face_jobs (key_name, state, created)",
+    f"CREATE INDEX IF NOT EXISTS tts2face_jobs_open ON tts2face_jobs (created) WHERE {IS_OPEN}",
+    f"CREATE INDEX IF NOT EXISTS tts2face_jobs_open_by_key ON tts2face_jobs (key_name, created) WHERE {IS_OPEN}",
+    f"CREATE INDEX IF NOT EXISTS tts2face_jobs_begun ON tts2face_jobs (started) WHERE {IS_OPEN}",
     "CREATE INDEX IF NOT EXISTS tts2face_job_files_by_hash ON tts2face_job_files (sha256)",
     "CREATE INDEX IF NOT EXISTS tts2face_job_segments_by_address ON tts2face_job_segments (address)",
 )
-# The column has the ending, which belongs to the results and is written with them. Of an open job it has one word for
-# ever (workers of earlier versions write another): whether it waits or runs is what DBOS says, and a workflow that has
-# ended without its job counts as running until `JobRunner.end_abandoned`.
-IS_OPEN = f"state IN {OPEN_STATES}"  # condition of a query
-_STATE = f"""CASE WHEN NOT {IS_OPEN} THEN state
-    WHEN EXISTS (SELECT 1 FROM {{workflows}} WHERE workflow_uuid = tts2face_jobs.id
-        AND status NOT IN ('ENQUEUED', 'DELAYED')) THEN 'running' ELSE 'waiting' END"""
 CHILD_TABLES = ("tts2face_job_files", "tts2face_job_events", "tts2face_job_segments")
 
 
@@ -158,9 +170,15 @@ class JobTable:
 
     def __init__(self, database: JobDatabase) -> None:
         self.database = database
-        self._state = _STATE.format(workflows=WORKFLOWS[database.kind])
-        shown = ", ".join(f"{self._state} AS state" if name == "state" else name for name in COLUMNS)
-        self._select = f"SELECT {shown} FROM tts2face_jobs"
+        workflows = WORKFLOWS[database.kind]
+        self._state = _STATE.format(workflows=workflows)
+        # Tables and conditions of the jobs of a state; None: of all jobs.
+        self._jobs: dict[str | None, str] = {
+            None: "tts2face_jobs WHERE 1 = 1",
+            WAITING: f"tts2face_jobs WHERE {IS_OPEN} AND {self._state} = 'waiting'",
+            RUNNING: _RUNNING.format(workflows=workflows),
+            **{ending: f"tts2face_jobs WHERE state = '{ending}'" for ending in ENDINGS},
+        }
 
     def create(self) -> None:
         """Create the tables where they are missing; several processes may do so at once."""
@@ -193,8 +211,8 @@ class JobTable:
             found = self._with_key(change, new)
             if found is not None:
                 return found, False
-            condition = f"key_name = :key AND {IS_OPEN} AND {self._state} = 'waiting'"
-            n_waiting = int(change.value(f"SELECT count(*) FROM tts2face_jobs WHERE {condition}", key=new.key_name))
+            query = f"SELECT count(*) FROM {self._jobs[WAITING]} AND key_name = :key"
+            n_waiting = int(change.value(query, key=new.key_name))
             if max_waiting is not None and n_waiting >= max_waiting:
                 raise QueueFullError(
                     f"the key {new.key_name} has {max_waiting} waiting jobs; wait until some have ended"
@@ -229,17 +247,16 @@ class JobTable:
         before
             Job after which the page begins; None: the newest.
         """
-        conditions, values = ["1 = 1"], dict[str, Any](limit=limit)
+        chosen, values = self._jobs[state], dict[str, Any](limit=limit)
         if key_name is not None:
-            conditions.append("key_name = :key")
+            chosen += " AND key_name = :key"
             values["key"] = key_name
-        if state is not None:
-            conditions.append(f"{IS_OPEN} AND {self._state} = :state" if state in OPEN_STATES else "state = :state")
-            values["state"] = state
         if before is not None:
-            conditions.append("(created, id) < (SELECT created, id FROM tts2face_jobs WHERE id = :before)")
+            chosen += " AND created <= (SELECT created FROM tts2face_jobs WHERE id = :before)"  # by an index
+            chosen += " AND (created, id) < (SELECT created, id FROM tts2face_jobs WHERE id = :before)"
             values["before"] = before
-        query = f"{self._select} WHERE {' AND '.join(conditions)} ORDER BY created DESC, id DESC LIMIT :limit"
+        shown = _shown(self._state if state is None else f"'{state}'")
+        query = f"SELECT {shown} FROM {chosen} ORDER BY created DESC, id DESC LIMIT :limit"
         with self.database.transaction() as read:
             return [record_from_row(row) for row in read.rows(query, **values)]
 
@@ -265,11 +282,14 @@ class JobTable:
     def counts(self) -> tuple[dict[str, int], float]:
         """Numbers of jobs by state, and the age of the oldest waiting one in seconds."""
         with self.database.transaction() as read:
-            rows = read.rows(f"SELECT state, count(*), 0.0 FROM tts2face_jobs WHERE NOT {IS_OPEN} GROUP BY state")
-            query = f"SELECT {self._state} AS shown, count(*), {self.database.now} - min(created) FROM tts2face_jobs"
-            rows += read.rows(f"{query} WHERE {IS_OPEN} GROUP BY 1")
-        ages = {row[0]: float(row[2]) for row in rows}
-        return dict.fromkeys(STATES, 0) | {row[0]: row[1] for row in rows}, ages.get(WAITING, 0.0)
+            query = "SELECT state, count(*) FROM tts2face_jobs GROUP BY state UNION ALL SELECT 'begun', count(*) FROM"
+            found = {state: n_jobs for state, n_jobs in read.rows(f"{query} {self._jobs[RUNNING]}")}
+            query = f"SELECT {self.database.now} - created FROM {self._jobs[WAITING]} ORDER BY created LIMIT 1"
+            oldest_s = read.value(query)
+        n_begun = found.pop("begun")
+        n_open = found.pop(WAITING, 0) + found.pop(RUNNING, 0)
+        ended = {state: found.get(state, 0) for state in ENDINGS}
+        return {WAITING: n_open - n_begun, RUNNING: n_begun} | ended, float(oldest_s or 0.0)
 
     def open_jobs(self) -> list[str]:
         """Names of all waiting and running jobs."""
@@ -325,8 +345,13 @@ class JobTable:
 
     def _find(self, read: Transaction, condition: str, **values: Any) -> JobRecord | None:
         """The job of a condition, with its files."""
-        rows = read.rows(f"{self._select} WHERE {condition}", **values)
+        rows = read.rows(f"SELECT {_shown(self._state)} FROM tts2face_jobs WHERE {condition}", **values)
         return _with_files(read, record_from_row(rows[0])) if rows else None
+
+
+def _shown(state: str) -> str:
+    """`COLUMNS` of a query in which `state` says the state."""
+    return ", ".join(f"{state} AS state" if name == "state" else name for name in COLUMNS)
 
 
 def insert_files(change: Transaction, job_id: str, role: str, files: Sequence[JobFile]) -> None:
