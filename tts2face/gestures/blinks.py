@@ -25,7 +25,9 @@ MAX_PROFILES = 256
 # pauses and ends of phrases (Bentivoglio et al. 1997, Movement Disorders 12; Nakano and Kitazawa 2010, Experimental
 # Brain Research 205).
 MEAN_INTERVAL_S = 4.7
+# of the gamma distribution of intervals: the larger, the more regular
 INTERVAL_SHAPE = 10.0
+# seconds, between two presented blinks
 MIN_INTERVAL_S = 1.5
 LISTENING_INTERVALS = 26 / 17  # of those of speech: 17 blinks a minute at rest, 26 in conversation (Bentivoglio)
 EARLY_SHARE = 0.6  # of the interval after which a phrase end is used
@@ -62,6 +64,7 @@ def find_blinks(closure: FloatArray, lengths: NDArray[np.integer]) -> IntArray:
     first, last = starts - 1, ends.copy()
     for _ in range(MAX_EDGE):
         first -= (first > lowest) & (closure[first - 1] < closure[first])
+        # lids open slowly: the end is where they no longer rise
         last += (last < highest) & (closure[np.minimum(last + 1, highest)] < closure[last])
     return np.stack([first, last + 1], axis=1)
 
@@ -190,6 +193,8 @@ class BlinkPresentation:
 
     def _draw_interval(self, chance: float) -> float:
         """Quantile `chance` of the distribution of intervals (Wilson and Hilferty 1931 for the gamma distribution)."""
+        # Wilson and Hilferty: the cube root of a gamma variable is nearly normal
         spread = 1.0 / (9.0 * INTERVAL_SHAPE)
+        # the quantiles of 0 and 1 are infinite
         normal = NormalDist().inv_cdf(min(max(chance, 1e-6), 1.0 - 1e-6))
         return float(max(MEAN_INTERVAL_S * (1.0 - spread + normal * np.sqrt(spread)) ** 3, MIN_INTERVAL_S))

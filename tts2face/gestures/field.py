@@ -217,6 +217,7 @@ def _index_field(field: Field, usable: NDArray[np.int64]) -> Field:
     history = field.options.history
     windows = _history_windows(field.values, field.prosody, usable[::AXES_STRIDE], history)
     away = (windows - windows.mean(axis=0)).astype(np.float64)
+    # projected distances only bound those of windows, which decide (decision 072)
     axes = np.ascontiguousarray(principal_axes(away.T @ away, N_SEARCH_AXES)[1], np.float32)
     tree = build_tree(_history_windows(field.values, field.prosody, usable, history) @ axes.T)
     tree.order[:] = usable[tree.order]
@@ -255,6 +256,7 @@ def _is_index(
         return False
     spans, axes = kept["tree_spans"], kept["tree_axes"]
     return bool(
+        # kernels read the index without checks: a damaged one would read outside the arrays
         np.array_equal(np.sort(kept["tree_order"]), usable)
         and 0 <= spans.min() <= spans.max() <= len(usable)
         and -1 <= axes.min() <= axes.max() < n_axes
@@ -288,6 +290,7 @@ def _history_windows(
 
 def _no_recent_jumps(made: Field) -> NDArray[np.int64]:
     """Empty list of jump targets; shorter for short recordings, so that some moment can always be chosen."""
+    # without memory the head repeated 13 s in silence (decision 175)
     return np.full(min(made.options.memory, len(made.tree.order) // (8 * MIN_MOMENT_GAP)), -MIN_MOMENT_GAP, np.int64)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from tts2face.numeric.kernels import inlined_kernel, kernel
 
 # Default factor by which distances of moments found may exceed the best ones (Ju and Lee 2008 use ANN).
+# of bounds of distances: nearly the nearest moments are found, in less time
 SEARCH_SLACK = 1.1
 MIN_MOMENT_GAP = 10  # default least number of frames between two candidates of one recording
 

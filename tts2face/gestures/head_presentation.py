@@ -22,12 +22,14 @@ RETURN_HZ = 0.12  # cut-off of what is subtracted, so that the head drifts back 
 # listener move by 2 to 5 degrees (yaw) about the direction to the listener.
 TARGET_SPREAD = {"pitch": np.radians(1.2), "yaw": np.radians(4.0), "roll": np.radians(1.2)}
 LARGEST_RATIO = 2.6  # of the slow part, in units of its target spread; approached smoothly
+# of a style that hardly moves: more would scale the noise of its tracking
 MAX_SCALE = 20.0
 STILL_S, LISTENING_MOTION = 1.0, 0.4  # listeners turn the head far less than speakers (Hadar et al. 1983)
 ONSET_S = 0.3  # transition from and to recorded styles
 # Nods at accents: size in radians of strength 1, and a sum of Gaussians (seconds from the accent, share): a slight
 # lift, the nod, and a slight overshoot. Gaussians of 0.1 s hold no power above 6 Hz.
 NOD_RAD = np.radians(4.5)
+# seconds from the accent and share of the depth: up before it, down, and back
 NOD_PARTS = ((-0.30, -0.18), (0.02, 1.0), (0.36, -0.15))
 NOD_WIDTH_S = (0.095, 0.135)  # least and greatest width of a nod
 NOD_SHARE = 0.8  # of accents get a nod
@@ -35,8 +37,11 @@ NOD_REACH_S = 0.7  # a nod lies within this of its accent
 ROLL_SHARE = 0.35  # largest roll and yaw of a nod, relative to its pitch
 MIN_LEAD_S = 0.12  # accents earlier than this in a piece of sound get no nod; until then the head may already be shown
 ONSET_RAMP_S = 0.2  # a nod that would begin before its piece fades in
+# seconds between the instants at which accents are sought
 ACCENT_STEP_S = 0.01
+# seconds, standard deviation: shorter than a syllable
 ACCENT_SMOOTHING_S = 0.06
+# seconds, least distance of two nods
 ACCENT_GAP_S = 0.75
 ACCENT_DB = -8.0  # least smoothed intensity of an accent, relative to the mean level of speech
 ACCENT_RANGE_DB = 6.0  # from the weakest to the strongest accent

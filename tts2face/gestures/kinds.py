@@ -75,6 +75,7 @@ class ElementKind:
             lanes.setdefault(self.lane(element), []).append(element)
         for lane, members in lanes.items():
             if self.shape == "curve" and len(members) > 1:
+                # two curves of one lane would have to be added or chosen between
                 raise InputError(f"{lane} has {len(members)} curves of one kind; join their keys in one curve")
             for before, after in pairwise(members):
                 if after.start < before.end:

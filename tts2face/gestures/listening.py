@@ -17,13 +17,18 @@ from tts2face.types import Waveform
 
 # Ward and Tsukahara 2000, section 4: pitch below its 26th percentile for 110 ms, after 700 ms of speech; the response
 # follows 700 ms later.
+# Ward and Tsukahara's rule for English: pitch below this percentile ... (decision 189)
 LOW_PITCH_SHARE = 0.26
+# ... for so many seconds ...
 LOW_PITCH_S = 0.11
+# ... after so many seconds of speech ...
 SPOKEN_S = 0.7
+# ... is answered after so many seconds
 WAIT_S = 0.7
 PAUSE_S = 0.3  # of silence that is a cue; shorter ones are closures of plosives
 # Between responses: their rule has .8 s, and responds far more often than their listeners did. Six to twelve a minute
 # look natural (Poppe, Truong and Heylen 2011, IVA).
+# seconds between responses: 10.5 a minute, of which six to twelve look natural (Poppe et al. 2011)
 LEAST_GAP_S = 4.5
 STEP_S, CUE_RATE = 0.01, 16_000  # s, and Hz of the sound in which cues are looked for
 # Without the other's sound: one response in each cell of time, away from its ends, so 6.7 a minute.
@@ -42,6 +47,7 @@ def responses(times: Sequence[float], seed: int) -> Timeline:
     """Nods and brow raises of responses that begin at times in seconds of the clip; each depends on its time alone."""
     nods, raises = list[Nod](), list[BrowRaise]()
     for time in times:
+        # by the time alone, so that pieces of .2 s agree with a whole clip (decision 189)
         draws = np.random.default_rng((seed, round(time * 1000))).random(5)
         has_nod = draws[0] < NOD_SHARE
         if has_nod:

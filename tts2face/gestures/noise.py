@@ -67,6 +67,7 @@ def perlin_noise(times: NDArray[np.float64], key: int) -> NDArray[np.float64]:
         at = times * rate
         low = np.floor(at).astype(np.int64)
         part = at - low
+        # Perlin's second fade curve, whose second derivative is 0 at both ends (2002)
         blend = part**3 * (part * (6 * part - 15) + 10)
         left, right = _hash_noise(low, key, octave) * part, _hash_noise(low + 1, key, octave) * (part - 1)
         total += 0.5**octave * ((1 - blend) * left + blend * right)
@@ -97,6 +98,7 @@ def blinks_per_second(shut: Float32Array) -> float:
 def _hash_noise(numbers: NDArray[np.int64], key: int, octave: int) -> NDArray[np.float64]:
     """(N,) hash values in [-1, 1) of N integers (SplitMix64; Steele, Lea and Flood 2014)."""
     mixed = numbers.astype(np.uint64) * np.uint64(3) + np.uint64(octave) + np.uint64((key * 0x9E3779B97F4A7C15) % 2**64)
+    # constants of SplitMix64
     for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB), (31, 1)):
         mixed = (mixed ^ (mixed >> np.uint64(shift))) * np.uint64(factor)
     return mixed.astype(np.float64) / 2.0**63 - 1.0

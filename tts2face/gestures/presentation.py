@@ -113,6 +113,7 @@ class Emphasis:
     def __init__(self, seed: list[int]) -> None:
         self._generator = np.random.default_rng(seed)
         self._loudness, self._random = LowPass(EMPHASIS_HZ, np.zeros(1)), LowPass(RANDOM_HZ, np.zeros(1))
+        # long enough for the response of the filter to end
         impulse = np.zeros((round(20 * GESTURE_FPS / RANDOM_HZ), 1))
         impulse[0] = np.sqrt(len(impulse))  # its spectrum is that of white noise of standard deviation 1
         self._random_gain = float(1.0 / filtered_spread(impulse, RANDOM_HZ)[0])

@@ -9,6 +9,7 @@ from tts2face.sound.praat import IntensityTrack, intensity_track, pitch
 from tts2face.types import Waveform
 
 AUDIBLE_DB = 30.0  # relative to 20 micropascals; a sound with a lower maximum contains no speech
+# an octave above or below the median
 HIGH_SEMITONES = 12.0
 QUIET_DB, PROSODY_LOUD_DB = -35.0, 10.0  # limits relative to the mean level of speech; values beyond are clipped
 SILENT_PROSODY = np.array([QUIET_DB, 0.0], np.float32)

@@ -43,6 +43,7 @@ NO_SEEDS: Mapping[str, int] = MappingProxyType({})
 OPTIONS: Mapping[str, FieldOptions] = MappingProxyType(
     {
         "expression": FieldOptions(alpha=(3.0, 1.0), sigma=0.05, stride=4),
+        # decision 175 compares these with exponential decay
         "head": FieldOptions(alpha=(16.0, 1.0), stride=2, continuity=0.07, settle_s=0.09, candidates=4),
         "blink": FieldOptions(
             alpha=(1.0, 0.1),
@@ -322,6 +323,7 @@ class _FeatureTrack:
         return self._fields.of(name, self._feature, has_blinks=has_blinks)
 
     def _sample(self, source: tuple[str, bool], prosody: Float32Array, chances: NDArray[np.float64]) -> Float32Array:
+        # the gaze of conversation replaces what a field would draw
         if self._gaze is not None and not source[1]:
             return np.zeros((len(chances), self._values.shape[1]), np.float32)
         field = self._field(source)

@@ -47,6 +47,7 @@ NOD_KEYS = ((0.0, 0.0), (0.18, 1.0), (0.42, -0.1), (0.55, 0.0))
 NOD_RAD = math.radians(6.0)  # of a nod of size 1; radians, as a head moves with a stressed word
 # A flash of the brows: up, held, down; seconds, and shares of BROW_RAISE_MM (Ekman 1979, About brows).
 BROW_RAISE_KEYS = ((0.0, 0.0), (0.15, 1.0), (0.4, 1.0), (0.8, 0.0))
+# of a raise of size 1
 BROW_RAISE_MM = 4.0
 LISTENING_HOLD_S = 0.1  # after a span: gestures of a piece are drawn two frames ahead, before the next span is known
 SACCADE_S = 0.06  # transition to a gaze target; saccades of 10 degrees take 50 ms (Bahill et al. 1975)
@@ -189,6 +190,7 @@ class Timeline:
         down, up = np.zeros(len(seconds)), np.zeros(len(seconds))
         for nod in self.nods:
             pitch = nod.size * NOD_RAD * interpolate_keys(seconds - nod.time, NOD_KEYS)
+            # overlapping nods are not added: a sum would be a bow
             down, up = np.maximum(down, pitch), np.minimum(up, pitch)
         return down + up
 

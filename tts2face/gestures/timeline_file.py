@@ -63,6 +63,7 @@ def timeline_json(timeline: Timeline) -> dict[str, Any]:
 
 def _element_json(element: Any) -> dict[str, Any]:
     """Fields of an element; JSON has no infinite end."""
+    # an end that is not stated is infinite, which JSON cannot write
     parts = {field.name: getattr(element, field.name) for field in fields(element)}
     if "keys" in parts:
         parts["keys"] = [list(pair) for pair in parts["keys"]]

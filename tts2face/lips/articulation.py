@@ -141,6 +141,7 @@ class Articulator:
         jaw = self.directions["open"]
         lip = self.directions["lowered"]
         dropped = ordered_product(speech, jaw) * self._gap_by_jaw()
+        # only what is missing
         drop = np.clip(DENTAL_DROP_MM * size - dropped, 0.0, DENTAL_DROP_MM * size)
         gap = ordered_product(speech, self.mouth.gaps[MIDDLE_PAIR]) + drop
         by_lip = max(float(ordered_product(lip, self.mouth.gaps[MIDDLE_PAIR])), LEAST_MOTION_MM)
@@ -159,6 +160,7 @@ class Articulator:
         shares `free` (T,).
         """
         gaps = ordered_product(speech, self.mouth.gaps.T)
+        # lips that overlap a little are closed
         gap = np.maximum(gaps[:, MIDDLE_PAIR], 0.0)
         narrowed = gap + ordered_product(added, self.mouth.gaps[MIDDLE_PAIR])
         missing = np.maximum(MIN_GAP_SHARE * gap - narrowed, 0.0) + opening * gap

@@ -183,6 +183,7 @@ def average_tokens(
     Every token is sampled at the same parts of its phone (and of its neighbours, where pieces overlap), which warps it
     to the target's duration; with `options.align`, it is first warped in time onto the best token.
     """
+    # with the halves of both neighbours, with which exemplars overlap (decision 007)
     parts = np.arange(3) if options.overlap else np.array([1])
     knots = np.concatenate([part + np.arange(N_KNOTS) / N_KNOTS for part in parts] + [[parts[-1] + 1.0]])
     shape = (len(chosen), len(knots), tokens.frames.shape[1])
@@ -193,6 +194,7 @@ def average_tokens(
         (mean, square),
         (np.zeros((3, *shape[1:]), np.float32), warp_space(len(knots))),
     )
+    # a variance below 0 is rounding
     return AveragedTokens(mean, np.maximum(square - np.square(mean), np.float32(0.0)))
 
 
@@ -209,6 +211,7 @@ def _accumulate_average(corpus, plan, sums, space):  # type: ignore[no-untyped-d
             if chosen[n, e] < 0 or weights[n, e] == 0.0:
                 continue
             _sample_token(corpus, chosen[n, e], knots, scale, best if e == 0 else piece)
+            # the best exemplar is the one that the others are warped onto
             if e > 0 and band > 0:
                 warp_to_reference(piece, best, scale, band, laid, warp)
             _add_weighted(best if e == 0 else (laid if band > 0 else piece), weights[n, e], mean[n], square[n])

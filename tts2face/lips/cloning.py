@@ -28,6 +28,7 @@ from tts2face.types import Trajectory
 
 MAX_STANDARD_DEVIATIONS = 3.0  # limit of a mapped parameter about the target's mean; T07, section 3.1
 # Of the rest. Talkers of eight sentences have few resting frames, and rest at up to 4.5 deviations of all their frames.
+# beyond it the recordings did not begin with closed lips
 MAX_REST_DEVIATIONS = 20.0
 MIN_COMPONENT_MM = 0.5  # root of the sum of squares over all landmarks: about 0.02 mm per landmark
 MIN_REAL_MOTION_MM = 1e-4  # above the rounding errors of a float32 basis, below any measured motion
@@ -100,6 +101,7 @@ class ParameterTransfer:
         gaps = ordered_product(limited, self.target_gaps[:, :-1].T) + self.target_gaps[:, -1]
         wrong = np.flatnonzero(((gaps < MIN_LIP_GAP_MM) | (gaps > upper_gaps)).any(axis=1))
         limited[wrong] = nearest_valid_parameters(unlimited[wrong], limits, self.target_gaps, upper_gaps[wrong])
+        # again in single precision: rounding may pass a limit
         return np.clip(limited.astype(np.float32), -self.limits, self.limits)
 
     def clone_unlimited(self, source: NDArray[np.floating]) -> FloatArray:
@@ -184,6 +186,7 @@ def append_missing_components(source: ShapeModel, target: ShapeModel, n: int | N
             f"choose 0 to {len(magnitudes)}"
         )
     n_added = int((magnitudes > MIN_COMPONENT_MM).sum()) if n is None else n
+    # the largest, in the order that they have in the source
     chosen = np.sort(np.argsort(-magnitudes, kind="stable")[:n_added])
     of_mouth, others = chosen[chosen < len(mouth)], chosen[chosen >= len(mouth)]
     added = np.concatenate([mouth, other])

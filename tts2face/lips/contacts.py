@@ -182,6 +182,7 @@ def enforce_contacts(
             continue
         gaps = gap.of(kept[low:high])
         at = low + int(np.argmin(gaps))
+        # closed already: left as recorded
         if gaps[at - low] <= enough:
             continue
         reach = int((CONTACT_HOLD_S / 2 + CONTACT_EASE_S) * rate_hz)

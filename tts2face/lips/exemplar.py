@@ -73,6 +73,7 @@ def build_exemplar_model(talker: Talker) -> ExemplarModel:
     """Index a talker's tokens and compute the similarity of its phones."""
     model, n_speech = talker.model, talker.model.n_speech
     tokens = collect_tokens(talker)
+    # a parameter that never moved would divide by 0
     spread = np.maximum(model.spread[:n_speech], 1e-6).astype(np.float32)
     upper, lower = UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID
     similarity = phone_similarity(token_samples(tokens), tokens.phone, tokens.inventory, spread)

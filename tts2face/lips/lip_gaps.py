@@ -69,6 +69,7 @@ def nearest_valid_parameters(target: FloatArray, limits: FloatArray, gaps: Float
     non-negative least squares, exact up to rounding. Source: Lawson and Hanson 1974, "Solving least squares problems",
     chapter 23.
     """
+    # imported here: clips of text need no SciPy (decision 200)
     from scipy.optimize import nnls
 
     n_modes = len(limits)

@@ -8,9 +8,11 @@ from tts2face.numeric.arrays import FloatArray, ordered_product
 # Largest change of a shape's weight per second, .3 per 1/60 s; closing the lips afterwards adds a little. The fastest
 # score of the mouth in 14 recordings of GRID s1 (mouthPucker) changes by .34 per 1/60 s (99.9th percentile), that of
 # the Live Link capture (mouthFunnel) by .25.
+# weights a second
 LARGEST_SPEED_PER_S = 18.0
 # Speed at which the lips of a mouth of 50 mm open or close (99.9th percentile of GRID s1: 265 and 310 mm/s), and the
 # time in which they reach half of it.
+# contacts come last, at most 300 mm/s (decision 102)
 LIP_SPEED_MM_PER_S, LIP_ONSET_S = 300.0, 0.01
 FIRM_POWER = 6  # of the smooth minimum of a gap and its bound: a bound of twice the gap lowers it by .3 %
 LEAST_CHANGE_MM = 1e-4  # of a gap; frames that would change less are unchanged

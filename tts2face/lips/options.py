@@ -82,6 +82,7 @@ class SynthesisOptions:
 
 
 THEOBALD_2007 = SynthesisOptions(
+    # section 3.3 as published (`--synthesis theobald2007`, decision 007)
     context=4, k=10, duration=0.0, sharpness=0.0, overlap=False, precision=0.0, align=True, network=0.0,
     amplitude=1.0, smoothing_s=0.02, contacts=False,
 )  # fmt: skip

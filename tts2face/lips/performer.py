@@ -16,6 +16,7 @@ from tts2face.models.talker import ShapeModel, Talker, speech_channels
 from tts2face.numeric.arrays import FloatArray, principal_axes
 from tts2face.types import Trajectory
 
+# as a talker has (decisions 012 and 035)
 N_MOUTH_MODES = 20
 SMILE = "mouthSmile"
 CLOSED_FRAME_SHARE = 0.15  # share of the frames that count as having closed lips

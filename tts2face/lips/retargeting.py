@@ -123,6 +123,7 @@ class Retargeter:
         """
         parameters = speech.values.astype(np.float64)
         tracked_gaps = ordered_product(parameters, self.gaps[:, :-1].T) + self.gaps[:, -1]
+        # with gaps relative to 0, 73 % of /p b m/ closed; relative to contact all (decision 022)
         beyond_contact = np.maximum(tracked_gaps, 0.0)  # gaps of the face are relative to its rest, where lips touch
         target_gaps = beyond_contact + self.contact * np.minimum(beyond_contact / FULL_GAP_MM, 1.0)
         if self.matching is not None:

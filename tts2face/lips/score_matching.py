@@ -90,6 +90,7 @@ class ScoreMatching:
             Distance of the person's mouth from rest in standard deviations of speech.
         """
         targets = self.face_scores(scores, distance)
+        # scores above the limit have no finite logit
         targets[:, JAW] = np.minimum(JAW_GAIN * targets[:, JAW], SCORE_LIMITS[1])
         weights: FloatArray = np.zeros(linear.shape)
         for first in range(0, len(linear), BLOCK):
@@ -128,6 +129,7 @@ class ScoreMatching:
             both_low = np.maximum(logistic(found), targets) < LOW_SCORE
             active = np.where(both_low, 0.0, strength)
             read = np.clip(logistic(found), *PRECISION_LIMITS)
+            # the precision of a score, s (1 - s): flat at both ends of a logistic (decision 101)
             active *= 4.0 * read * (1.0 - read)
             wanted = active * (logits - found + np.einsum("tsk,tk->ts", slopes, weights))
             solved = bounded_least_squares(

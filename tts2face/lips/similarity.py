@@ -100,6 +100,7 @@ def _phone_statistics(
     sums = np.stack([z[rows].sum(axis=0, dtype=np.float64) for rows in members])  # `np.add.at` takes 20 times as long
     mean = sums / np.maximum(counts, 1.0)[:, None, None]
     scatter = np.stack([np.square(z[rows] - mean[label]).sum(axis=0) for label, rows in enumerate(members)])
+    # a parameter without spread would have infinite weight
     pooled = scatter.sum(0) / max(1, len(z)) + 1e-6
     n = counts[:, None, None]
     return mean, (scatter + PRIOR_TOKENS * pooled) / (n + PRIOR_TOKENS)

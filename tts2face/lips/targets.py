@@ -37,6 +37,7 @@ class Targets:
 @functools.lru_cache(maxsize=4096)
 def substitute_phones(label: str, inventory: tuple[str, ...]) -> tuple[str, ...]:
     """Phones of the inventory for a phone: itself, the nearest, or those of its parts; none for a transparent one."""
+    # h, ɦ and ʔ give their time to the next phone (decision 004)
     if label not in inventory and label in TRANSPARENT_PHONES:
         return ()
     return nearest_phones(label, inventory)
@@ -89,6 +90,7 @@ def _substitution_rows(phones: PhoneSequence, inventory: tuple[str, ...]) -> lis
         if not shown:
             waiting = start if waiting is None else waiting
             continue
+        # before a pause to the last one, whose position the lips have
         if waiting is not None and label == SILENCE and rows:
             rows[-1] = (rows[-1][0], rows[-1][1], start, rows[-1][3])
         elif waiting is not None:

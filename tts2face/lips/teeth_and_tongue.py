@@ -147,6 +147,7 @@ def incisor_edge(face: Face, places: FloatArray, width: float) -> tuple[float, f
         low = float(front[:, 1].min())
         ahead = float(front[front[:, 1] < low + EDGE_SHARE * width, 2].max())
         below, behind = (lip[1] - low) / width, (lip[2] - ahead) / width
+        # parts named "teeth" of strangers' characters may be a whole jaw, or lie elsewhere
         if PLAUSIBLE_BELOW[0] < below < PLAUSIBLE_BELOW[1] and PLAUSIBLE_BEHIND[0] < behind < PLAUSIBLE_BEHIND[1]:
             return low, ahead
     return float(lip[1] - EDGE_BELOW_LIP * width), float(lip[2] - EDGE_BEHIND_LIP * width)

@@ -170,6 +170,7 @@ def _score(target, context, durations, scoring):  # type: ignore[no-untyped-def]
 def _insert_token(tokens, scores, token, score):  # type: ignore[no-untyped-def]
     """Put a token into the ranking if it belongs there: higher score first, then lower token."""
     k = len(tokens)
+    # of equal scores the lower number wins, so that the order of the search does not matter
     if score < scores[k - 1] or (score == scores[k - 1] and token > tokens[k - 1] >= 0):
         return
     at = k - 1
@@ -210,6 +211,7 @@ def _search_groups(query, tokens, far_likeness, scoring, found, space):  # type:
         for _ in range(last - first):
             g = _argmax(bounds)
             bound = bounds[g]
+            # groups come by falling bounds: no later one can enter
             if bound < found.scores[n, -1]:
                 break
             bounds[g] = -np.inf

@@ -93,6 +93,7 @@ def spoken_spans(phones: tuple[str, ...], edges: NDArray[np.float64]) -> NDArray
     starts, ends = edges[:-1].copy(), edges[1:].copy()
     if len(phones) > 1:
         if phones[0] == SILENCE:
+            # the rest of a long silence is no part of speech
             starts[0] = max(starts[0], ends[0] - PAUSE_REACH_S)
         if phones[-1] == SILENCE:
             ends[-1] = min(ends[-1], starts[-1] + PAUSE_REACH_S)
@@ -122,6 +123,7 @@ def read_motion(frames: Float32Array, first: int, last: int, at: float, out: Flo
     a, b = first + max(i - 1, 0), first + i
     c, d = first + min(i + 1, n - 1), first + min(i + 2, n - 1)
     wa = u * (-0.5 + u * (1.0 - 0.5 * u))
+    # Catmull-Rom weights of the rows before, at and behind the position
     wb = 1.0 + u * u * (-2.5 + 1.5 * u)
     wc = u * (0.5 + u * (2.0 - 1.5 * u))
     wd = u * u * (-0.5 + 0.5 * u)

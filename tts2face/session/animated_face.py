@@ -328,6 +328,7 @@ class OwnAppearanceFace:
 
     def renderer(self, picture: Picture) -> FrameRenderer:
         """Create the renderer that draws the face over the talker's video."""
+        # imported here: exports draw nothing
         from tts2face.picture.own_face import own_face_renderer  # exports draw nothing
 
         return marked(own_face_renderer(self.talker, picture, self.gestures))

@@ -149,6 +149,7 @@ def _moving(
 def _dtw_cost(pairs: Sequence[tuple[RealArray, RealArray]], spread: RealArray, band: int | None) -> float | None:
     """Mean over the frames of the second motion."""
     pairs = [(a, b) for a, b in pairs if len(a) and len(b)]
+    # a channel that stands still has no deviations to count in
     if not pairs or (spread < LIP_SPREAD).any():
         return None
     costs = [warping_cost(a, b, spread, band) for a, b in pairs]

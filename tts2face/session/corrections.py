@@ -68,6 +68,7 @@ class SentenceEdges:
         later = phones.edges[1:-1] - own[1:-1]
         if abs(phones.end - own[-1]) > MAX_END_CHANGE_S and len(later) and phones.phones[0] == SILENCE:
             shift = float(np.median(later))
+            # most edges agree about a shift: the start of the sound was cut, and nothing else changed
             if 2 * np.count_nonzero(np.abs(later - shift) <= EQUAL_EDGES_S) >= len(later):
                 own[1:] += shift
         if abs(phones.end - own[-1]) > MAX_END_CHANGE_S or own[-2] >= phones.end or own[1] <= 0.0:

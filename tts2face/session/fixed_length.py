@@ -145,6 +145,7 @@ def _pause(sound_end: float, n_frames: int, fps: Fraction) -> float:
 
 def _frames_with_pause(sound_end: float, n_frames: int, fps: Fraction) -> int:
     pause = max(_pause(sound_end, n_frames, fps), 0.0)
+    # a hundredth of a frame is rounding
     return int(np.ceil((sound_end + pause) * float(fps) - 0.01))
 
 

@@ -126,6 +126,7 @@ class GestureLayer:
         """The piece with gestures, which follow the loudness of its voice and the timelines of request and marks."""
         lips, drawn = piece.clip.motion, piece.drawn
         assert drawn is not None
+        # other requests of this process have turns meanwhile (decision 097)
         while not wait([drawn], POLL_S).done:
             self._yield_turn()
         history, timeline, (gestures, stream) = drawn.result()
@@ -171,6 +172,7 @@ class GestureLayer:
 
     def _draw(self, sound: Waveform, times: NDArray[np.float64], timeline: Timeline) -> Drawn:
         """Gestures of a piece, and the stream for the piece after it."""
+        # a stream is used up by drawing; the copy keeps the state before the piece
         stream = (self._now.stream or self._first.result()).copy()
         gestures = _gaze_relative_to_head(stream.next(sound, len(times), timeline))
         if "gaze" in gestures and self._has_microsaccades:

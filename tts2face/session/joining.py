@@ -137,6 +137,7 @@ def trim_end(speech: Speech) -> Speech:
 def _part(speech: Speech, start: int, end: int) -> Speech:
     """Samples [start, end) of speech, faded at the cuts, with all its phones and words: none is shorter than 5 ms."""
     sound, phones = speech.waveform, speech.phones
+    # nothing is cut: no fade
     if (start, end) == (0, len(sound.samples)):
         return speech
     gains = _fade_gains(end - start, sound.rate, start > 0, end < len(sound.samples))
@@ -169,6 +170,7 @@ def pad_to_frame(speech: Speech, first_frame: int, fps: Fraction) -> Speech:
     n_samples = first_sample(first_frame + n_frames, rate, fps) - first_sample(first_frame, rate, fps)
     sound = speech.waveform.padded(n_samples)
     phones, edges = list(speech.phones.phones), list(speech.phones.edges)
+    # silence that fills the last frame would belong to a phone
     if phones[-1] != SILENCE and len(sound.samples) > len(speech.waveform.samples):
         phones.append(SILENCE)
         edges.append(edges[-1])

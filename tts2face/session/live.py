@@ -97,6 +97,7 @@ class _Calibration:
         now = Trajectory(BLENDSHAPES, scores[None], fps)
         weights = self.retargeter.weights(posed.landmarks[-1:], now).values[0]
         head = np.concatenate([head_angles(posed.rotations[-1:])[0], posed.translations[-1]]) - self.head
+        # head channels: three angles, then x, y and z
         head[5] = 0.0  # the distance is relative to the recent frames and drifts over longer times
         return LivePose(weights, head.astype(np.float32))
 

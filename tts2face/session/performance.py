@@ -25,6 +25,7 @@ from tts2face.video.take import Take, read_take
 
 CAPTURE_SUFFIX = ".csv"
 CAPTURE_FPS = 30.0  # default frame rate of captures, whose own is higher than a video needs
+# of a performer's lips and expressions
 GAINS = (0.0, 4.0)
 
 
@@ -138,6 +139,7 @@ def resample_take(motion: FaceMotion, fps: float) -> FaceMotion:
     old = motion.face.fps
     if exact_rate(fps) == exact_rate(old):
         return motion
+    # 1e-6: an instant that is a frame of both rates counts in spite of rounding
     n_frames = max(1, int(np.floor((len(motion.face) - 1) / old * fps + 1e-6)) + 1)
     at = np.minimum(np.arange(n_frames) / fps * old, len(motion.face) - 1)
 

@@ -235,6 +235,7 @@ def check_marks(text: MarkedText, request: Request) -> None:
             "[pause], <break>, <prosody>, <emphasis>, <voice> and <lang> have no effect on a recording; remove them or "
             "--audio"
         )
+    # en-GB in a request of en-us is one language, de is another
     if text.language is not None and _primary(language_code(text.language)) != _primary(request.language):
         raise InputError(f"the text names the language {text.language}, not {request.language}; choose one of them")
     marked_styles(text)

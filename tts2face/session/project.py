@@ -94,6 +94,7 @@ class Project:
             A pronunciation is invalid; the message names the word.
         """
         for word in self.pronunciations:
+            # dictionaries have a word a line, and comments after #
             if len(word.split()) != 1 or "#" in word:
                 raise InputError(f"a pronunciation is for one word, not for {word[:40]!r}; give each word its own")
         lines = (f"{word} {written}" for word, written in self.pronunciations.items())

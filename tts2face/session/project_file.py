@@ -76,6 +76,7 @@ def parse_project(content: Any, name: str, folder: Path) -> Project:
     """A project from its object of JSON; errors as `load_project`."""
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise DataError(f'{name} is not a project: "format" is not {FORMAT!r}; choose a file written by the studio')
+    # a project of version 1 without a face shows `head` (decision 164)
     if content.get("version") not in (1, VERSION):
         raise DataError(
             f"{name} has version {content.get('version')!r}; this program reads version {VERSION}; update it"
@@ -153,6 +154,7 @@ def _options_json(options: Options, default: Options, folder: Path, files: tuple
         if value == getattr(default, option.name):
             continue
         if option.name in files and is_file(Path(value)):
+            # a project and its files can be moved together
             value = os.path.relpath(value, folder)
         chosen[option.name] = str(value) if isinstance(value, Path) else value
     return chosen

@@ -178,6 +178,7 @@ def _phones_within(
     words = tuple(
         replace(word.shift(-first), last=min(word.last, last) - first)
         for word in transcript.words
+        # a word belongs to the clip in which it begins
         if first <= word.first < last and edges[word.first] > -1e-6  # else it began in the span before
     )
     return PhoneSequence(transcript.phones.phones[first:last], cut), words

@@ -72,6 +72,7 @@ def _file_times(models: Models) -> tuple[int, ...]:
     """Times of the last change of those models that are files, in nanoseconds."""
     found = []
     for name in (models.talker, models.face, models.palette):
+        # shipped models have names without folders, and do not change
         if name is not None and os.sep in name:
             with suppress(OSError):
                 found.append(os.stat(name).st_mtime_ns)

@@ -155,6 +155,7 @@ def speak_sentence(
         try:
             speech = speaker.speak(phrase_content(part), rate=rate, seed=request.seed)
         except SilentTextError:  # signs, such as pictures, for which a voice has no words
+            # a sentence of signs alone is an error, beside words they are left out
             if part is sentence.utterances[-1] and not spoken:
                 raise
             continue
@@ -188,6 +189,7 @@ def sentence_sound(
 ) -> Waveform:
     """Sound of `speak_sentence`, byte for byte, without aligning the phones of a sentence that needs no edges."""
     part, text = sentence.utterances[0], text_of(request)
+    # joins and gains need the edges of phones
     if len(sentence.utterances) > 1 or any(run.volume != 1.0 for run in sentence.runs):
         return speak_sentence(voice, sentence, request, voices, deliveries=deliveries).sound
     speaker = speaker_of(part, voice, request, voices)

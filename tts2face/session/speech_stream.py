@@ -191,6 +191,7 @@ def spoken_ahead(pieces: Iterator[Piece], timeline: Timeline, yield_turn: YieldT
     So times beyond the end of the clip are refused before anything of it is sent; beyond `AHEAD_S` that is found later.
     """
     waiting, seconds = deque[Piece](), 0.0
+    # a time beyond the clip gets 400, not a stream that breaks off (decision 206)
     while seconds <= min(timeline.latest_s, AHEAD_S):
         if (piece := next(pieces, None)) is None:
             timeline.check_duration(seconds)
@@ -338,5 +339,6 @@ def _spoken(
             continue
         n_spoken += 1
         yield sentence, spoken
+    # single signs are left out; a text of signs alone is an error
     if silent is not None and not n_spoken:
         raise silent

@@ -30,6 +30,7 @@ from tts2face.processes.threads import available_cores
 from tts2face.session.named_models import Models
 from tts2face.sound import segments
 
+# seconds of one kernel in a child
 COMPILE_TIMEOUT_S = 120.0
 Kernel = tuple[ModuleType, str]
 MOTION: Kernel = (contacts, "_closest_rows")  # one of the last that `compile_motion` compiles, and nothing else needs
@@ -73,6 +74,7 @@ def compile_kernels(drawn: Face | None) -> None:
     try:
         if drawn is not None:
             compile_pictures(keep_parts(drawn, lambda part: part.kind != STRANDS) if has_strands else drawn)
+        # an empty list is the end: there is no lock between test and take
         with suppress(IndexError):  # the children have taken the rest
             while True:
                 TASKS[names.popleft()]()
