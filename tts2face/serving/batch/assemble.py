@@ -79,10 +79,12 @@ class _Joined:
     def _open(self, source: Any) -> None:
         """Streams like those of the first segment."""
         for name, value in source.metadata.items():
+            # the notice of synthetic media goes into the joined file
             if name.lower() == "comment":
                 self._target.metadata["comment"] = self.notice = value
         first = source.streams.video[0]
         self._video = self._target.add_stream_from_template(first)
+        # WebM states in its metadata that its pictures have transparency
         if "alpha_mode" in (name.lower() for name in first.metadata):
             self._video.metadata["alpha_mode"] = "1"
         self._audio = self._target.add_stream(self._kind.audio, rate=SOUND_RATE, layout="mono")
@@ -99,8 +101,10 @@ class _Joined:
         offset = Fraction(self.n_frames) / self._fps / video.time_base
         n_frames, earlier = 0, 0
         for packet in source.demux(video):
+            # the last packet of a demuxer flushes, and has no picture
             if packet.dts is None:
                 continue
+            # with B frames the first picture is decoded before time 0
             if n_frames == 0 and video.codec_context.has_b_frames:
                 earlier = min(0, -round(DECODE_DELAY / self._fps / video.time_base) - packet.dts)
             packet.pts += round(offset)
@@ -155,5 +159,6 @@ def sound_on(
     mixed[: len(samples)] += samples
     mixed[: len(before)] += before
     limits = np.iinfo(np.int16)
+    # two sounds together may exceed 16 bits
     joined = np.clip(mixed, limits.min, limits.max).astype(np.int16)
     return joined[n_samples:], joined[:n_samples]

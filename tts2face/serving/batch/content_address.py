@@ -52,6 +52,7 @@ def program_version() -> dict[str, str]:
     for package in VOICE_PACKAGES:
         try:
             found[package] = version(package)
+        # an extra that is not installed determines nothing
         except PackageNotFoundError:
             continue
     return found

@@ -40,6 +40,7 @@ def continues(text: str, following: str, language: str = "en-us", *, is_in_capit
     if has_end_mark(end):
         after = begin.capitalize() if begin.isupper() else begin
         return end[-1] == "." and not ends_sentence(end[:-1], after, language)
+    # in capitals a small letter cannot say that the sentence goes on
     if is_in_capitals or end[-1] in ",、，" or begin[:1].islower():
         return True
     word = _LAST_WORD.search(end)

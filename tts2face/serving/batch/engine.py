@@ -60,6 +60,7 @@ class LocalEngine:
 
     def render(self, segments: Mapping[str, Segment], store: Store) -> Iterator[Rendered]:
         """Yield each segment as soon as it is stored or has failed."""
+        # no process of its own for one job
         if self.n_jobs == 1:
             from tts2face.serving.batch.render import SegmentRenderer
 
@@ -101,6 +102,7 @@ def _render_waiting(
 @contextmanager
 def _processes(n_jobs: int) -> Iterator[list[RenderProcess]]:
     """Child processes, each bound to a core; they end at once with the context, whatever they render."""
+    # the cores that a container allows; not on macOS and Windows
     cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
     processes = [RenderProcess(cores[number % len(cores)] if cores else None) for number in range(n_jobs)]
     try:
@@ -137,6 +139,7 @@ def render_into(store: Store, segment: Segment, renderer: SegmentRenderer, on_me
             reason = str(died)
             tries += 1
         except Tts2faceError as wrong:
+            # a full disk is no fault of the segment: the try does not count
             if isinstance(wrong, BackendError) and _is_full(store):
                 continue
             return Rendered(address, None, str(wrong))

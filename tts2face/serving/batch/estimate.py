@@ -12,9 +12,13 @@ from tts2face.serving.batch.store import Store
 # Seconds of one core, measured at 256 x 256 to 1280 x 720 (docs/performance.md): for each frame, for each pixel sample
 # of the square that holds the head, for each pixel of the picture, for each second of speech, and to load the models.
 FRAME_S = 4.3e-3
+# seconds of a sample of a picture
 SAMPLE_S = 11.6e-9
+# seconds of a pixel, drawn and encoded
 PIXEL_S = 22e-9
+# seconds of a second of speech
 SYNTHESIS_S = 0.15
+# seconds until a process renders
 START_S = 5.0
 FRAME_BYTES, PIXEL_BYTES = 1000, 0.003  # of a frame, H.264 at CRF 18
 SOUND_BYTES_PER_S, OUTPUT_SOUND_BYTES_PER_S = 96_000, 16_000  # of a segment, and of an output

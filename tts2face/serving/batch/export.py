@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from tts2face.session.session import Session
 
 
+# faces in a message
 MAX_SHOWN = 3
 
 
@@ -137,6 +138,7 @@ def _with_sound(clip: Clip, sound: Waveform) -> Clip:
     seconds = sound.duration
     edges = np.minimum(phones.edges, seconds)
     edges[-1] = seconds
+    # phones beyond the new end would last no time: all shrink alike
     if (np.diff(edges) <= 0).any():
         edges = phones.edges * (seconds / phones.end)
     speech = Speech(sound, PhoneSequence(phones.phones, edges), clip.speech.words)

@@ -178,6 +178,7 @@ class FilePlan:
         if cue.begin_s + offset < 0.0:
             self._warn(cue.line, f"cue {cue.number} begins at 0 s: an offset of {offset:g} s is before the start")
         begin = max(cue.begin_s + offset, 0.0)
+        # a millisecond at least: a cue before 0 s has no other length
         return replace(cue, begin_s=begin, end_s=max(cue.end_s + offset, begin + 0.001)) if offset else cue
 
     def _divide(self, cue: Cue) -> Cue:

@@ -161,6 +161,7 @@ class _Search:
             if not self.exceeds(targets) or self.rate >= fastest:
                 return
             longest = max(end / target for end, target in zip(self._ends, targets, strict=True))
+            # at least one percent a step
             raised = fastest if step == MAX_STEPS - 1 else self.rate * max(longest / AIM, 1.01)
             self._speak(min(fastest, raised))
 

@@ -27,6 +27,7 @@ def read_manifest(folder: Path) -> dict[str, dict[str, Any]]:
     """Entries of a manifest by the name of their output; empty without one or if it is damaged."""
     try:
         content = parse_json((folder / JSON_NAME).read_text(encoding="utf-8"), JSON_NAME)
+    # a damaged manifest is as none: outputs are joined again from stored segments
     except (OSError, UnicodeDecodeError, DataError):
         return {}
     entries = content.get("outputs") if isinstance(content, dict) else None
@@ -50,6 +51,7 @@ def read_segments(folder: Path) -> set[str]:
 
 def is_current(entry: Mapping[str, Any] | None, output: Output, folder: Path) -> bool:
     """Whether a file is what the plan would make: its entry has the same address, and the file the same size."""
+    # a failed output is tried again
     if entry is None or entry.get("address") != output.address or entry.get("status") != "done":
         return False
     files = {output.name: entry.get("bytes")} if output.suffix else {}

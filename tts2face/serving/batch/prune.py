@@ -78,6 +78,7 @@ def _unfinished_files(store: Store, before: float) -> list[tuple[Path, int]]:
     found = []
     for path in (store.folder / "scratch").glob("*") if store.folder is not None else ():
         status = path.stat()
+        # a younger file may be of a process that runs
         if path.is_file() and status.st_mtime <= before:
             found.append((path, status.st_size))
     return found

@@ -56,6 +56,7 @@ def fit_recording(session: Session, request: Request, segment: Segment) -> tuple
     try:
         pieces = list(session.stream(request))
     except DataError as wrong:
+        # a recording of this cue alone contains its words, or is wrong
         if segment.audio_begin is None:
             raise
         if request.source.text:
@@ -64,6 +65,7 @@ def fit_recording(session: Session, request: Request, segment: Segment) -> tuple
         idle = replace(request, source=Idle(max(seconds, IDLE_LIMITS_S[0])))
         return idle, 0.0, [f"the recording has no speech here ({_reason(wrong)})"]
     found = [f"{' '.join(mismatch.words)!r}" for piece in pieces for mismatch in piece.mismatches]
+    # an excerpt of a dubbing track may have other words than its subtitles
     if found and segment.audio_begin is not None:
         return _without_words(session, request, segment)
     warnings = [f"the recording probably does not contain {', '.join(found)}"] if found else []

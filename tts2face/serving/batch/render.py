@@ -192,10 +192,12 @@ def _length(segment: Segment, fit: Fit, fps: float) -> tuple[int, list[str]]:
     warnings = []
     if fit.overflow_s > (1.0 / fps if segment.overflow == REPORT else EASY_S):
         warnings.append(f"the speech is {fit.overflow_s:.2f} s longer than its cue at rate {fit.rate:.2f}")
+    # beyond the limit only where nothing else made room (decision 208)
     if fit.rate > max(segment.max_rate, float(segment.request.get("rate", 1.0))) + 1e-6:
         warnings.append(f"the rate {fit.rate:.2f} exceeds {segment.max_rate:g}, {_why(segment)}")
     if segment.fills_slot and segment.slot_frames is not None:
         return segment.slot_frames, warnings
+    # a clip has a frame at least
     return max(segment.window_frames, frame_count(max(fit.speech_s, 1e-3), fps)), warnings
 
 

@@ -77,6 +77,7 @@ def measure_plan(
 
     renderer, found = SegmentRenderer(), dict[str, SegmentResult]()
     segments = {line.segment.address: line.segment for line in plan.lines if line.segment is not None}
+    # by models: a renderer holds one session at a time
     for done, segment in enumerate(sorted(segments.values(), key=lambda segment: repr(segment.models)), start=1):
         result = _fit_of(segment, store, renderer)
         if result is not None:

@@ -114,6 +114,7 @@ class Speakers:
         models = self.models
         for settings in (self.cast.default, role.settings if role else {}):
             chosen = {name: settings[name] for name in MODEL_NAMES if name in settings}
+            # a haircut of one face does not fit another
             if chosen.get("face", models.face) != models.face:
                 chosen = dict.fromkeys(("identity", "hair", "hair_color")) | chosen  # they belong to a face
             elif models.face == DRAWN_FACE:

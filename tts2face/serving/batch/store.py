@@ -59,6 +59,7 @@ class Store:
 
     def result(self, address: str) -> SegmentResult | None:
         """Result of a stored segment; None if it is not stored or damaged, so that it is rendered again."""
+        # a result without its movie, as of a folder that was cleaned by hand
         if self.folder is not None and not self.files.get(_movie(address), 1):
             return None
         content = self.files.get(_result(address), MAX_RESULT_BYTES)
@@ -90,6 +91,7 @@ class Store:
         try:
             return self.files.lend(_movie(address), folder / f"{address}{SEGMENT_SUFFIX}")
         except FileNotFoundError:
+            # so that the next run renders it
             self.remove(address)  # a result without its movie
             raise BackendError(f"the segment {address[:12]} is missing in {self.files.place}; run again") from None
 

@@ -66,6 +66,7 @@ class KeyRing:
         if self.is_open:
             return key
         found = next((held for held in self._keys if held.hash == key.hash), None)
+        # a named file without keys serves nobody: absence is no permission (decision 202)
         if found is None and not self._keys:
             raise _unauthorized("the service has no API keys now, so that nobody is served; ask its operator")
         if found is None:
@@ -103,6 +104,7 @@ class KeyRing:
         async with self._reading:
             found: tuple[ApiKey, ...] = ()
             try:
+                # in a thread: a slow disk must not stop the event loop
                 found = () if self._path is None else await asyncio.to_thread(read_keys, self._path)
             finally:
                 self._keys = found
@@ -242,6 +244,7 @@ class RateLimits:
         running, self._running = dict(self._running), +self._running  # what no longer runs is given once, as 0
         try:
             found = await exchange(spent, running)
+        # while the database is away each server counts alone (decision 186)
         except BaseException:
             self._elsewhere = {}
             for taken in spent:
@@ -290,6 +293,7 @@ def require_scope(request: HttpRequest, scope: str, what: str) -> ApiKey:
 
 
 def _limited(reason: str, wait_s: float) -> RefusedError:
+    # Retry-After has whole seconds: rounded up, so that the next try is not too early
     seconds = max(1, int(wait_s + 0.999))
     return RefusedError(
         429, "rate_limited", f"{reason}; wait {seconds} s and repeat the request", {"Retry-After": str(seconds)}

@@ -109,6 +109,7 @@ async def _answer_invalid(request: HttpRequest, error: Exception) -> JSONRespons
     assert isinstance(error, RequestValidationError)
     first = error.errors()[0]
     name = ".".join(str(part) for part in first["loc"] if part != "body") or "body"
+    # pydantic quotes what was sent, of any length
     message = f"{name}: {first['msg'][:200]}"
     request.state.exchange.code = "invalid_request"
     return JSONResponse(error_body("invalid_request", message, name), 422)
@@ -117,6 +118,7 @@ async def _answer_invalid(request: HttpRequest, error: Exception) -> JSONRespons
 async def _answer_http(request: HttpRequest, error: Exception) -> JSONResponse:
     assert isinstance(error, HTTPException)
     headers = dict(error.headers or {})
+    # RFC 9110, 15.5.6: the answer names the methods that there are
     if error.status_code == 405:
         headers["Allow"] = ", ".join(sorted(_methods(request)))
     return JSONResponse(error_body("http", str(error.detail)), error.status_code, headers)
@@ -136,5 +138,6 @@ def _methods(request: HttpRequest) -> set[str]:
 def _routes(routes: Iterable[Any]) -> Iterator[Any]:
     """All routes, those of included routers among them, which FastAPI keeps as one."""
     for route in routes:
+        # FastAPI keeps an included router as one route
         router = getattr(route, "original_router", None)
         yield from (route,) if router is None else _routes(router.routes)

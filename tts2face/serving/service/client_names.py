@@ -103,6 +103,7 @@ def voice_kind(name: str) -> _Kind | None:
     (_Kind(language='en-gb', sex='female'), 'male', None)
     """
     heaviest: tuple[float, _Kind] | None = None
+    # Kokoro's clients combine voices: af_bella(2)+af_sky; none are mixed (decision 206)
     for part in (_WEIGHTED.fullmatch(named.strip()) for named in re.split(r"[+-]", name[:400])):
         kind = None if part is None else _single_kind(part["name"])
         if part is None or kind is None:

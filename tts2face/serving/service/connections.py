@@ -28,6 +28,7 @@ REASONS = {
     431: "Request Header Fields Too Large",
     503: "Service Unavailable",
 }
+# seconds until a connection may be free
 RETRY_S = 2
 
 
@@ -104,6 +105,7 @@ class HttpConnection(H11Protocol):
         super().on_response_complete()
         self._linger.stop()
         self._n_lingering = 0
+        # a client that still sends when the connection closes gets a reset, and not the answer
         if self.conn.their_state is h11.SEND_BODY and not self.transport.is_closing():
             self._linger.start(LINGER_S)
 
@@ -115,6 +117,7 @@ class HttpConnection(H11Protocol):
         """
         if self.transport.is_closing():
             return
+        # an answer of a stated length cannot have trailers
         with suppress(h11.LocalProtocolError):  # of a stated length, or for a client of HTTP/1.0: without trailers
             end = self.conn.send(h11.EndOfMessage(headers=list(fields)))
             self.transport.write(end if is_read else end.removesuffix(b"\r\n"))
@@ -198,6 +201,7 @@ class SocketConnection(WebSocketsSansIOProtocol):
         """Continue, as the client reads."""
         self._stall.stop()
         super().resume_writing()
+        # reading stopped when the client did not read (a WebSocket's ping ends no such client)
         if not self.read_paused and not self.transport.is_closing():
             self.transport.resume_reading()
 

@@ -26,6 +26,7 @@ MAX_REASON = 300  # characters
 MEMORY_BYTES = 1 << 30  # of what is decoded at the same time; the largest picture of the default settings takes .8 GB
 ADDRESS_BYTES = 256 << 20  # of a child with its libraries, most of which take no memory; 149 MB measured
 AVATAR_CPU_S, AVATAR_S = 240, 300.0  # the head of a person takes 15 s
+# seconds until a place of the queue may be free
 RETRY_S = 10
 
 
@@ -81,6 +82,7 @@ class KeyTurns:
         """Give free places to those that wait, one key after the other."""
         for key in list(self._waiting):
             waiting = self._waiting[key]
+            # clients that have left wait no longer
             while waiting and waiting[0].cancelled():
                 waiting.popleft()
             is_free = self._running.total() < self._shares.running and self._running[key] < self._shares.of_key
@@ -116,6 +118,7 @@ class MemoryBudget:
         while self._waiting:
             n_bytes, place = self._waiting[0]
             if not place.cancelled():
+                # in the order of asking, so that no large file waits for ever (decision 204)
                 if self._n_used and self._n_used + n_bytes > self._n_bytes:
                     return
                 self._n_used += n_bytes
@@ -151,6 +154,7 @@ class Decoders:
                         if kind == PICTURE:
                             _limit_memory(child.pid, n_bytes)
                         answer = (await child.call(DECODE, order, timeout_s=timeout_s)).content
+        # the child's disk is the server's: its error is raised here, as one of the server
         if answer["is_full"]:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
@@ -184,6 +188,7 @@ class Decoders:
 
 def _limit_memory(pid: int | None, n_bytes: int) -> None:
     """Let a child take no more memory than is reserved for it, where the system has limits of other processes."""
+    # Linux alone limits other processes
     with suppress(ImportError, AttributeError, OSError):
         import resource
 

@@ -31,6 +31,7 @@ class Downloads:
         size = len(str(work.request)) + len(name)
         self._links[name] = _Link(owner, complete, size)
         self._sizes[owner] += size
+        # the key that has most loses, so that one key cannot push out the links of others
         while self._sizes.total() > MAX_CHARACTERS:
             largest = self._sizes.most_common(1)[0][0]
             oldest = next(name for name, link in self._links.items() if link.owner == largest)
@@ -46,6 +47,7 @@ class Downloads:
             The key has no such link, or no longer.
         """
         link = self._links.get(name)
+        # 404 for both: another key learns of no name
         if link is None or link.owner != owner:
             raise RefusedError(404, "not_found", f"there is no file {name[:40]!r}, or no longer; speak the text again")
         return link.work

@@ -41,6 +41,7 @@ class RefusedError(HTTPException):
 
 
 STATUS: Mapping[type[Tts2faceError], tuple[int, str]] = {
+    # by who can put it right: the client asks differently, waits, or the operator installs something
     BusyError: (429, "busy"),
     DefectError: (500, "internal"),
     InputError: (400, "invalid_request"),
@@ -57,6 +58,7 @@ def as_refused(error: Tts2faceError, folders: Iterable[Path] = ()) -> RefusedErr
     status, code = next(found for kind, found in STATUS.items() if isinstance(error, kind))
     headers = {"Retry-After": str(BusyError.retry_after_s)} if status in {429, 503} else {}
     message = without_folders(" ".join(str(error).split()), folders)
+    # what is missing on the server is named without the places of its disk
     return RefusedError(status, code, without_paths(message) if status == 503 else message, headers)
 
 

@@ -48,6 +48,7 @@ class Guard:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Check a request, pass it on, and record its answer."""
+        # "lifespan": start and end of the application
         if scope["type"] not in {"http", "websocket"}:
             return await self._app(scope, receive, send)
         request = Exchange(scope, receive, send)
@@ -111,6 +112,7 @@ class Guard:
             incoming.close()
 
     def _check_draining(self, path: str) -> None:
+        # balancers must learn from /readyz that it drains (decision 100)
         if self._state.is_draining and path not in PROBES:
             raise draining()
 
@@ -123,6 +125,7 @@ class Guard:
         if len(given) > settings.headers or size > 1024 * settings.head_kb:
             message = f"the head has more than {settings.headers} headers or {settings.head_kb} KB; send less"
             raise RefusedError(431, "too_large", message, CLOSE)
+        # request smuggling (RFC 9112, 6.3)
         if {b"transfer-encoding", b"content-length"} <= set(request.headers):
             raise RefusedError(400, "invalid_request", "the body has two lengths; send one of them", CLOSE)
 
@@ -144,6 +147,7 @@ class Guard:
         given = given or request.headers.get(b"x-api-key", b"").decode("latin-1")
         if not given and request.scope["type"] == "websocket":  # a browser cannot send headers with it
             given = parse_qs(request.scope["query_string"].decode("latin-1")).get("key", [""])[0]
+        # pages of the studio have logged in by a cookie
         if not given and is_page(path):
             given = cookie_key(request.headers)
         try:

@@ -37,7 +37,9 @@ RETRY_AFTER_S = 5  # for clients, while the database cannot be reached
 SUPERVISE_S, RESTART_S = 0.5, 10.0  # between two checks of the workers, and after they ended again and again
 # seconds between two times
 SHARE_S = 0.5
+# seconds between two countings of jobs for the metrics
 STATISTICS_S = 5.0
+# seconds between two removals of what is old
 SWEEP_S = 3600.0
 PROBE_S = 3.0  # of the database for /readyz
 DAY_S = 86_400.0
@@ -120,6 +122,7 @@ class JobService:
             raise self._unavailable() from away
         except OtherBodyError as other:
             raise RefusedError(422, "idempotency_conflict", str(other)) from other
+        # before Tts2faceError, whose class it is
         except QueueFullError as full:
             raise RefusedError(429, "queue_full", str(full), {"Retry-After": "30"}) from full
         except Tts2faceError as error:

@@ -17,6 +17,7 @@ from tts2face.storage.files import write_atomically
 
 SCOPES = ("speak", "build", "admin")  # synthesis; uploads and talkers; everybody's jobs and metrics
 KEY_PREFIX = "t2f_"
+# 256 random bits: a plain hash of them cannot be guessed, and needs no salt
 N_KEY_BYTES = 32
 MAX_FILE_BYTES = 1_000_000
 LIMITS = ("requests_per_minute", "concurrent", "speech_s_per_day", "resources", "resources_mb", "photos_per_day")
@@ -167,4 +168,5 @@ def write_keys(path: Path, keys: Sequence[ApiKey]) -> None:
         lines += [f"{limit} = {getattr(key, limit)}" for limit in LIMITS if getattr(key, limit) is not None]
         parts.append("[[key]]\n" + "\n".join(lines) + "\n")
     write_atomically(path, "\n".join(parts).encode())
+    # hashes and names of keys are for the operator alone
     path.chmod(0o600)

@@ -85,6 +85,7 @@ class Library:
 
     def close(self) -> None:
         """Close the connections to the database."""
+        # not opened by closing it
         if "_table" in self.__dict__:
             self._table.close()
 

@@ -90,8 +90,10 @@ class Curves:
         self._is_new = False
         if self._difference is not None:
             at = np.minimum((self._n_joined + 1 + np.arange(len(frames))) / (JOIN_S * fps), 1.0)
+            # a jump between two sources fades within `JOIN_S`
             left = (1.0 - at * at * (3.0 - 2.0 * at)).astype(np.float32)
             frames = frames + left[:, None] * self._difference
+            # ARKit's weights lie from 0 to 1
             frames[:, :N_WEIGHTS] = frames[:, :N_WEIGHTS].clip(0.0, 1.0)
             self._n_joined += len(frames)
             self._difference = self._difference if self._n_joined < JOIN_S * fps else None

@@ -163,6 +163,7 @@ class LiveText:
         self._check(len(text))
         for at in range(0, len(text), PART_CHARACTERS):
             self._queue(self._growing.add(text[at : at + PART_CHARACTERS]))
+            # other connections have their turn
             await asyncio.sleep(0)
 
     def _check(self, n_characters: int) -> None:

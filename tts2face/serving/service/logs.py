@@ -63,6 +63,7 @@ class LineFormatter(logging.Formatter):
             return {"event": record.getMessage(), **fields}
         message = record.getMessage()
         lines = message.splitlines() or [""]
+        # messages of libraries may quote a text that is spoken
         return {"event": "library", "logger": record.name, "message": message if self._with_text else lines[0][:300]}
 
     def _error(self, error: BaseException) -> dict[str, Any]:
@@ -91,6 +92,7 @@ class LineWriter(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Queue the line of a record."""
+        # the log says itself that it has gaps
         if self._n_dropped and not self._lines.full():
             n_dropped, self._n_dropped = self._n_dropped, 0
             note = logging.LogRecord(LOG.name, logging.WARNING, "", 0, "lines dropped", None, None)

@@ -23,6 +23,7 @@ from tts2face.serving.service.pool import Pool
 from tts2face.serving.service.readiness import CHECKS, Readiness
 from tts2face.serving.service.result_cache import ResultCache
 
+# fine below half a second, in which the first bytes are to come (decision 025)
 LATENCY_BUCKETS_S = (0.025, 0.05, 0.1, 0.15, 0.25, 0.35, 0.5, 0.75, 1, 2, 5, 10, 30, 120)
 STATUSES = (200, LEFT, *DOCUMENTED)  # of any path; others, such as 206, begin with their first answer
 

@@ -30,6 +30,7 @@ def check_origin(headers: Mapping[bytes, bytes], origins: Sequence[str]) -> None
     if b"origin" in headers:
         if origin not in origins and origin.partition("://")[1:] != ("://", _value(headers, b"host")):
             raise _refused(repr(origin[:80]))
+    # a link on another page may open ours
     elif _value(headers, b"sec-fetch-site") in OTHER_SITES and _value(headers, b"sec-fetch-dest") != PAGE:
         raise _refused("other origins")
 
@@ -46,6 +47,7 @@ def answer_headers(headers: Mapping[bytes, bytes], origins: Sequence[str]) -> He
         return []
     lines = [(b"vary", b"Origin")]
     if _value(headers, b"origin") in origins:
+        # never "*": the key that comes with a request makes it one of that page alone
         lines.append((b"access-control-allow-origin", headers[b"origin"]))
         lines.append((b"access-control-expose-headers", ", ".join(EXPOSED).encode()))
     return lines

@@ -226,6 +226,7 @@ class Pool:
                 return
             except ChildEndedError:
                 tries += 1
+                # what a client has begun to read cannot be sent again
                 if is_begun or tries >= MAX_TRIES:
                     raise
             finally:
@@ -247,6 +248,7 @@ class Pool:
         try:
             return await future
         except asyncio.CancelledError:
+            # the place came at the moment in which the client left
             if future.done() and not future.cancelled() and future.exception() is None:
                 self._release(future.result())
             raise
@@ -257,8 +259,10 @@ class Pool:
         """Refuse the newest waiting work of the key that has most, unless that gives this key as many."""
         waits = {name: sum(not waiting.place.done() for waiting in queue) for name, queue in self._waiting.items()}
         largest = max(waits, key=lambda name: waits[name], default=key)
+        # a place moves only where the numbers become more alike (decision 180)
         if waits.get(largest, 0) <= waits.get(key, 0) + 1:
             raise BusyError(f"{self.n_waiting} requests are waiting already; repeat the request later")
+        # the newest has waited least
         newest = next(waiting.place for waiting in reversed(self._waiting[largest]) if not waiting.place.done())
         newest.set_exception(BusyError("other keys need the places to wait; repeat the request later"))
         self._forget(largest, newest)

@@ -91,6 +91,7 @@ class Preparation:
             await call(step.call, step.content)
         except Tts2faceError as error:
             self._n_ended += isinstance(error, ChildEndedError)
+            # a process that ended once is started again; an error of a model stays
             if not isinstance(error, ChildEndedError) or self._n_ended >= N_ENDED:
                 self._lack = f"the service cannot prepare its {step.name}: {without_paths(str(error))}"
             raise

@@ -41,6 +41,7 @@ class Readiness:
                 before, self._found = self._found, await self._check()
                 self._at = time.monotonic()
                 if _missing(before) != _missing(self._found) or not before:
+                    # only changes are logged: probes ask every few seconds
                     level = logging.WARNING if any(self._found.values()) else logging.INFO
                     log_event(
                         "readiness", level=level, missing={name: self._found[name] for name in _missing(self._found)}

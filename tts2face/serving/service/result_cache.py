@@ -74,6 +74,7 @@ class ResultCache:
     def __init__(self, folder: Path, max_bytes: int) -> None:
         self._store, self._max_bytes = FolderStore(folder), max_bytes
         self.n_hits = self.n_misses = 0
+        # texts lie there in the form of their speech (decision 098)
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         self._store.remove_drafts()
         self.n_bytes = self._store.prune(max_bytes=max_bytes)  # size of all entries
@@ -92,6 +93,7 @@ class ResultCache:
         try:
             async with aclosing(made):  # type: ignore[type-var]
                 async for message in made:
+                    # the cache keeps nothing that was drawn with less quality (decision 182)
                     if message.content.get("event", {}).get("type") == QUALITY:
                         draft.close()
                     await asyncio.to_thread(draft.add, message)

@@ -173,6 +173,7 @@ async def stream_work(
     try:
         first = await anext(chunks)
     except StopAsyncIteration:
+        # a result without a byte
         first = b""
     except BaseException:
         await messages.aclose()  # type: ignore[attr-defined]

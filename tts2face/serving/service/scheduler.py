@@ -143,6 +143,7 @@ class Turns:
                     self._release(task)
                 self._take(task)
         finally:
+            # a generator frees what it holds at once, not when it is collected
             if hasattr(steps, "close"):
                 steps.close()
             self._release(task)
@@ -153,6 +154,7 @@ class Turns:
         """As the function of this name, for a task."""
         future.add_done_callback(lambda _: _notify(task.call))
         self._wait(task, lambda: future.done() or task.is_urgent)
+        # what runs cannot be cancelled, and is ended by its own means
         if not future.done() and not future.cancel():
             end()
         self.take_again(task)

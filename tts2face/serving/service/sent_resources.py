@@ -19,9 +19,13 @@ from tts2face.serving.work.resources import StoredResource
 from tts2face.storage.tensors import read_metadata
 
 # Characters of texts.
+# characters, as `library.check_new_name` allows
 MAX_NAME = 40
+# characters of a statement
 MAX_CONSENT = 1000
+# characters of JSON
 MAX_FIT = 100_000
+# characters of a table
 MAX_MAPPING = 100_000
 SPEAKING_PICTURE, AVATAR = "picture", "avatar"  # what is made of a photo
 NO_PHOTOS = "this service has no faces of photos; its operator allows them with the setting photos"
@@ -95,6 +99,7 @@ async def _checked(state: ServiceState, key: ApiKey, sent: Sent, folder: UploadF
     if sent.mapping is not None:
         folder.state(given, {"mapping": sent.mapping})
     checked = await folder.resource(sent.kind, given, n_bytes)
+    # also a face that was made of a photo elsewhere
     if sent.kind == FACE and not state.settings.photos:
         await asyncio.to_thread(_refuse_photograph, checked / CONTENT)
     return checked

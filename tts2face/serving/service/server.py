@@ -89,6 +89,7 @@ class DrainingServer(uvicorn.Server):
         """Listen; then write the address, whose port may have been chosen by the system."""
         await super().startup(sockets)
         resume_collection()
+        # not on Windows
         if hasattr(signal, "SIGHUP"):
             asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, self._reload_keys)
         for server in self.servers:
@@ -109,6 +110,7 @@ class DrainingServer(uvicorn.Server):
         state.is_draining = True
         log_event("draining", running=len(state.running), seconds=state.settings.drain_s)
         telling = asyncio.create_task(self._end_sockets())
+        # the port stays open, so that /readyz can say why (decision 100)
         while state.running and not self.force_exit and time.monotonic() < began + state.settings.drain_s:
             await asyncio.sleep(0.05)
         telling.cancel()
@@ -145,6 +147,7 @@ def _allow_files(connections: int) -> None:
 
         soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
         wanted = 2 * connections + 256
+        # a connection is a file, and each may bring a temporary one
         if soft != resource.RLIM_INFINITY and soft < wanted:
             most = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
             resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, most), hard))

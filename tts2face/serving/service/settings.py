@@ -126,6 +126,7 @@ class ServiceSettings:
             choices, value = option.metadata["choices"], getattr(self, option.name)
             if choices is not None and value not in choices:
                 raise InputError(f"{option.name} must be one of {', '.join(choices)}, not {value!r}")
+        # absence is no permission: without keys only this machine may ask
         if self.keys is None and not is_loopback(self.host):
             where = self.host or "all addresses"
             raise InputError(
@@ -183,6 +184,7 @@ class ServiceSettings:
                 continue
             value = getattr(self, option.name)
             if option.name == "database":
+                # a database's address holds its password
                 value = _PASSWORD.sub(r"\1@", value)
             line = f"{option.name} = {_toml(value)}" if value is not None else f'# {option.name} = ""'
             lines.append(f"# {option.metadata['help']}\n{line}\n")

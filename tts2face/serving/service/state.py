@@ -69,6 +69,7 @@ class ServiceState:
         try:
             names = await self.keys.reload()
         except Tts2faceError as error:
+            # a damaged file serves nobody (decision 202)
             log_event("keys dropped", level=logging.ERROR, reason=str(error), ended=self._end_lost())
         else:
             log_event("keys reloaded", keys=list(names), ended=self._end_lost())

@@ -48,6 +48,7 @@ def stream_file(session: "Session", work: Work, _: Inputs) -> Iterator[Event | C
         request, work.format, picture=picture, threads=DRAWING_THREADS, pace=pace, is_complete=work.is_complete
     ):
         yield chunk
+        # an event with each change: the cache and the metrics follow it
         if pace is not None and pace.quality != quality:
             quality = pace.quality
             yield Event({"type": QUALITY, **asdict(quality)})
@@ -126,6 +127,7 @@ class Synthesis:
         except Tts2faceError:
             raise
         except Exception as error:
+            # in the child, whose traceback the parent does not get
             log_event("defect", level=logging.ERROR, error=error, id=call.content["id"])
             raise DefectError(f"internal error: {type(error).__name__}; see the log of the service") from error
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 ENDPOINTS = ("OTEL_EXPORTER_OTLP_TRACES_ENDPOINT", "OTEL_EXPORTER_OTLP_ENDPOINT")
 PROTOCOLS = ("OTEL_EXPORTER_OTLP_TRACES_PROTOCOL", "OTEL_EXPORTER_OTLP_PROTOCOL")
 PROTOCOL = "http/protobuf"
+# a collector that is away must not hold the end of the server
 CLOSE_TIMEOUT_S = 5.0
 
 
@@ -22,6 +23,7 @@ def is_tracing_requested(environment: Mapping[str, str]) -> bool:
     exporter = environment.get("OTEL_TRACES_EXPORTER", "").strip().lower()
     if environment.get("OTEL_SDK_DISABLED", "").lower() == "true" or exporter == "none":
         return False
+    # gRPC would add 10 MB (decision 099)
     if exporter not in {"", "otlp"}:
         raise InputError(f"OTEL_TRACES_EXPORTER must be otlp or none, not {exporter!r}")
     if not exporter and not any(environment.get(name) for name in ENDPOINTS):
@@ -83,6 +85,7 @@ class Tracing:
         )  # fmt: skip
         if request.code is not None:
             root.set_attribute("error.type", request.code)
+        # 0: no answer was begun
         if request.status >= 500 or request.status == 0:
             root.set_status(StatusCode.ERROR)
         now, context = time.monotonic(), set_span_in_context(root)

@@ -20,7 +20,9 @@ from tts2face.serving.work.uploaded_file import PICTURE, PLACES, SOUND, SUBTITLE
 
 RESOURCE_TIMEOUT_S = 300.0  # a check takes 3 to 7 s; with other work on the machine, and kernels to compile, longer
 UPLOAD_PREFIX = "tts2face-upload-"  # of names of private folders
+# of transcripts, subtitles and tables
 MAX_TEXT_BYTES = 1_000_000
+# read at a time
 BLOCK_BYTES = 1 << 20
 
 

@@ -80,6 +80,7 @@ class WarmProcess:
         pause_s, self._pause_s = self._pause_s, FIRST_PAUSE_S if was_ready else min(2 * self._pause_s, LAST_PAUSE_S)
         if not was_ready:
             with suppress(TimeoutError):
+                # a pause that the end of the server cuts short
                 await asyncio.wait_for(self._closed.wait(), pause_s)
 
     async def _serve(self) -> None:

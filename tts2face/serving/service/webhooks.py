@@ -32,6 +32,7 @@ CONNECT_S = 4.0  # to one address of a host
 POLL_S = 1.0  # between two polls of the messages that are due, while none ends
 # calls at the same time: of all, of a key, to a host
 PLACES = 64
+# places bound what one key and one host delay (decision 205)
 KEY_PLACES = 2
 HOST_PLACES = 8
 HEAD_BYTES, BLOCK_BYTES = 16 << 10, 4 << 10  # of an answer, of which only the status counts
@@ -46,6 +47,7 @@ def check_webhook(url: str, settings: ServiceSettings) -> None:
         place = host_of(parts)
     except ValueError as wrong:
         raise RefusedError(400, "invalid_webhook", f"the webhook is no URL: {wrong}") from wrong
+    # "@" hides the host from a reader, spaces and control characters divide the request
     if parts.scheme not in PORTS or "@" in parts.netloc or not url.isascii() or not url.isprintable() or " " in url:
         raise RefusedError(400, "invalid_webhook", "the webhook must be a URL https://HOST/PATH without a password")
     if place not in settings.webhook_hosts:
@@ -91,6 +93,7 @@ async def send_message(url: str, message_id: str, body: bytes, secret: str) -> b
                 rest = [sender.send(part) for part in (h11.Data(data=body), h11.EndOfMessage())]
                 writer.write(b"".join(part for part in (head, *rest) if part))
                 await writer.drain()
+                # redirects are not followed: they could name any host (decision 092)
                 return 200 <= await _read_status(reader, sender) < 300
             finally:
                 writer.transport.abort()  # its end is not waited for
@@ -137,6 +140,7 @@ async def _addresses(name: str, port: int) -> list[str]:
         with suppress(OSError, UnicodeError):
             infos = socket.getaddrinfo(name, port, type=socket.SOCK_STREAM)
             addresses = list(dict.fromkeys(str(info[4][0]) for info in infos))
+        # a thread of an address outlives it
         with suppress(RuntimeError):  # the loop has ended meanwhile
             loop.call_soon_threadsafe(tell, addresses)
 

@@ -59,6 +59,7 @@ def _run_with(app: FastAPI, studio: Studio) -> None:
             try:
                 yield state
             finally:
+                # a second signal must not cut the writing of projects
                 await asyncio.shield(studio.close())
 
     app.router.lifespan_context = lifespan

@@ -21,7 +21,9 @@ from tts2face.serving.studio.camera_process import FOLLOW, LIMITS
 
 PROGRAM = Program("tts2face.serving.studio.camera_process:HANDLERS", LIMITS)
 TIME = struct.Struct("<d")  # before each JPEG of a client
+# of a JPEG of the camera's page
 MAX_PICTURE_BYTES = 1 << 20
+# a forgotten page must not hold a process for ever
 MAX_LIVE_S = 3600.0
 ENDING_S = 3.0  # for which the end of an earlier connection is waited for
 POLL_S = 0.05  # between two checks of it

@@ -19,6 +19,7 @@ from tts2face.video.media import TimedFrame
 
 FOLLOW = "follow"  # name of the call
 LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=7200, file_bytes=0, n_files=128)
+# as `tts2face.video.streaming.MAX_SIDE_PX`
 MAX_SIDE_PX = 1280
 FPS = 20.0  # about; of the averages over time
 DIGITS = 4  # of weights and angles
@@ -92,6 +93,7 @@ def follow(call: Call) -> dict[str, Any]:
             answer |= {"state": NO_FACE, "share": 1.0}
         else:
             first = now if first is None else first
+            # never 1 before it is done
             answer |= {"state": CALIBRATING, "share": round(min((now - first) / CALIBRATION_S, 0.99), 2)}
         call.event(answer)
     return {}

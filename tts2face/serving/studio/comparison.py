@@ -115,6 +115,7 @@ class ComparedProject:
         self.preview.cancel()
         self.reference, self._measured = None, None
         self.is_ready, self._made_of = False, ""
+        # nothing was compared
         with translate_disk_errors(self._folder), suppress(FileNotFoundError):
             await asyncio.to_thread(shutil.rmtree, self._folder)
         self._on_change()
@@ -131,6 +132,7 @@ class ComparedProject:
         folder, key = self._workspace.folder, self._workspace.key
         more = self._source(self.reference)
         made_of = json.dumps([project_json(project, folder), more], sort_keys=True, default=str)
+        # an edit that the A does not depend on
         if made_of == self._made_of and (self.is_ready or self.preview.is_running):
             return
         self._made_of, self.is_ready = made_of, False

@@ -73,6 +73,7 @@ def _recorded(session: "Session", options: Mapping[str, Any], project: Project) 
         capture = read_livelink(Path(options["take"]))
         found = FaceMotion(face.motion_of_capture(capture), capture.head)
     offset, fps = float(options.get("offset", 0.0)), float(project.request.fps)
+    # 1e-6: an instant that is a frame of both rates counts in spite of rounding
     n_frames = int(np.floor(((len(found.face) - 1) / found.face.fps - offset) * fps + 1e-6)) + 1
     if n_frames < 1:
         raise InputError(f"the recording ends before its second {offset:g}; give a smaller offset")

@@ -107,6 +107,7 @@ def _nod(project: Project, given: Edit, _: Sentences) -> Project:
 def _remove_nod(project: Project, given: Edit, _: Sentences) -> Project:
     nods = project.timeline.nods
     near = min(nods, key=lambda nod: abs(nod.time - given["time"]), default=None)
+    # a page knows times to the pixel
     if near is None or abs(near.time - given["time"]) > NEAR_S:
         raise InputError(f"there is no nod at {given['time']:.2f} s; click on one")
     return _timed(project, nods=tuple(nod for nod in nods if nod is not near))

@@ -20,6 +20,7 @@ async def face_answer(request: HttpRequest, path: Path, *, is_named: bool = True
     headers = {"Vary": "Accept-Encoding"}
     if is_named:
         headers["Cache-Control"] = "private, max-age=31536000, immutable"
+    # it is kept compressed: nothing is packed for each page
     if "gzip" in request.headers.get("accept-encoding", ""):
         headers["Content-Encoding"] = "gzip"
     else:

@@ -45,6 +45,7 @@ class History:
         """
         if _is_equal(project, self.present):
             return self
+        # one drag of a slider is one step of the history
         if continues and self.past and not self.future and topic and self.past[-1].topic == topic:
             return replace(self, present=project)
         return History(project, (*self.past, Step(self.present, topic))[-MAX_STEPS:])

@@ -63,6 +63,7 @@ class OwnedFolders:
             The owner has no such one.
         """
         folder = self._folder / number
+        # one answer for all: another key learns of no folder
         if not ID.fullmatch(number) or _owner(folder) != owner or not (folder / self._entry).is_file():
             raise InputError(f"there is no {self._noun} {number[:40]!r}; choose one from the list")
         return folder

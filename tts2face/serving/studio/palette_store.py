@@ -99,6 +99,7 @@ class PaletteStore:
         """File of the moving picture of a style, which may not exist yet."""
         own = style not in shipped().names
         folder = self.path(owner).parent / "swatches" if own else self._studio / "swatches"
+        # with the version: another one draws other pictures
         return folder / f"{hashlib.sha256(f'{__version__} {style}'.encode()).hexdigest()[:24]}.webp"
 
     def take_folder(self, owner: str) -> Path:

@@ -139,6 +139,7 @@ def _changed(new: Sequence[Mapping[str, Any]], old: Sequence[Mapping[str, Any]],
     last = len(new)
     if sum(n for _, n in new_keys) == sum(n for _, n in old_keys):
         at = len(old)
+        # from the end, while the pieces are equal
         while last > first and at > first and new_keys[last - 1] == old_keys[at - 1]:
             last, at = last - 1, at - 1
     return first, last

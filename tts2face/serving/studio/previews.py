@@ -89,6 +89,7 @@ class ProjectPreview:
     def bundle(self, have: int | None) -> bytes | None:
         """Bytes for a page that has a revision; None if they must be made again, which is then begun."""
         made = bundle(self.current, self._memory, self._revisions.get(have) if have is not None else None)
+        # contents that memory has dropped
         if made is None and self._ask is not None and not self.is_running:
             self.start(self._ask)
         return made
@@ -101,6 +102,7 @@ class ProjectPreview:
                     self.is_made = True
                     return None
                 except (RefusedError, Tts2faceError) as wrong:
+                    # only the end of a process is an accident
                     if not _has_ended(wrong) or number == MAX_TRIES - 1:
                         return self._fail(wrong)
         finally:

@@ -96,6 +96,7 @@ class ProjectStore:
                 for part in ("past", "future")
             )
         except (OSError, DataError, KeyError, TypeError):
+            # what could be undone is worth less than the project
             return History(present)
         return History(present, past, future)
 

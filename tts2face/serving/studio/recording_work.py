@@ -37,7 +37,9 @@ from tts2face.serving.work.tools import TALKER_TOOL, run_tool, talker_build
 TOOL = "recordings"
 TOOL_LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=100_000, file_bytes=1 << 30, n_files=256)
 ANSWER_S = 120.0  # of one order, with the loading of the networks
+# after which the process with its networks ends
 IDLE_S = 300.0
+# as `lexicon.sentence_length.MAX_SENTENCE_CHARACTERS`
 MAX_SENTENCE_CHARACTERS = 300
 # tasks of the work on a recording, and the kind of work on its takes
 BUILD = "build"

@@ -55,6 +55,7 @@ async def receive_take(parts: AsyncIterator[bytes], target: Path) -> None:
             if n_bytes > MAX_TAKE_BYTES:
                 raise InputError(f"a take may have {MAX_TAKE_BYTES >> 20} MB; record it shorter")
         file.flush()
+        # a person has spoken it: it must survive a loss of power
         os.fsync(file.fileno())
     if not n_bytes:
         raise InputError("the take is empty; record it again")
@@ -165,6 +166,7 @@ class RecordingStore:
                 return
             manifest = self._read(number)
             current = manifest["takes"].get(str(at), {})
+            # recorded again, or deleted meanwhile
             if current.get("file") != judged.file:
                 self._remove_files(number, judged)
                 return

@@ -130,6 +130,7 @@ def _plan(title: str, form: str) -> tuple[str, str, dict[str, str]]:
     """Name of the file, kind of the work, and further fields of its request."""
     if form not in formats():
         raise InputError(f"there is no format {form[:20]!r}; choose one of {', '.join(formats())}")
+    # a title becomes the name of a file: letters and digits alone
     stem = re.sub(r"[^A-Za-z0-9]+", "-", title).strip("-")[:60] or "clip"
     name = f"{stem}.{form}"
     if form in MOVIE_KINDS or (form in SOUND_KINDS and form != "wav"):

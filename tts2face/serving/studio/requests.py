@@ -150,6 +150,7 @@ async def events_of(messages: AsyncIterator[Message]) -> AsyncIterator[tuple[dic
 
 def _asset(option: str, name: str, folder: Path) -> str:
     found = folder / ASSETS / Path(name).name
+    # a client names files of its project alone
     if option != "audio" or not ASSET.fullmatch(Path(name).name) or not found.is_file():
         raise InputError(
             f"the project has no file {name[:40]!r} for {option}; remove {option}, or import its recording"

@@ -122,6 +122,7 @@ class Studio:
         """Make the face in a process of its own: it takes seconds, in which one of the service would answer nobody."""
         project = Project()
         work = self.state.results.work(kind="face", models=asdict(project.models), request={"has_gestures": True})
+        # nobody waits for it
         with suppress(RefusedError, Tts2faceError):  # the first page says why
             await self._face_file(project, work, self.state.pool.make_aside)
 
@@ -165,6 +166,7 @@ class Studio:
                 with translate_disk_errors(path):
                     path.parent.mkdir(parents=True, exist_ok=True)
                 content = await make(work)
+                # without a time equal faces have equal files
                 await asyncio.to_thread(lambda: write_atomically(path, gzip.compress(content, mtime=0)))
                 await asyncio.to_thread(_keep_last, path.parent, MAX_FACES)
         return path

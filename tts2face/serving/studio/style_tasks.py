@@ -21,9 +21,12 @@ if TYPE_CHECKING:
 SPOKEN = "Hello there, nice to see you."
 # tiles of a swatch, and frames of the clip from one to the next
 N_TILES = 20
+# pixels of a side
 TILE_PX = 144
+# frames of the clip between two tiles
 EVERY = 3
 MIXED = "mixed here"  # name of a style that no palette holds yet
+# of the WebP
 QUALITY = 70
 
 
@@ -36,6 +39,7 @@ def swatch(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
         palette = session.palette
         assert palette is not None
         session = session.with_style(name, mix_styles(palette, StyleMix(**work.request["mix"])))
+    # the quickest voice: nobody hears it
     clip = session.clip(SPOKEN, style=name, voice="espeak", plain_delivery=True)
     yield Chunk(b"")
     renderer = session.renderer(Picture(size=f"{TILE_PX}x{TILE_PX}", camera="close"))

@@ -254,6 +254,7 @@ def _with_recorded(palette: Palette, learnt: Palette, name: str) -> Palette:
 
 def _with_shipped(project: Project) -> Project:
     palette = project.models.palette
+    # a name is a shipped palette
     if palette is None or os.sep not in palette:
         return project
     return replace(project, models=replace(project.models, palette=SHIPPED))

@@ -113,4 +113,5 @@ class TakeStore:
             content: dict[str, Any] = read_json(file)
             return TakeEntry(**content)
         except (OSError, DataError, TypeError):
+            # it must be seen to be deleted
             return TakeEntry(file.parent.name, "damaged take", FAILED, message="its file is damaged; delete it")

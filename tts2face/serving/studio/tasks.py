@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from tts2face.session.speech_stream import Piece
 
 
+# of a piece; two pieces of one project with equal ones are not to be expected
 DIGEST_BYTES = 12
 MAX_EXAMPLES = 12  # of an explained phone
 N_DECIMALS = 2  # of outlines, mm
@@ -68,6 +69,7 @@ def preview(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk
             dropped.append([stale.text, stale.occurrence])
             project = without_edges(project, [(stale.text, stale.occurrence)])
         except BeyondClipError as beyond:
+            # once is enough: a project that still does not fit has another fault
             if cut_to is not None:
                 raise
             cut_to = beyond.duration

@@ -65,6 +65,7 @@ async def add_words(order: JobOrder, part: str, file: UploadFile, number: int) -
     if part == "transcript":
         files[f"{RECORDING}.txt"] = await folder.text(part, file, ".txt")
         return
+    # a byte order mark may stand before WEBVTT
     suffix = ".vtt" if (await file.read(6)).lstrip(b"\xef\xbb\xbf").startswith(b"WEB") else ".srt"
     await file.seek(0)
     path, _ = await folder.subtitles(part, file, suffix, None, order.state.settings.job_cues)

@@ -71,6 +71,7 @@ def _parse(body: bytes | str) -> ClipRequest:
     try:
         return ClipRequest.model_validate_json(body)
     except ValidationError as wrong:
+        # as FastAPI raises it of a body that it reads itself
         raise RequestValidationError(wrong.errors()) from wrong
 
 

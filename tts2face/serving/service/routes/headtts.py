@@ -98,6 +98,7 @@ async def synthesize(request: HttpRequest, body: HeadTtsRequest) -> JSONResponse
     try:
         content, sound = await _speak(request, body, adjustments)
     except RefusedError as refused:
+        # HeadTTS' own form of an error
         return JSONResponse({"error": refused.message}, refused.status, refused.headers)
     return adjustments.on(JSONResponse(content | {"audio": base64.b64encode(sound).decode()}))
 
@@ -115,6 +116,7 @@ async def socket(connection: WebSocket) -> None:
             except RefusedError as refused:
                 await _send_error(connection, None, refused.message)
                 continue
+            # HeadTTS ignores what it does not know
             if not isinstance(message, dict):
                 continue
             if message.get("type") == "setup" and isinstance(message.get("data"), dict):
@@ -178,6 +180,7 @@ def items_to_ssml(items: Sequence[str | dict[str, Any]]) -> tuple[str, dict[str,
         make = ITEMS.get(str(item.get("type", "text")))
         if make is None:
             raise RefusedError(400, "invalid_request", f"there is no item type {str(item.get('type'))[:40]!r}")
+        # letters of phones are not shown to readers
         if item.get("subtitles") or item.get("type") == "phonetic":  # whose letters are no words
             subtitles[name] = str(item.get("subtitles") or "")
         parts.append(f"<mark name={quoteattr(name)}/>{make(value)} ")
@@ -227,6 +230,7 @@ def audio_fields(events: Sequence[dict[str, Any]], subtitles: dict[str, str]) ->
     spoken = [Label(*word) for event in events for word in event["words"]]
     ends = [seconds for _, seconds in marks[1:]] + [float("inf")]
     for (name, begin), end in zip(marks, ends, strict=True):
+        # times are rounded to microseconds
         own = [word for word in spoken if begin - 1e-6 <= word.start < end - 1e-6]
         if name in subtitles and own:
             own = [Label(subtitles[name].strip(), own[0].start, own[-1].end)]

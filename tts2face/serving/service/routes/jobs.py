@@ -102,6 +102,7 @@ async def _queue(request: HttpRequest, idempotency_key: str | None, kinds: Mappi
         asked: NewJobBody = _parse(NewJobBody, body)
         kind = _kind(asked.kind, kinds)
         key = require_scope(request, kind.scope, f"jobs of kind {asked.kind}")
+        # what builds a talker makes no speech
         if kind.scope == "speak":
             state.limits.check_speech(key)
         if asked.webhook is not None:
@@ -274,6 +275,7 @@ async def _events(request: HttpRequest, job_id: str, after: int) -> AsyncIterato
     state, loop = service_state(request), asyncio.get_running_loop()
     yield b"retry: 2000\n\n"
     sent_at = loop.time()
+    # EventSource connects again by itself, with the id of the last event
     while not state.is_draining:  # a client that connects again goes on where it was
         try:
             found, may_follow = await state.jobs.call(partial(_read_events, job_id=job_id, after=after))

@@ -98,6 +98,7 @@ async def stream(connection: WebSocket) -> None:
     receiving = asyncio.create_task(_receive(connection, receiver))
     try:
         await asyncio.wait({sending, receiving}, return_when=asyncio.FIRST_COMPLETED)
+        # True after "end"; False when the client has left, who waits for nothing
         if receiving.done() and receiving.exception() is None and receiving.result():
             await sending  # the client ended its input and waits for the rest
     finally:
@@ -134,6 +135,7 @@ async def _receive(connection: WebSocket, receiver: "LiveText | _Sound") -> bool
             return False
         except RefusedError as wrong:
             await connection.send_json({"type": "error", "message": wrong.message})
+            # who sends what is refused is slowed down
             await asyncio.sleep(REFUSED_S)
             continue
         if content["type"] == "end":

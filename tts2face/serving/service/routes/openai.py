@@ -182,6 +182,7 @@ class TimedJson:
                     lists[name] += found
             if message.payload:
                 rest += message.payload
+                # parts of base64 can be joined only there
                 n_whole = len(rest) - len(rest) % 3  # three bytes are four letters
                 yield opening + base64.b64encode(rest[:n_whole])
                 opening, rest = b"", rest[n_whole:]

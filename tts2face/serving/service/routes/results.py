@@ -47,6 +47,7 @@ async def fetch_result(
     if if_none_match is not None and _matches(if_none_match, sha256):
         return Response(status_code=304, headers=headers)
     path = await jobs.call(lambda client: _fetch(client, found))
+    # RFC 9110, 14.2: a Range that is none is ignored
     if not _names_ranges(request.headers.get("range", "")):
         request.scope["headers"] = [header for header in request.scope["headers"] if header[0] != b"range"]
     return FileResponse(path, headers=headers, media_type=found.media_type, filename=found.name)

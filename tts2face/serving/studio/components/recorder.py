@@ -8,6 +8,7 @@ from nicegui.element import Element
 
 from tts2face.serving.studio.components.stage import COMPONENTS, MODULES
 
+# seconds of a take
 LONGEST_S = 30.0
 STYLE = Path(__file__).with_name("recorder.css")
 

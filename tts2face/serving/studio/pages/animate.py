@@ -102,6 +102,7 @@ class AnimatePage:
         self.client.on_disconnect(lambda: self.workspace.release(self.tab))  # a reloaded page may edit at once
         self.client.on_connect(self._renew)
         self.client.on_delete(self._leave)
+        # two renewals may be late before another tab may edit
         ui.timer(LEASE_S / 3, self._renew)
         ui.on(SEEN_AGAIN, self._show_models)
         ui.run_javascript(WATCH)

@@ -79,6 +79,7 @@ async def styles(library: Library, key: ApiKey, palette: str | None) -> list[dic
         return []
     try:
         path = palette  # the own palette is given as its path, which no client can choose
+        # a path is the own palette (decision 151)
         if palette not in shipped_names(PALETTE) and os.sep not in palette:
             path, _ = await asyncio.to_thread(library.resolve, key, PALETTE, palette)
         found = await asyncio.to_thread(catalogue.styles, path)

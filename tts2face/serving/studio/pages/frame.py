@@ -72,6 +72,7 @@ def _top_links(request: HttpRequest) -> None:
     current = request.url.path.removeprefix(PAGES) or "/"
     with ui.element("nav").classes("bar-links").props('aria-label="Pages"'):
         for address, name in TOP_PAGES.items():
+            # the page would refuse everything
             if address == RECORD_PAGE and "build" not in request.state.key.scopes:
                 continue
             link = ui.link(name, address)

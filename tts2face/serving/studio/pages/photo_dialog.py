@@ -30,6 +30,7 @@ from tts2face.serving.studio.pages.open_page import OpenPage
 from tts2face.serving.work.resource_check import FACE
 
 PICTURES = ".jpg,.jpeg,.png,.webp,.heic,.heif,.tif,.tiff,.bmp,.gif"
+# as the settings count
 MB = 1_000_000
 TITLE = "A face from a photo"
 MAKES = {SPEAKING_PICTURE: "Speaks in the picture", AVATAR: "3D head of the person"}

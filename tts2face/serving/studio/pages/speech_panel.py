@@ -131,6 +131,7 @@ class SpeechPanel:
             control.value = value
 
     async def _change(self, part: str, name: str, value: Any) -> None:
+        # a control that is set by the server reports it as a change
         if value is None or value == self._value(name):
             return
         options = {name: None if value == "" and name != "text" else value}

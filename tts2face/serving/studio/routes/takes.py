@@ -85,6 +85,7 @@ def download(request: HttpRequest, number: str, name: str) -> FileResponse:
     """Table, sound or film of a take."""
     store = _takes(request).store
     folder, entry = store.folder(request.state.key.name, number), store.entry(request.state.key.name, number)
+    # names from a list, never a client's path
     if name not in KINDS or not (folder / name).is_file():
         raise InputError(f"the take has no file {name[:40]!r}; choose {', '.join(KINDS)}, and render the film first")
     shown = "".join(letter if letter.isalnum() else "-" for letter in entry.name)
