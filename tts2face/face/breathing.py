@@ -20,6 +20,7 @@ IN_S, REST_IN_S = 0.45, 1.5  # length of a breath in before a phrase, and at res
 OUT_S = 2.4  # in which the shoulders sink to a third of the way
 REST_CYCLE_S = (3.4, 4.8)  # between breaths at rest: 12 to 18 a minute
 REST_DEPTH = 0.7  # of a breath at rest
+# share of the lungs below which the shoulders do not sink
 LOWEST = 0.1
 JAW_SHAPE, PARTED = "jawOpen", 0.07  # weight at which a mouth that was closed draws breath
 PARTS_S, CLOSES_S = 0.3, 0.05  # before the first phone: start and end, so that its closure is the phone's own
@@ -86,6 +87,7 @@ def _next(now: Breath, ahead_s: float, step: float, seed: int) -> Breath:
     goal, until, following, number = now.goal, now.until_s, now.next_s, now.number
     if ahead_s > 0 and goal < 1.0:
         goal, until = 1.0, now.clock_s + ahead_s
+    # no breath at rest shortly before a phrase, which begins with its own
     elif now.clock_s >= following and ahead_s == 0:
         goal, until, number = max(REST_DEPTH, now.level), now.clock_s + REST_IN_S, number + 1
     if until > now.clock_s:
@@ -100,6 +102,7 @@ def _next(now: Breath, ahead_s: float, step: float, seed: int) -> Breath:
 
 def part_lips(face: Trajectory, turns: Sequence[float]) -> Trajectory:
     """Motion (T, K) with lips that part before `turns` (s); as it is for a face without `JAW_SHAPE`."""
+    # a face without a jaw breathes by its shoulders alone
     if not turns or JAW_SHAPE not in face.channels:
         return face
     weights, column, times = face.values.copy(), face.channels.index(JAW_SHAPE), face.times

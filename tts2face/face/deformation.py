@@ -118,6 +118,7 @@ def _share_by_height(face: Face) -> NDArray[np.float32]:
 def rotation_matrix(turn: NDArray[np.floating]) -> NDArray[np.float64]:
     """Rotation matrix (3, 3) of a rotation vector (3,) in radians (Rodrigues)."""
     angle = float(np.linalg.norm(turn))
+    # the axis of no rotation would be 0 / 0
     if angle == 0.0:
         return np.eye(3)
     x, y, z = np.asarray(turn, np.float64) / angle

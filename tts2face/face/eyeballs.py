@@ -22,6 +22,7 @@ REACH_MM = 12.0  # distance from the eyeball at rest of skin that shapes may mov
 ROOT_MM = 2.5  # distance from the eyeball at rest of the lids' edges, which lashes and tear fluid follow
 FOLLOWER_PARTS = ("lashes", "wet")
 FOLLOWER_REACH_MM = 15.0  # length of lashes; those of other people, hidden in the skull, are further away
+# edges of lids that a lash follows
 N_ROOTS = 3
 N_ANGLES = 64  # of an eyeball's profile
 
@@ -106,6 +107,7 @@ def eyeball_profile(face: Face, eye: Eye) -> NDArray[np.float64]:
 def _distances_outside(off: NDArray[np.float64], profile: NDArray[np.float64]) -> NDArray[np.float64]:
     """(N,) distances of points (N, 3) from an eyeball's surface, mm; negative inside."""
     distance = np.linalg.norm(off, axis=1)
+    # rounding may exceed 1
     angle = np.arccos(np.clip(off[:, 2] / np.maximum(distance, 1e-9), -1.0, 1.0))
     beyond: NDArray[np.float64] = distance - np.interp(angle, np.linspace(0.0, np.pi, N_ANGLES), profile)
     return beyond
@@ -143,6 +145,7 @@ def _bind_followers(
         distance[:, k] = apart[rows, nearest[:, k]]
         apart[rows, nearest[:, k]] = np.inf
     is_near = distance[:, 0] < FOLLOWER_REACH_MM
+    # a lash at an edge follows that alone; 0.05 mm keeps the share finite
     share = 1.0 / np.maximum(distance[is_near], 0.05) ** 2
     share /= share.sum(axis=1, keepdims=True)
     return followers[is_near], edges[nearest[is_near]], share.astype(np.float32)

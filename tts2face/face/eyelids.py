@@ -56,6 +56,7 @@ class EyelidModel:
         for eye in range(len(SIDES)):
             self._limit_narrowing(lids, eye)
             lids[:, [self.wide[eye], *self.narrowing[eye]]] *= 1.0 - np.clip(shares[:, eye : eye + 1], 0.0, 1.0)
+            # lids that cross are shut
             opening = np.maximum(self.opening[eye] + ordered_product(lids, self.per_weight[eye]), 0.0)
             for column, share in ((self.blink[eye], shares[:, eye]), (self.wide[eye], shares[:, eye])):
                 per_weight = self.per_weight[eye, column]

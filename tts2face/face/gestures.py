@@ -132,6 +132,7 @@ class GestureFace:
             added = self.mouth.attenuate_on_rounded_lips(speech, self.mouth.attenuate_on_moved_lips(speech, added))
         if "gaze" in features:
             down, left = features["gaze"].T
+            # shapes of gaze have one direction each: down, up, left, right
             turned = np.stack([np.maximum(down, 0), np.maximum(-down, 0), np.maximum(left, 0), np.maximum(-left, 0)])
             added += ordered_product(turned.T, self.gaze)
         others = np.setdiff1d(np.arange(speech.shape[1]), self.mouth.moving)

@@ -45,6 +45,7 @@ class HairSwing:
         """
         angles = head.values[:, :3].astype(np.float64)
         if before is None:
+            # at the first frame hair hangs at rest
             before = Swing(angles[0], np.zeros(3), np.zeros((2, 3)))
         rates = np.diff(angles, axis=0, prepend=before.angles[None]) * head.fps
         pushes = -np.diff(rates, axis=0, prepend=before.rates[None])

@@ -30,6 +30,7 @@ MIN_GAP_SHARE = 0.5  # least share of the speech gap that an expression leaves o
 GAP_CONSTRAINT_WEIGHT = 1e5  # relative to a landmark of the cheek; 300 in retargeting, where gaps may deviate a little
 CHANGE_COST = 0.5  # of changes of the weights in contacts, relative to the median curvature
 # Of changes of a smile by gestures: lips close by pressing and rolling; a smaller smile is seen as another mood.
+# without a cost the cheapest way to close smiling lips is to smile less (decision 118)
 SMILE_COST, SMILE_PREFIX = 5.0, "mouthSmile"
 GESTURE_COST = 1.0  # of changes of all weights by gestures
 CLOSED_SMILE_COST = 0.3  # of the smile of a basis expression, whose lips are closed

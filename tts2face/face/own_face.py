@@ -33,6 +33,7 @@ LID_CHANNEL = "lids"
 OPEN_QUANTILE, CLOSED_QUANTILE = 0.7, 0.005  # quantiles of the lid opening over all frames: open eyes and blinks
 MIN_BLINK_CLOSURE = 0.5  # least closure in recorded blinks; talkers without blinks get no lid motion
 MIN_LID_CLOSURE = -0.3  # closure of lids opened wide
+# share of the mean curvature
 GESTURE_RIDGE = 1e-5
 LID_INNER_RADIUS, LID_OUTER_RADIUS = 0.7, 1.1  # relative to the eye width: lid texture changes in full, and ends
 EXPRESSION_SHARE = 0.6  # of an expression that is applied: its folds and teeth do not occur in recorded speech
@@ -171,6 +172,7 @@ def _lid_model(talker: Talker, appearance: Appearance) -> tuple[FloatArray, Floa
     openings = _mean_eye_openings(model, shapes)
     opened, shut = np.quantile(openings, [OPEN_QUANTILE, CLOSED_QUANTILE])
     still, plate = model.basis[model.n_speech :].astype(np.float64), _mean_eye_openings(model, appearance.plate.shape)
+    # nobody blinks in the recordings: there is no lid to learn
     if shut > (1.0 - MIN_BLINK_CLOSURE) * opened:
         return np.zeros((2, len(model.mean), 3)), np.zeros((2, n_face)), np.zeros(len(plate))
     shares, on_plate = (

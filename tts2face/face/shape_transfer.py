@@ -141,6 +141,7 @@ def _merge_places(places: FloatArray, values: FloatArray, apart: float) -> tuple
     for number, place in enumerate(places):
         distances = np.linalg.norm(places[kept] - place, axis=1)
         near = int(distances.argmin()) if kept else 0
+        # two centres at one place make the equations singular
         if kept and distances[near] < apart:
             member[number] = near
         else:

@@ -18,8 +18,11 @@ from tts2face.storage.schema import Contents, Tensor, millimetres
 
 STEPS_PER_PARAMETER = 1000.0  # appearance parameters are stored as 16-bit integers in steps of spread / 1000
 APPEARANCE = "appearance"  # name of an appearance before those of its arrays
+# of any place in a picture
 MAX_PX = 1e5
+# of a frame of the video
 MAX_SIDE_PX = 4096
+# of any appearance parameter: a damaged file must not overflow
 MAX_PARAMETER = 1e6
 N_POINTS = N_MESH_LANDMARKS + len(FACE_OVAL)
 

@@ -72,6 +72,7 @@ class AudioMap:
     def gain_for(self, loudness: float) -> float:
         """Factor on the samples of speech at `loudness` dB that gives the level of the training speech."""
         missing = self.loudness - loudness
+        # a map without a level takes sound as it is
         return 1.0 if math.isnan(missing) else float(10.0 ** (min(max(missing, -MAX_GAIN_DB), MAX_GAIN_DB) / 20.0))
 
     def parameters(self, features: RealArray) -> NDArray[np.float32]:

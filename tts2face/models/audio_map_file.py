@@ -32,6 +32,7 @@ OUTER = Stored(Tensor("float32", ("{prefix} units {at}",), -MAX_WEIGHT, MAX_WEIG
 
 
 def _n_layers(arrays: Arrays, prefix: str) -> int:
+    # the middle layer may be absent
     return 3 if f"{prefix}.{WEIGHTS[1]}" in arrays else 2
 
 

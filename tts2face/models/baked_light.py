@@ -19,6 +19,7 @@ from tts2face.numeric.arrays import make_read_only
 from tts2face.storage.model_pictures import encode_colours
 from tts2face.storage.schema import MAX_MM, Tensor
 
+# one above the other in the texture
 N_PAGES = 2
 N_LAMP_NUMBERS = 17
 LIP_RING = (
@@ -235,6 +236,7 @@ class BakedLight(HairLight):
         if n < min(self.camera_modes.shape[2], worn.camera_modes.shape[2]):
             own = (self.camera_sizes / worn.camera_sizes)[:, None, None] * self.camera_modes[:, :, :n]
             cameras = worn.camera_modes.copy()
+            # 8 bits without -128, so that both directions are alike
             cameras[:, :, :n] = np.clip(np.rint(cameras[:, :, :n] + own), -127, 127)
             new["camera_modes"] = cameras
         return replace(self, **new)
@@ -265,6 +267,7 @@ def quantised(
     Those above a share in per cent are cut off.
     """
     flat = values.reshape(len(values), -1)
+    # a row of zeros has no size
     sizes = np.maximum(np.percentile(np.abs(flat), share, axis=1) / 127, least)
     steps = np.clip(np.rint(flat / sizes[:, None]), -127, 127).astype(np.int8)
     return steps.reshape(values.shape), sizes.astype(np.float32)

@@ -20,6 +20,7 @@ def consent_record(name: str, statement: str | None, *, date: str | None = None)
         The statement is missing or too short.
     """
     said = "" if statement is None else statement.strip()
+    # drawn people need nobody's consent
     if said != DRAWN and len(said.split()) < MIN_STATEMENT_WORDS:
         raise InputError(
             f"the file will contain pictures of {name}'s face; state the consent: "

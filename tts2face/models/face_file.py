@@ -79,6 +79,7 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
     least_mm = LEAST_STEP * float(np.ptp(face.vertices, axis=0).max())
     own = stored_arrays(face)
     if not (face.textures or face.light.is_flat):
+        # nothing is drawn by places in a texture
         own.pop("uv", None)
     late = {name: own.pop(name) for name in PACKED_LATE if name in own}
     arrays = own | pack_shapes(face.shapes, least_mm) | late | _texture_arrays(face)
@@ -110,6 +111,7 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
         arrays[LIGHT], header[LIGHT] = encode_light(face.light.baked)
     if isinstance(face.light, Photographed):
         view = face.light.view
+        # shares of the head's motion, in 8 bits
         arrays[FOLLOW] = np.rint(255 * view.follow).astype(np.uint8)
         if view.alpha is not None:
             arrays[PHOTO_ALPHA] = encode_coverage(view.alpha)

@@ -24,6 +24,7 @@ SCORE_INPUTS = "score_inputs"  # key of the metadata: names of the shapes that t
 PHOTOGRAPH, FOLLOW = "photograph", "follow"
 PHOTO_LAYERS = PHOTO_ALPHA, PHOTO_BEHIND = "photo_alpha", "photo_behind"
 LIGHT = "light"  # array of baked light, and the key of the metadata that describes it
+# of a face; a shipped one has three
 MAX_TEXTURES = 16
 MAX_PHOTO_PX = 8192  # side of a photograph
 MIN_EXTENT_MM = 1.0  # least width and height of a face

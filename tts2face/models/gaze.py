@@ -82,6 +82,7 @@ class GazeHabit:
     @classmethod
     def of_parameters(cls, values: FloatArray) -> "GazeHabit":
         """From values (P,) of `PARAMETERS`."""
+        # parameters are logarithms: lengths are log-normal (decision 188)
         named = dict(zip(PARAMETERS, np.exp(np.clip(values, -MAX_VALUE, MAX_VALUE)).tolist(), strict=True))
         total = 1.0 + named["up"] + named["down"]
         drawn = {name: LogNormal(named[name], named[f"{name}_spread"]) for name in PAIRS}

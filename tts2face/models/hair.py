@@ -132,6 +132,7 @@ def fit_hair(face: Face, hair: Hair) -> NDArray[np.float32]:
     """Vertices (V, 3) of a haircut on a face: it moves as its anchors do (biharmonic interpolation in space)."""
     places = hair.anchor_places.astype(np.float64)
     moved = face.vertices[hair.anchors].astype(np.float64) - places
+    # the head that it was made for
     if not np.abs(moved).max(initial=0.0) > 0:
         return hair.vertices.astype(np.float32)
     n, middle, scale = len(places), places.mean(axis=0), float(np.ptp(places, axis=0).max())
@@ -140,6 +141,7 @@ def fit_hair(face: Face, hair: Hair) -> NDArray[np.float32]:
         """Distances from the anchors, and an affine map, at points (N, 3)."""
         squared = (points**2).sum(axis=1)[:, None] + (places**2).sum(axis=1) - 2 * points @ places.T
         affine = np.column_stack([np.ones(len(points)), (points - middle) / scale])
+        # biharmonic in space: the kernel is the distance
         return np.hstack([-np.sqrt(np.maximum(squared, 0.0)), affine])
 
     matrix = np.zeros((n + 4, n + 4))

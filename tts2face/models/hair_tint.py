@@ -71,6 +71,7 @@ def _tinted(light: BakedLight, tint: HairTint, srgb: NDArray[np.float64]) -> Bak
         first, second = (to_light[known[at][..., channel]] for at in pair)
         own[..., channel] = np.searchsorted(bounds, first + np.float32(share) * (second - first))
     grey = curves[1][0]
+    # black hair has next to no light to compare with
     ratio = grey[before.max(axis=2)] / np.maximum(grey[resized(own, small).max(axis=2)], DARKEST)
     gloss = np.clip(ratio, LEAST_GLOSS, 1.0).ravel()
     apart = float(np.abs(srgb - tint.colours[0]).mean()) / OTHER_COLOUR

@@ -8,6 +8,7 @@ coordinates: x to the person's left, y up, z out of the face, millimetres, head 
 import numpy as np
 from numpy.typing import NDArray
 
+# of MediaPipe's face mesh with irises; the numbers below are its own
 N_LANDMARKS = 478
 N_MESH_LANDMARKS = 468  # landmarks of the skin; those after them lie on the irises and depend on gaze
 

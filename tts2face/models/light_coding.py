@@ -23,6 +23,7 @@ from tts2face.storage.deflated import pack_arrays, unpack_arrays
 from tts2face.storage.model_pictures import JPEG_QUALITY, decode_colours, encode_colours
 from tts2face.storage.schema import Contents, ModelPlace, Tensor
 
+# texels of a page
 MAX_SIDE = 4096
 PICTURES = ("page0", "page1", "backdrop", "tint")
 ARRAYS = {"arrays": anything}  # checked when they are inflated

@@ -23,6 +23,7 @@ from tts2face.models.mesh_coding import (
 from tts2face.storage.schema import Tensor, millimetres
 
 SWING_SHAPES = ("hairPitch", "hairYaw", "hairRoll")  # shapes of hair that lags, in the order of the head's angles
+# of vertices or triangles: indices have 32 bits
 COUNT = whole(1, 2**31 - 1)
 
 

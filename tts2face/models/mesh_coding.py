@@ -13,8 +13,10 @@ from tts2face.storage.schema import Tensor
 
 Bits = NDArray[np.uint8]
 MAX_OCCLUSION_BYTES = 128  # of one vertex: 1,024 directions; planes of one bit for each direction take a third more
+# of 16 bits: a sixteenth of a texel of 4096
 UV_STEPS = 65535
 PLACE_STEP = 6e-6  # of the extent of a mesh, 0.002 mm of a head
+# of 8 bits: half a degree
 TANGENT_STEPS = 127
 
 

@@ -10,11 +10,13 @@ from lexicon.values.fields import check_fields
 from tts2face.models.palette import EXPRESSIONS, FEATURES, Delivery, Derivation, FeatureChange, Palette
 from tts2face.models.palette_file import LEVEL_DB, RATE_FACTORS
 
+# characters
 MAX_NAME = 40
 FORBIDDEN = frozenset(",=@;:#[]<>\"'/\\")  # have a meaning in marks, flags, timelines or paths
 SHARE_LIMITS = (0.0, 1.0)  # of a style in a mix
 EXPRESSION_LIMITS = (-1.0, 1.5)  # weights that are added
 SIZE_LIMITS = (0.0, 3.0)  # factors of the motion of a feature
+# factors of the tempo of recorded gestures
 TEMPO_LIMITS = (0.5, 2.0)
 
 
@@ -154,6 +156,7 @@ def remove_style(palette: Palette, name: str) -> Palette:
     """
     require_own(palette, name)
     dependent = [other for other, derived in palette.derivations.items() if derived.source == name and other != name]
+    # a derived style has no motion of its own
     if dependent and name in palette.styles:
         raise InputError(f"{', '.join(dependent)} is derived from {name}; delete what is derived from it first")
     styles = {other: style for other, style in palette.styles.items() if other != name}

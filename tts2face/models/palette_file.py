@@ -36,6 +36,7 @@ STEPS_PER_SPREAD = 2000.0  # 16-bit steps per standard deviation: finer than the
 MAX_VALUE = 1e4  # of any motion: mm, radians, or weights; 16 bits in steps of 1/2000 of the spread reach 16 spreads
 LOUDNESS_DB = 400.0  # of either sign
 SEMITONES = 120.0  # ten octaves
+# of a derived style
 MAX_GAIN = 100.0
 # A tempo of 0.05 stretches 30 frames to 20 s; one of 20 gives 600 frames/s, the most that a clip can use.
 SLOWEST, FASTEST = 0.05, 20.0
@@ -87,6 +88,7 @@ class StoredMotion(StoredModel):
     def of(cls, values: NDArray[np.float32], step: NDArray[np.float32] | None) -> "StoredMotion":
         """Motion in the steps of the file from which it was read, or of its spread."""
         if step is None:
+            # written with the steps that it was read with, a style stays equal bit by bit (decision 151)
             step = np.maximum(values.std(axis=0), 1e-6) / STEPS_PER_SPREAD
         return cls(np.clip(np.rint(values / step), -32768, 32767), step)
 
@@ -145,6 +147,7 @@ def read_palette(path: Path) -> Palette:
     arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
     contents = Contents(path, KIND, arrays, header)
     _check(contents)
+    # fields search windows of frames, whose length depends on the rate
     if header["fps"] != GESTURE_FPS:
         raise DataError(f"{path} was recorded at {header['fps']:g} frames/s, not {GESTURE_FPS:g}; build it again")
     return _palette_of(contents)

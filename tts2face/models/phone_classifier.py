@@ -30,6 +30,7 @@ from tts2face.storage.shipped import find_file
 from tts2face.storage.tensors import write_tensors
 
 KIND, VERSION = "phones", 1
+# of any weight, and of a spike behind its phone
 MAX_VALUE, MAX_DELAY_S = 1e4, 1.0
 WEIGHTS = (
     half("features", "units", low=-MAX_VALUE, high=MAX_VALUE),

@@ -20,10 +20,12 @@ from tts2face.numeric.kernels import kernel
 from tts2face.storage.schema import Contents, Tensor
 
 PHONE_WINDOW_S = 0.28  # window on either side
+# between instants of the window: a frame of the recordings
 STEP_S = 0.04
 NEIGHBOURS = (-3, -2, -1, 1, 2, 3)  # phones relative to the present one
 N_PHONES_SEEN = 2 * round(PHONE_WINDOW_S / STEP_S) + 1 + len(NEIGHBOURS)
 N_PLACE = 4  # values that describe the position within the present phone
+# a damaged file must not overflow
 MAX_WEIGHT = 1e6
 NETWORK = "network"  # name of the networks before those of their arrays
 INVENTORY = "network_inventory"  # key of the metadata
@@ -123,6 +125,7 @@ def _add_rows(weights: Any, used: Any, values: Any, biases: Any, total: Any) -> 
     n_outputs, n_used = len(total), len(used)
     for h in range(n_outputs):
         total[h] = biases[h]
+    # four rows in each pass over the sums
     whole = n_used - n_used % 4
     for at in range(0, whole, 4):
         first, second, third, fourth = used[at], used[at + 1], used[at + 2], used[at + 3]

@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 from tts2face.numeric.arrays import make_read_only
 
 HEAD_GAIN = 0.75  # of the turns of a head, in a photograph
+# of a turn, towards which larger ones bend: the picture has no other side of the face
 HEAD_LIMIT_RAD = np.radians(9.0)
+# of shifts of the head: the picture does not show what they uncover
 SHIFT_GAIN = 0.45
 NO_TURN_DEG = 75.0  # yaw of a photographed head that does not move
 

@@ -33,6 +33,7 @@ SCORE_SHAPES: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 N_SCORES = len(SCORE_SHAPES)
 SCORES = "scores"  # name of the map before those of its arrays
+# a damaged file must not overflow
 MAX_WEIGHT = 1e6
 
 

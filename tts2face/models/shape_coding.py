@@ -60,6 +60,7 @@ def pack_shapes(shapes: Iterable[NDArray[np.floating]], least_mm: float) -> dict
 def unpack_shapes(arrays: Mapping[str, NDArray[Any]], n_vertices: int) -> NDArray[np.float32]:
     """Displacements (K, V, 3) of what `pack_shapes` returned."""
     counts, steps = arrays["shape_counts"], arrays["shape_steps"]
+    # shapes of a palette are appended without a copy of all
     shapes = zeros_with_room(len(counts), ROOM, (n_vertices, 3))
     bounds = np.concatenate([[0], np.cumsum(counts)])
     for at, step in enumerate(steps):

@@ -34,6 +34,7 @@ from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.types import HEAD_CHANNELS
 
 KIND = "talker"
+# raised when readers of before would misread a file
 FORMAT_VERSION = 1
 STEPS_PER_SPREAD = 2000.0  # of shape parameters: finer than the tracker's noise
 ROUNDING_S, BEYOND_S = 1e-6, 1.0  # largest excess of phones before and after the frames of their utterance

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 TABLE_SIDE = 33  # entries of the view transform along each colour
 OFFSET = 0.004  # of the logarithm
 MOST = 16.0  # linear light
+# powers of two from 0 to the brightest light of the table
 SPAN = float(np.log2(MOST / OFFSET + 1))
 
 

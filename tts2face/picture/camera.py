@@ -20,6 +20,7 @@ FIELD_OF_VIEW_RAD = math.radians(
 FRAME_MARGIN = 0.06  # margin on each side as a share of the head's size
 MAX_PHOTO_TURN_DEG = 5.0  # of a camera from that of a photograph, whose named views look down a little
 PHOTO_DISTANCE_MM = 1000.0  # of a camera that shows as much of a photograph as it can
+# least distance of the near plane from the camera of a photograph
 NEAR_PHOTO_MM = 20.0
 NECK_SHARE = 0.28  # length of neck below the chin, as a share of the head's height
 
@@ -69,6 +70,7 @@ def camera_matrices(camera: CameraView, face: Face, size: tuple[int, int]) -> Ca
     distance = camera.distance or float(framing_distance)
     view = np.column_stack([axes, -axes @ ((low + high) / 2 - distance * ahead)])
     extent = float(np.abs(face.vertices).max()) + distance
+    # a triangle beyond would wrap to the other side of the picture
     near = max(distance / 50, extent * focal * 256 / 2**29)  # keeps grid coordinates below the int32 limit
     return CameraMatrices(view, np.array([focal, size[0] / 2, size[1] / 2, near]))
 
@@ -88,6 +90,7 @@ def photo_crop(
     wide, high = view.size
     part = _own_pixels(view.size, size) or min(wide / size[0], high / size[1])
     low, top = _in_photo(face, view)
+    # a close view shows a part of the head's height
     if camera.share < 1:
         part = min(part, float((top - low).max()) / camera.share / min(size))
     elif camera.distance:

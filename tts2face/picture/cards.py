@@ -54,6 +54,7 @@ def find_strands(
     means = np.ones(len(levels), np.float32)
     for number in np.unique(texture):
         start, width, height = levels[number, 0]
+        # every seventh texel: a mean needs no more
         seen = texels[start : start + width * height : 7]
         light = linear_light(seen[:, :3]).mean(axis=1)
         means[number] = max(float(np.average(light, weights=seen[:, 3] + 1e-3)), 1e-4)

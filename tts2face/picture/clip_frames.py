@@ -87,6 +87,7 @@ class ClipFrames:
 
         def choose(*, has_all_samples: bool) -> Iterator[int]:
             nonlocal at
+            # the quality changes while frames are drawn (decision 182)
             while at < n_frames and pace.quality.has_all_samples == has_all_samples:
                 begun.append(at)
                 yield at

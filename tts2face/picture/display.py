@@ -35,6 +35,7 @@ def require_display(purpose: str) -> None:
     if find_spec("pyvista") is None:
         raise BackendError(f"{purpose} needs pyvista, which is not installed; run: pip install 'tts2face[view]'")
     is_linux = sys.platform.startswith("linux")
+    # VTK 9.7 ends the process where it finds no display (decision 223)
     if is_linux and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise BackendError(
             f"{purpose} opens a window, and this machine has no display; write a file with --out clip.mp4"

@@ -59,6 +59,7 @@ class EncoderThread:
         while not self._work.done():
             try:
                 return self._queue.put(item, timeout=POLL_INTERVAL_S)
+            # asked again, whether the encoder has ended meanwhile
             except queue.Full:
                 continue
         return self._work.result()

@@ -172,6 +172,7 @@ def write_clips(
 def output_kind(path: Path | str) -> str:
     """Kind of an output path: one of `FILE_SUFFIXES`, or `FOLDER`."""
     suffix = Path(path).suffix.lower()
+    # a folder may have a point in its name
     if str(path).endswith(("/", os.sep)) or suffix == "" or (suffix not in FILE_SUFFIXES and Path(path).is_dir()):
         return FOLDER
     if suffix not in FILE_SUFFIXES:
@@ -196,6 +197,7 @@ def check_output(path: Path | str) -> Path:
     output = Path(path)
     check_name(output)
     kind = output_kind(path)
+    # a finished folder replaces the old one whole: nothing else may lie there
     if kind == FOLDER and output.exists() and not (output.is_dir() and is_png_folder(output)):
         raise InputError(f"{output} contains files other than the pictures of a clip; choose another folder")
     if kind != FOLDER and output.is_dir():

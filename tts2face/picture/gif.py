@@ -13,6 +13,7 @@ MIN_TICKS = 2  # browsers play shorter delays as 0.1 s
 COLOUR_BITS = 6  # bits of each channel in the colour lookup table
 BAYER = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]], np.int16)
 # 8-bit steps between the extremes of the ordered dither, which does not flicker on still pictures.
+# of 255, from the least to the greatest step of the pattern
 DITHER_AMPLITUDE = 10
 OPAQUE_COVERAGE = 128  # least coverage of an opaque pixel
 
@@ -29,6 +30,7 @@ class GifWriter:
         self._n_frames = 0
         self._last = -MIN_TICKS
         height, width, channels = swatches[0].shape
+        # the last entry is the transparent one
         self._palette, self._nearest = _colour_table(swatches, 256 if channels == 3 else 255)
         pattern = np.tile(BAYER, (-(-height // 4), -(-width // 4)))[:height, :width, None]
         self._dither = (pattern * DITHER_AMPLITUDE // 16 - DITHER_AMPLITUDE // 2).astype(np.int16)
@@ -76,6 +78,7 @@ class GifWriter:
 
 def _write_comment(path: Path, notice: str) -> None:
     """Insert a comment (GIF89a, section 24) before the trailer byte of a file; the muxer writes no comments."""
+    # a block of a GIF has at most 255 bytes
     comment = notice.encode("ascii", "replace")[:255]
     with path.open("r+b") as file:
         file.seek(-1, 2)

@@ -115,6 +115,7 @@ def sum_directions(hidden: Any, directions: Any, normals: Any, weights: Any, exp
             facing = (
                 directions[d, 0] * normals[v, 0] + directions[d, 1] * normals[v, 1] + directions[d, 2] * normals[v, 2]
             )
+            # scattered light reaches a vertex from beside it, too
             facing = max(facing, np.float32(0.02))
             whole += facing
             if hidden[v, d >> 3] & (128 >> (d & 7)):

@@ -83,6 +83,7 @@ def mux_pictures(container: Any, packets: Iterable[Any], sound: Any) -> None:
     """
     container.start_encoding()
     head = bytes(sound.codec_context.extradata or b"")
+    # only Opus has a start that players drop (RFC 7845, 4.2)
     if not head.startswith(b"OpusHead"):
         container.mux(packets)
         return
@@ -173,6 +174,7 @@ class MovieWriter:
     def _fill_transparent(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Pixels with empty ones filled by the mean colour of the head, so that coding does not darken its outline."""
         empty = pixels[:, :, 3] == 0
+        # of the first picture that shows something, for the whole film
         if self._fill_colour is None and not empty.all():
             self._fill_colour = pixels[~empty][:, :3].mean(axis=0).astype(np.uint8)
         filled = pixels.copy()

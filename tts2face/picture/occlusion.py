@@ -147,6 +147,7 @@ def _visibility(
 
 def _shadow_view(direction: NDArray[np.float64], middle: Any, radius: float) -> tuple[NDArray[np.float64], Any]:
     ahead = -direction
+    # seen from straight above there is no upright direction
     right = np.cross(ahead, [0.0, 1.0, 0.0] if abs(direction[1]) < 0.99 else [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     turned = np.stack([right, np.cross(ahead, right), ahead])

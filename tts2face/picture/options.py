@@ -116,6 +116,7 @@ def parse_size(size: str) -> tuple[int, int]:
         raise InputError(f"size must be width x height such as 640x480, not {size!r}")
     width, height = int(match[1]), int(match[2] or match[1])
     for side in (width, height):
+        # H.264 halves the colours of both directions: sides are even
         if not SIDE_LIMITS_PX[0] <= side <= SIDE_LIMITS_PX[1] or side % 2:
             raise InputError(
                 f"size must be even numbers from {SIDE_LIMITS_PX[0]} to {SIDE_LIMITS_PX[1]}, not {width}x{height}"
@@ -129,6 +130,7 @@ def parse_background(background: str) -> tuple[int, int, int] | Path | str:
         return background
     digits = COLOURS.get(background.lower(), background.removeprefix("#"))
     if re.fullmatch(r"[0-9a-fA-F]{3}", digits):
+        # #rgb as in CSS
         digits = "".join(2 * digit for digit in digits)
     if re.fullmatch(r"[0-9a-fA-F]{6}", digits):
         return int(digits[:2], 16), int(digits[2:4], 16), int(digits[4:], 16)

@@ -222,6 +222,7 @@ def _lid_texture_change(
     """Change (P, 3) of the face texture by lids closed by a share; detail of the eye outside the model fades out."""
     face = renderer.appearance.face
     change = np.zeros((len(face.pixels), 3), np.float32)
+    # lids that are not closed show the plate as it is
     if renderer.gestures is None or renderer.eyes is None or closure <= 0:
         return change
     pixels = renderer.eyes.pixels

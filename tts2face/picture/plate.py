@@ -39,6 +39,7 @@ class TextureSamples:
         """Bilinear colours (Q, 3) of a picture (H, W, 3) whose mesh points lie at `points` (N, 2), pixels."""
         height, width = picture.shape[:2]
         places = np.einsum("qc,qcd->qd", self.weights, points[self.corners])
+        # below the last pixel, so that four neighbours exist
         x, y = np.clip(places[:, 0], 0, width - 1.001), np.clip(places[:, 1], 0, height - 1.001)
         left, top = x.astype(np.int64), y.astype(np.int64)
         right, low = (x - left)[:, None], (y - top)[:, None]
@@ -137,6 +138,7 @@ def _decode_video(plate: Plate) -> Iterator[NDArray[np.uint8]]:
             stream = container.streams.video[0]
             size = stream.width, stream.height
             for frame in container.decode(stream) if max(size) <= MAX_VIDEO_SIDE_PX else ():
+                # as many frames as points, all of one size: else the file is damaged
                 if n_frames == len(plate.points) or (frame.width, frame.height) != size:
                     n_frames = -1
                     break

@@ -9,6 +9,7 @@ from tts2face.picture.provenance import png_labels
 from tts2face.storage.wave_files import open_wave, pcm_bytes
 
 SOUND_NAME = "sound.wav"
+# nine hours at 30 frames a second
 NUMBER_DIGITS = 6
 COMPRESSION = 3  # zlib level: twice as fast as the default 6, 4 % larger
 

@@ -44,6 +44,7 @@ def append_to_mp4(target: Path | WriteBuffer, notice: str) -> None:
     if not notice:
         return
     content = b"uuid" + MP4_BOX + xmp_packet(notice).encode()
+    # of ISO 14496-12: its size, with these four bytes, stands first
     box = (4 + len(content)).to_bytes(4, "big") + content
     if isinstance(target, WriteBuffer):
         target.write(box)

@@ -109,6 +109,7 @@ class MeshRenderer:
         pixels[:, :, : background.shape[2]] = background
         try:
             buffers = self.buffers.pop()
+        # no buffers are free: another thread draws with each
         except IndexError:
             buffers = self.scene.allocate_buffers()
         self.scene.draw(weights, head, buffers, pixels)

@@ -144,6 +144,7 @@ def _draw_studio(width: int, height: int) -> NDArray[np.uint8]:
     falloff = np.exp(-2.6 * (across**2 + along**2))[:, :, None]
     wall = np.array(STUDIO_DARK) + (np.array(STUDIO_BRIGHT) - STUDIO_DARK) * falloff
     bayer = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]]) / 16
+    # a wall's gradient in 8 bits would show its steps
     dither = np.tile(bayer, (-(-height // 4), -(-width // 4)))[:height, :width, None]
     return np.floor(wall + dither).astype(np.uint8)
 

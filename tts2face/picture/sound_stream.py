@@ -95,6 +95,7 @@ def _blocks(sound: Waveform) -> Iterator[Waveform]:
 def wav_header(rate: int, n_bytes: int | None) -> bytes:
     """Header of a mono 16-bit WAV file; `n_bytes` of samples, or None if not yet known (RIFF, Microsoft 1991)."""
     size = UNKNOWN_BYTES if n_bytes is None else n_bytes
+    # the head without its first eight bytes, and the samples
     riff = UNKNOWN_BYTES if n_bytes is None else n_bytes + 36
     return b"".join((
         struct.pack("<4sI4s", b"RIFF", riff, b"WAVE"),
@@ -119,6 +120,7 @@ class _PcmEncoder:
         if self._file is None:
             return header + samples
         self._n_bytes += len(samples)
+        # the size has 32 bits
         if self._has_header and self._n_bytes > UNKNOWN_BYTES - HEAD_BYTES:
             raise InputError("a .wav file has at most 4 GB of sound; choose flac, or divide the text")
         self._file.write(header + samples)

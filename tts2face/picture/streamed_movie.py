@@ -81,6 +81,7 @@ def find_movie_kind(format: str, picture: Picture) -> StreamedMovie:
     if format not in MOVIE_KINDS:
         raise InputError(f"there is no streamed movie format {format!r}; the formats are {', '.join(MOVIE_KINDS)}")
     movie = MOVIE_KINDS[format]
+    # H.264 has no transparency
     if picture.is_transparent and not movie.has_alpha:
         raise InputError(f"{format} cannot be transparent; choose webm, or another background")
     return movie

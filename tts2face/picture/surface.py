@@ -130,6 +130,7 @@ def weld_groups(face: Face, rig: FaceRig, kind: NDArray[np.int64] | None = None)
         mixed[rig.indices[first:end]] += weight * rig.deltas[first:end]
     alike = np.zeros(len(mixed)) if kind is None else kind
     key = np.column_stack([face.vertices, mixed, alike])
+    # micrometres: vertices of a seam differ by rounding
     return _group_rows(np.rint(key * 1000).astype(np.int64))
 
 

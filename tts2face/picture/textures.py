@@ -85,6 +85,7 @@ def halve(fine: Array, linear: Array, encoded: Array, coarse: Array) -> None:
             total[0] = total[1] = total[2] = total[3] = np.float32(0)
             for row in (2 * y, min(2 * y + 1, fine.shape[0] - 1)):
                 for column in (2 * x, min(2 * x + 1, fine.shape[1] - 1)):
+                    # colours of hidden texels do not count, unless all four are hidden
                     weight = np.float32(fine[row, column, 3]) + np.float32(1e-3)
                     for c in range(3):
                         total[c] += weight * linear[fine[row, column, c]]

@@ -10,6 +10,7 @@ from tts2face.numeric.arrays import Float32Array, FloatArray
 
 TURN_SCALE_DEG = (10.0, 8.0)  # of yaw and pitch in the distance between turns
 TURN_LIMIT_DEG = (23.0, 14.0)  # beyond the baked turns light stays
+# of the distance between cameras
 CAMERA_SCALE_DEG = 15.0
 
 

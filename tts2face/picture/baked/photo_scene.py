@@ -30,6 +30,7 @@ def build_photo_scene(face: Face, light: Photographed, picture: Picture) -> LitS
     shown = _resized(baked.backdrop, size, crop)
     if view.alpha is None:
         return build_lit_scene(face, light, picture, optics, shown)
+    # the wall behind a person was filled in when the face was made
     if view.behind is not None and picture.background in (STUDIO, BLUR):
         wall = _own_background(view, view.behind, picture, crop)
     else:

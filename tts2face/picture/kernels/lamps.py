@@ -10,6 +10,7 @@ from tts2face.picture.camera_view import CameraView
 
 # Sky and floor: colour. Lamps: yaw and pitch in degrees, measured like the camera's, then colour. Linear light.
 SKY_COLOUR, FLOOR_COLOUR = (0.30, 0.307, 0.335), (0.115, 0.112, 0.115)
+# degrees beside and above the camera's axis, and colour; warm
 KEY_LIGHT = (-36.0, 32.0, (1.36, 1.25, 1.13))
 FILL_LIGHT = (46.0, 8.0, (0.37, 0.375, 0.41))
 RIM_LIGHTS = ((150.0, 34.0, (0.85, 0.92, 1.05)), (-156.0, 26.0, (0.50, 0.52, 0.58)))

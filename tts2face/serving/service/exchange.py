@@ -104,7 +104,6 @@ class Exchange:
     @property
     def route(self) -> str:
         """Path of its route with the names of parameters in place of their values; `OTHER` if there is none."""
-        # the pattern, not the address: metrics must not grow with the names that clients send
         return str(getattr(self.scope.get("route"), "path", OTHER))
 
     @property
@@ -143,7 +142,6 @@ class Exchange:
 
     async def answer(self, status: int, headers: list[tuple[bytes, bytes]], body: bytes = b"") -> None:
         """Answer it as a whole."""
-        # RFC 9110, 8.6: 204 has no length
         lines = headers if status == 204 else [*headers, (b"content-length", str(len(body)).encode())]
         with suppress(ClientDisconnect):
             await self.send({"type": "http.response.start", "status": status, "headers": lines})
@@ -155,8 +153,7 @@ class Exchange:
         try:
             await work
         except asyncio.CancelledError:
-            # cancelled by the server's end, not by us
-            if not self.is_cut:
+            if not self.is_cut:  # cancelled by the server's end, not by us
                 raise
         finally:
             task, self._task = self._task, None
@@ -184,7 +181,6 @@ class Exchange:
         try:
             yield
         except asyncio.CancelledError:
-            # the count of cancellations says whether another one waits
             if self.has_left and task.uncancel() == 0:  # nobody else has cancelled it
                 raise ClientDisconnect from None
             raise
@@ -213,7 +209,6 @@ class Exchange:
         """End an answer that has begun: by a last line or event where its form has them, else by a trailer."""
         if self.scope["type"] != "http" or self.is_answered or self._is_closed or self.has_left:
             return
-        # text formats have a place for an error; bytes have none (decision 206)
         if self.ending is not None and (last := self.ending(content)):
             with suppress(TimeoutError):
                 await asyncio.wait_for(self.send({"type": "http.response.body", "body": last}), CLOSE_S)
@@ -294,7 +289,6 @@ class Incoming:
         headers = self._request.headers
         length = headers.get(b"content-length", b"0")
         if self._request.scope["type"] == "http":
-            # a body of unknown length comes in chunks
             self._has_body = length != b"0" or b"transfer-encoding" in headers
             if not length.isdigit() or int(length) > self._max_bytes:
                 raise self._too_large()
@@ -340,8 +334,7 @@ class Incoming:
             self._changed.set()
             if self._wrong is not None:
                 return
-            # then TCP slows the client down
-            while self._n_waiting_bytes >= READ_AHEAD_BYTES:
+            while self._n_waiting_bytes >= READ_AHEAD_BYTES:  # then TCP slows the client down
                 self._changed.clear()
                 await self._changed.wait()
 
