@@ -79,6 +79,7 @@ def barycentric_coordinates(places: NDArray[np.floating], corners: FloatArray) -
     across, along, off = b - a, c - a, places - a
     area = across[0] * along[1] - across[1] * along[0]
     if area == 0.0:
+        # no place lies inside a triangle without an area
         return np.full((len(places), 3), -1.0)
     second = (off[:, 0] * along[1] - off[:, 1] * along[0]) / area
     third = (across[0] * off[:, 1] - across[1] * off[:, 0]) / area

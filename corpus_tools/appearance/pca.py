@@ -66,8 +66,10 @@ def _truncated_svd(rows: Float32Array, n_kept: int) -> tuple[Float32Array, NDArr
     """Leading right singular vectors (K, D) and singular values (K,) of (B, D) rows, by the smaller Gram matrix."""
     products = rows @ rows.T if len(rows) <= rows.shape[1] else rows.T @ rows
     values, vectors = np.linalg.eigh(products.astype(np.float64))
+    # smaller values are rounding
     order = np.argsort(values)[::-1][: min(n_kept, int((values > values.max(initial=0.0) * 1e-10).sum()))]
     scales = np.sqrt(values[order])
+    # the smaller of both products of rows and columns has the same values
     if len(rows) <= rows.shape[1]:
         basis = (vectors[:, order] / scales).T.astype(np.float32) @ rows
     else:

@@ -39,6 +39,7 @@ def encode_plate_video(pictures: Iterator[NDArray[np.uint8]]) -> NDArray[np.uint
         stream = container.add_stream("libx264", rate=Fraction(25), options=dict(NEAR_LOSSLESS))
         stream.width, stream.height, stream.pix_fmt = width, height, "yuv444p"
         for picture in chain([first], pictures):
+            # H.264 halves the colours of both directions: sides are even
             frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture[:height, :width]), format="rgb24")
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))

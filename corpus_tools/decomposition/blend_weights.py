@@ -113,6 +113,7 @@ class NearestSamplesEstimator:
         near, at = self.tree.query(within, k=self.n_nearest)
         shape = (len(within), self.n_nearest)
         squares = np.reshape(near, shape) ** 2 + beyond[:, None]
+        # a sample that is the frame itself has no distance
         least = np.maximum(squares.min(axis=1, keepdims=True), np.finfo(np.float64).tiny)
         shares = np.sqrt(least / np.maximum(squares, least))  # relative to the nearest: no distance divides by 0
         shares /= shares.sum(axis=1, keepdims=True)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from tts2face.numeric.arrays import FloatArray
 
+# C3D counts places in blocks of 512 bytes, from 1
 BLOCK_BYTES = 512
 HEADER_KEY = 80  # second byte of a file, and of its parameters where a writer sets it
 DEC, BIG_ENDIAN = 85, 86  # of the processors; 84 is that of Intel
@@ -47,6 +48,7 @@ class C3dFile:
     def labels(self, group: str) -> list[str]:
         """Names of the markers (POINT) or channels (ANALOG); more than 255 are divided among several parameters."""
         found: list[str] = []
+        # LABELS, LABELS2, LABELS3: a parameter holds at most 255 texts
         for number in range(1, 256):
             found += self.parameters.get(f"{group}:LABELS{number if number > 1 else ''}", [])
         return found
@@ -85,6 +87,7 @@ def _read_frames(file: BinaryIO, words: NDArray[Any], parameters: Parameters, pr
     file.seek(start)
     values = _decode(file.read(n_frames * width * kind.itemsize), kind, processor).reshape(n_frames, width)
     quads = values[:, : 4 * n_points].reshape(n_frames, n_points, 4).astype(np.float64)
+    # a negative scale says that the points are floats
     points = quads[..., :3] * (1.0 if scale < 0 else scale)
     points[quads[..., 3] < 0] = np.nan
     channels = values[:, 4 * n_points :]
@@ -125,6 +128,7 @@ def _read_parameters(section: bytes, processor: int) -> Parameters:
             groups[-group] = name
         elif name:
             found.append((group, name, _read_values(section, at + 2, processor)))
+        # a pointer of 0 ends the list of parameters
         if step <= 0 or not name:
             break
         at += step
@@ -154,5 +158,6 @@ def _decode(content: bytes, kind: np.dtype[Any], processor: int) -> NDArray[Any]
     """Numbers; floats of DEC are four times as large as those with the same bits, and their halves are exchanged."""
     if processor == DEC and kind.itemsize == FLOATS:
         halves = np.frombuffer(content, "<u2").reshape(-1, 2)
+        # DEC's floats: words of 16 bits exchanged, exponent larger by two
         return np.ascontiguousarray(halves[:, ::-1]).view("<f4").ravel() / 4
     return np.frombuffer(content, kind)

@@ -107,6 +107,7 @@ def _interpolate_frames(values: FloatArray, fps: float, target_fps: float, n_fra
     instants, end = np.arange(n_frames) / target_fps, (len(values) - 1) / fps
     if len(values) == 1:
         return values
+    # a cubic needs four frames
     curve = make_interp_spline(np.arange(len(values)) / fps, values, k=min(3, len(values) - 1))
     if target_fps >= fps:
         return np.asarray(curve(np.minimum(instants, end)))

@@ -41,6 +41,7 @@ def is_livelink(path: Path) -> bool:
     if path.suffix.lower() != ".csv" or not path.is_file():
         return False
     with path.open("rb") as file:
+        # marker tables are .csv, too
         return file.read(64).decode("utf-8-sig", errors="replace").lower().startswith(LIVELINK_FIRST_COLUMN)
 
 

@@ -25,6 +25,7 @@ from tts2face.numeric.arrays import Float32Array, interpolate_columns
 TREMOR_SMOOTHING_S = 0.03  # standard deviation of the Gaussian that removes tracking noise from head, brows and cheeks
 # Of tracked lids that touch; first percentile of 40 minutes of one person (docs/gestures.md).
 CLOSED_LID_APERTURE = 0.055
+# centres of the irises in MediaPipe's mesh
 IRIS_LANDMARKS = {"Left": 473, "Right": 468}
 # Motion of a tracked iris in eye widths per radian of gaze, down and to the left; measured on one person who turns the
 # head with the gaze on the camera (docs/gestures.md).

@@ -21,6 +21,7 @@ from tts2face.models.palette import (
 from tts2face.numeric.arrays import fix_signs, principal_axes
 
 KEPT_VARIANCE = 0.95  # of a region's motion that its modes keep: the rest is the tracker's
+# of a region
 MAX_MODES = 10
 
 
@@ -95,5 +96,6 @@ def _build_region(feature: str, displaced: NDArray[np.floating]) -> FaceRegion:
     variances, vectors = principal_axes(np.einsum("ti,tj->ij", flat, flat), flat.shape[1])
     share = np.cumsum(variances) / max(float(variances.sum()), 1e-12)
     n_modes = min(int(np.searchsorted(share, KEPT_VARIANCE)) + 1, MAX_MODES)
+    # LAPACK chooses signs of vectors by the machine
     modes = fix_signs(vectors[:n_modes]).reshape(n_modes, -1, 3)
     return FaceRegion(feature_landmarks(feature), modes.astype(np.float32))

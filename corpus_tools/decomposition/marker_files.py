@@ -82,11 +82,13 @@ def _analogue_sound(file: C3dFile) -> Waveform | None:
 
     labels = file.labels("ANALOG")
     named = [at for at, label in enumerate(labels) if any(word in label.lower() for word in SOUND_LABELS)]
+    # force plates and muscles are analogue channels, too
     if not named or file.number("ANALOG:RATE") < MIN_SOUND_HZ:
         return None
     samples = file.channels[:, named[0]]
     samples = np.nan_to_num(samples - np.nanmean(samples))
     samples_at_rate = soxr.resample(samples.astype(np.float32), file.number("ANALOG:RATE"), SOUND_RATE)
+    # to its peak: scales and offsets of channels cancel (decision 198)
     return Waveform(samples_at_rate / max(float(np.abs(samples_at_rate).max(initial=0.0)), 1e-9), SOUND_RATE)
 
 
@@ -133,6 +135,7 @@ def _build_even_take(
     what, at = counted
     if what == "frame" and fps is None and len(at) > 1:
         raise InputError(f"{path.name} has frame numbers; give its frame rate, or a column time")
+    # whose rate no file can say
     if len(at) == 1:  # a still
         return MarkerTake(names, points, fps or GESTURE_FPS)
     steps = np.diff(at)

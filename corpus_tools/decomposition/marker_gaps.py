@@ -59,5 +59,6 @@ def _interpolate_gaps(track: FloatArray, is_missing: NDArray[np.bool_]) -> Float
     there = np.flatnonzero(~is_missing)
     if len(there) == 1:
         return np.repeat(track[there], is_missing.sum(), axis=0)
+    # before the first and after the last place the marker is held
     at = np.clip(np.flatnonzero(is_missing), there[0], there[-1])
     return np.asarray(PchipInterpolator(there, track[there])(at))

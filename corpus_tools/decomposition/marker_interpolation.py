@@ -129,4 +129,5 @@ def _landmark_groups(common: FloatArray) -> list[tuple[list[int], set[int]]]:
     sides = [*pairs, *((down, up) for up, down in pairs)]
     apart = set().union(*(side for side, _ in sides))
     others = [landmark for landmark in range(N_MESH_LANDMARKS) if landmark not in apart]
+    # lips and lids are apart though near: a side is moved without the markers of the opposite one
     return [(sorted(side), opposite) for side, opposite in sides] + [(others, set())]

@@ -144,6 +144,7 @@ def _read_frame(still: Still, at: float) -> NDArray[np.uint8]:
     """The frame of a video that is shown at an instant."""
     shown: TimedFrame | None = None
     for picture in read_frames(still.path):
+        # the frame that a player shows at this time began before it
         if shown is not None and picture.time > at:
             return shown.pixels
         shown = picture

@@ -90,6 +90,7 @@ def _warp_shapes(face: Face, warp: HeadWarp, soft: NDArray[np.int64], moved: Flo
     def write(number: int) -> None:
         shape = face.shapes[number].astype(np.float64)
         rows = soft[np.abs(shape[soft]).max(axis=1) > MIN_SHAPE_MOTION_MM]
+        # ARKit defines it on the open jaw: lips that meet while it is open
         if face.shape_names[number] == "mouthClose":
             before = rest[rows] + jaw[rows]
             shapes[number, rows] = warp.apply(before + shape[rows], rows) - warp.apply(before, rows)

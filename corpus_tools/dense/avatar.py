@@ -31,6 +31,7 @@ from tts2face.video.tracking import FaceTracker
 
 MIRRORED_WEIGHT = 0.03  # of a mirrored picture, which fills what a turned head hides
 OPENING_SCALE = np.array([1.02, 1.25])  # of the opening between lips, for its rim
+# of the head in which landmarks are read as in the pictures
 DRAWN_PX, DRAWN_CAMERA = 512, "0,0"
 # Of differences in depth, which the tracker hardly sees: with all of them, heads of the eight identities are 3.0 mm off
 # those in their pictures (mean of landmarks), with half of them 2.9, and 4.3 without the comparison to a drawn head.
@@ -152,6 +153,7 @@ def _mirrored(seen: TrackedPictures, table: NDArray[np.int64]) -> TrackedPicture
     width = pixels.shape[1]
     points, landmarks = seen.points[:, table].copy(), seen.landmarks[:, table] * np.array([-1, 1, 1], np.float32)
     points[..., 0] = width - 1 - points[..., 0]
+    # OpenCV reads no negative strides
     picture = np.ascontiguousarray(pixels[:, ::-1])
     opening = None if seen.opening is None else np.array([width - 1, 0]) + seen.opening * (-1, 1)
     return TrackedPictures(seen.file, points, landmarks, (picture,), MIRRORED_WEIGHT, opening)

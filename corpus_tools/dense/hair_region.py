@@ -9,6 +9,7 @@ from corpus_tools.dense.skin_canvas import polygon_depth
 from tts2face.models.landmarks import CHIN, FACE_OVAL
 from tts2face.numeric.arrays import FloatArray, Mask
 
+# of the grid in which hair is sought
 CELL_MM = 3.0
 ACROSS_MM = np.arange(-165.0, 165.1, CELL_MM)  # of the picture, from between the eyes
 UP_MM = np.arange(190.0, -200.1, -CELL_MM)
@@ -89,6 +90,7 @@ def find_hair(portrait: Portrait, skin: FloatArray) -> SeenHair:
     seed = crown & known & (unlike > IS_HAIR)
     background = known & _edge_cells(known) & (up > portrait.marks[CHIN, 1])
     plain = SeenHair("", seed & False, background, np.full(3, np.nan))
+    # most of the crown lies outside the picture
     if 2 * (crown & known).sum() < crown.sum():
         return plain
     if seed.sum() < MIN_HAIRY_SHARE * (crown & known).sum():

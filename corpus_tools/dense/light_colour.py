@@ -33,6 +33,7 @@ OFF_IRIS, OFF_LIDS = 1.35, 0.18  # of the radius: what is white of the eye, and 
 IRIS_MIX_PX = 0.5  # over the radius: share of the surroundings' light; rendered eyes have .05 to .1 at 5 px
 MIN_OWN_LIGHT = 0.5  # of what is seen
 BRIGHT_WHITE, PLAIN_IRIS = 0.6, (0.2, 0.8)  # quantiles of luminance: white without shadow, iris without catchlights
+# of a colour, below which its median is noise
 MIN_PIXELS = 6
 # Skin of cheeks and forehead in the renderer's studio light is gain * texture ** power in linear light, by channel:
 # least squares of logarithms over the head's eight identities, residuals .1. The tone curve compresses red.
@@ -142,6 +143,7 @@ def estimate_cast(eyes: EyeColours) -> FloatArray:
     if not np.isfinite(eyes.sclera).all():
         return SKIN_ALONE * of_skin
     of_white = _beyond(eyes.sclera[1:] - SCLERA_CHROMA, SCLERA_SPREAD)
+    # only a cast that skin and white of the eye agree on is corrected (decision 034)
     smaller = np.sign(of_skin) * np.minimum(np.abs(of_skin), np.abs(of_white))
     agreed = np.array([smaller[0], (of_skin[1] + of_white[1]) / 2])
     return np.where(of_skin * of_white > 0, agreed, 0.0)

@@ -67,6 +67,7 @@ def build_canvas(face: Face) -> SkinCanvas:
     island = texels.rows > ISLANDS_TOP * side - 1
     share = _front_share(face, texels, opened)
     share[island] = 0.0
+    # where the layout of the shipped heads has the mouth
     in_mouth = island & (texels.columns < 0.24 * side)
     return SkinCanvas(skin, texels, opened, soften_edges(share, texels, side), in_mouth)
 

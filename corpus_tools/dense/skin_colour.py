@@ -109,6 +109,7 @@ def average_skin_colours(
         facing = sampled.weight * smoothstep(own_normals @ turn[2], *FACING_COSINES) * inside
         total += facing[:, None] * colour
         weight += facing
+        # mirrored pictures fill what a turned head hides, and show nothing else
         if sampled.weight == 1:
             on_frame(picture, points)
     if not weight.any():

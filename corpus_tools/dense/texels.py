@@ -85,6 +85,7 @@ def _find_owners(corners, owner, weights):  # type: ignore[no-untyped-def]
         (ax, ay), (bx, by), (cx, cy) = corners[number]
         area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
         if abs(area) < 1e-12:
+            # a triangle without an area in the texture must not divide by 0
             area = 1e-12
         last = len(owner) - 1
         low_x, high_x = max(0, np.ceil(min(ax, bx, cx) - 1e-9)), min(last, np.floor(max(ax, bx, cx) + 1e-9))

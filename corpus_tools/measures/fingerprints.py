@@ -30,6 +30,7 @@ LOUDNESS_RANGE_DB = 30.0  # below the loudest frame; what is quieter depends on 
 WINDOW_SAMPLES, STEP_SAMPLES = 1024, 256  # of `SOUND_RATE`: 64 ms, 16 ms; a shift by half a step changes little
 BAND_EDGES_HZ = np.geomspace(200.0, 4000.0, 13)  # within what low bit rates keep
 # Between the most similar different recordings (.68, .66) and the same ones re-encoded (.83, .74 and above).
+# similarities of one recording twice lie above, of two below (decision 140)
 SAME_SOUND, SAME_MOTION = 0.76, 0.71
 # Recordings of the same phones are the same from a lower similarity of motion on, if the durations agree so well:
 # repetitions of the same words differ by 22 ms, the closest of 611 pairs by 5.9 ms.
@@ -214,6 +215,7 @@ def _have_same_durations(own: PhoneSequence, other: PhoneSequence) -> bool:
 
 def _sound(observation: Observation) -> Waveform | None:
     """Sound of an observation, None without a file of sound."""
+    # tracks without sound are compared by their motion
     if observation.video.suffix == TRACK_SUFFIX or not observation.video.is_file():
         return None
     whole = _read_sound(observation.video)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from tts2face.numeric.arrays import FloatArray
 
+# of the intervals in reports
 CONFIDENCE = 0.95
 N_PAIRED_DRAWS = 2000  # resamples of utterances with replacement (Efron 1979)
 ROUNDING = 1e-12  # spread of a constant curve in parts of its sum of squares: what float32 values and sums leave

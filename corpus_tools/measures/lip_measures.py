@@ -76,6 +76,7 @@ def peak_times(opening: RealArray, phones: PhoneSequence, fps: float) -> NDArray
 def _peak_position(curve: RealArray, low: int, high: int) -> float:
     top = low + int(np.argmax(curve[low : high + 1]))
     before, here, behind = (float(value) for value in curve[top - 1 : top + 2])
+    # a flat curve has no peak
     if not (here >= before and here >= behind and here > min(before, behind)):
         return np.nan
     return top + 0.5 * (before - behind) / (before - 2 * here + behind)

@@ -227,6 +227,7 @@ def _estimate_figures(tallies: Sequence[UtteranceStatistics]) -> dict[str, Inter
         rows["free_cost"] = weights @ free / weights.sum(axis=1)
     counts = np.tensordot(weights, np.array([tally.counts for tally in tallies]), axes=1)
     for at, name in enumerate(("closure", "false_closure", "labiodental", "rounding")):
+        # a draw of utterances may hold no opportunity
         rows[name] = counts[:, at, 0] / np.maximum(counts[:, at, 1], 1.0)
     return {name: interval_of(rows[name]) for name, _, _ in FIGURES if name in rows}
 

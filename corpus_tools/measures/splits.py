@@ -122,6 +122,7 @@ def check_unknown(talker: Talker, observations: Sequence[Observation]) -> tuple[
 
 
 def _sort_by_name(observations: Sequence[Observation]) -> list[Observation]:
+    # a seed gives one split, in whatever order recordings were read
     return sorted(observations, key=lambda observation: observation.name)
 
 

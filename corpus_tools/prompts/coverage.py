@@ -96,6 +96,7 @@ def count_units(sentences: Iterable[Units]) -> RunningText:
     for units in sentences:
         phones.update(units.phones)
         triphones.update(units.triphones)
+    # sorted, so that ties are chosen alike on each machine
     return RunningText(dict(sorted(phones.items())), dict(sorted(triphones.items())))
 
 
@@ -117,6 +118,7 @@ def select_sentences(candidates: Sequence[Units], running: RunningText) -> Itera
     while heap:
         gain, at, measured = heapq.heappop(heap)
         if measured != n_selected:
+            # lazy greedy (Minoux 1978): a gain only falls; who is best of the heap is computed again
             heapq.heappush(heap, (-_gain(candidates[at], seen, weights), at, n_selected))
             continue
         if not gain:

@@ -17,6 +17,7 @@ from lexicon.values.files import read_text
 
 POOL = Path(__file__).with_name("prompts_en_us.tsv")  # written by `write_prompts`, best first
 UNIT_COUNTS = Path(__file__).with_name("running_text_en_us.tsv")
+# of a recording
 MAX_MINUTES = 60.0
 MAX_CANDIDATES = 20_000  # sentences of a text that are compared, evenly over it
 _MINUTES, _N_PROMPTS = (0.0, 2.0, 5.0, 10.0, 60.0), (0.0, 25.0, 60.0, 120.0, 720.0)  # about 5 s a prompt

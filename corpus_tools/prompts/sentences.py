@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from lexicon.chunks import split_chunks
 
+# of a prompt
 MIN_WORDS, MAX_WORDS = 5, 12
 LONGEST_SENTENCE = 400  # characters; longer ones are cut, and have too many words anyway
 _WORD = re.compile(r"[^\W\d_]+(?:['’-][^\W\d_]+)*")

@@ -99,6 +99,7 @@ def look_up_pronunciations(word: str, *, is_letter: bool) -> Pronunciations:
         found = [arpabet_segments(names) for names in LETTER_NAMES[word.lower()]]
     else:
         found = []
+        # CMUdict numbers further pronunciations: read, read(2), read(3)
         while variant := cmudict_lookup(word if not found else f"{word}({len(found) + 1})"):
             found.append(variant)
     if not found:
@@ -146,4 +147,5 @@ def _recordings_in_video(video: Path) -> Iterator[Recording]:
 
 
 def _list_videos(folder: Path) -> list[Path]:
+    # sorted: folders list their files in any order
     return sorted(path for path in folder.iterdir() if path.suffix.lower() in VIDEO_SUFFIXES)

@@ -206,6 +206,7 @@ def sound_measures(sound: Waveform, phones: PhoneSequence) -> dict[str, float]:
     spoken, quiet = power[is_speech], power[~is_speech]
     clipped = float((np.abs(blocks[is_speech]) >= CLIPPED_LEVEL).mean()) if is_speech.any() else 0.0
     if not len(quiet) or not len(spoken):
+        # without a pause there is no noise to measure
         return {"clipped": clipped, "snr_db": np.inf}
     noise = max(float(np.quantile(quiet, NOISE_QUANTILE)), 1e-10)
     return {"clipped": clipped, "snr_db": float(10 * np.log10(max(float(spoken.mean()), 1e-10) / noise))}

@@ -124,6 +124,7 @@ def observe(
         tuple(
             sorted((item for item in every if isinstance(item, Observation)), key=lambda observation: observation.name)
         ),
+        # workers end in any order
         tuple(sorted((item for item in every if isinstance(item, Refusal)), key=lambda refusal: refusal.name)),
         tuple(sorted(warnings, key=lambda warning: warning.name)),
     )
@@ -303,6 +304,7 @@ def recordings_to_check(recordings: Path, transcript: str | Path | None = None) 
 def _worst(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """The first refusal of each code, then the first warning of each other code."""
     found: dict[str, Finding] = {}
+    # refusals first: of one code the worse finding stays
     for finding in sorted(findings, key=lambda found: found.severity != REFUSAL):
         found.setdefault(finding.code, finding)
     return tuple(found.values())

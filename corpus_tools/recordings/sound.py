@@ -21,6 +21,7 @@ from tts2face.storage.tensors import write_tensors
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 
+# seconds
 LEVEL_WINDOW_S = 0.02
 ALIGNMENT_KIND = "alignment"
 ALIGNMENT_VERSION = 7  # increased when alignment gives other edges, which invalidates cached ones

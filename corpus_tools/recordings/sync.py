@@ -20,6 +20,7 @@ from lexicon.errors import DataError
 from tts2face.models.landmarks import lip_opening
 
 MAX_LAG_S = 0.5  # lags between minus and plus this are compared
+# seconds between the lags that are tried
 LAG_STEP_S = 0.01
 LAGS_S = np.arange(-round(MAX_LAG_S / LAG_STEP_S), round(MAX_LAG_S / LAG_STEP_S) + 1) * LAG_STEP_S
 MIN_FRAMES = 25
@@ -165,6 +166,7 @@ def _peak_lag(curve: NDArray[np.float64]) -> float:
     if not curve.any():
         return 0.0
     at, offset = int(curve.argmax()), 0.0
+    # a parabola through the peak and its neighbours
     if 0 < at < len(LAGS_S) - 1:
         before, peak, behind = curve[at - 1 : at + 2]
         bend = before - 2 * peak + behind

@@ -19,6 +19,7 @@ TEXT_SUFFIX = ".txt"
 def read_textgrid(path: Path) -> tuple[SpokenCue, ...]:
     """The intervals of the first tier whose name contains "word", or else of the first interval tier."""
     items = _split_items(read_text(path))
+    # also of the short form, which has the same items without names
     if list(items[:2]) != ["ooTextFile", "TextGrid"]:
         raise DataError(f"{path} is not a TextGrid; save it with Praat as text")
     try:
@@ -38,6 +39,7 @@ def _split_items(text: str) -> list[str | float]:
     items: list[str | float] = []
     for match in _TOKEN.finditer(text):
         if match["label"] is not None:
+            # Praat doubles quotes within texts
             items.append(match["label"].replace('""', '"'))
         elif match["number"] is not None:
             items.append(float(match["number"]))
@@ -74,6 +76,7 @@ def read_word_times(path: Path) -> tuple[SpokenCue, ...]:
             continue
         if len(fields) != 3 or not (fields[0].isdecimal() and fields[1].isdecimal()):
             raise DataError(f"{path}, line {number}: {line[:60]!r} is not start, end and word; correct it")
+        # GRID's transcripts list silences as words
         if fields[2].lower() not in SILENT_LABELS:
             cues.append(SpokenCue(int(fields[0]) / UNITS_PER_S, int(fields[1]) / UNITS_PER_S, fields[2]))
     if not cues:

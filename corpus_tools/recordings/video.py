@@ -25,6 +25,7 @@ TRACKING_KIND = "tracking"
 LIGHT_KIND = "light"
 LIGHT_VERSION = 1  # increased when the measures of light change
 TRACKING_VERSION = 2  # increased when tracking gives other values, which invalidates cached ones
+# of the faces of a frame
 NOT_COUNTED = -1
 ShareCallback = Callable[[float], None]  # called with the finished share of a video
 
@@ -132,6 +133,7 @@ def content_key(path: Path) -> str:
         The path is no ordinary file.
     """
     check_regular_file(path)
+    # by content: a renamed or moved video is not tracked again
     return content_hash(path)[:32]
 
 

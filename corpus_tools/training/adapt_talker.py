@@ -154,6 +154,7 @@ def lip_gain(model: ShapeModel, gain: tuple[float, float]) -> FloatArray:
 def map_inventory(base: Base, observations: Sequence[Observation]) -> tuple[str, ...]:
     """Phones of a map: those of English, of the base and of the recordings."""
     spoken = {label for observation in observations for label in observation.phones.phones}
+    # sorted: sets have another order in each process
     return tuple(sorted({*ARPABET.values(), SILENCE, *base.exemplars.tokens.inventory, *spoken}))
 
 
@@ -221,6 +222,7 @@ def _carry_utterance(utterance: Utterance, base: Talker, model: ShapeModel, mapp
     shape = np.repeat(model.rest[None].astype(np.float64), len(times), axis=0)
     shape[:, : model.n_speech] = speech
     head = interpolate_columns(utterance.head, before, times)
+    # shifts of the head are in mm, of another head
     head[:, 3:] *= face_size(model) / face_size(base.model)
     intensity = np.interp(times, before, utterance.intensity)
     return Utterance(

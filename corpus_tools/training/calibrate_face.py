@@ -137,6 +137,7 @@ def symmetrise_score_map(score_map: ScoreMap, mirror: list[int]) -> ScoreMap:
 
 def mirrored_name(name: str) -> str:
     """Name of a shape on the other half of the face; the same for shapes of both halves."""
+    # the face is made symmetric: each pose is learnt with its mirror image
     if "Left" in name:
         return name.replace("Left", "Right")
     return name.replace("Right", "Left")

@@ -60,6 +60,7 @@ class Fixations:
         places = [place]
         for at in range(1, len(self.start)):
             gap = np.linalg.norm(self.place[at] - place)
+            # smaller shifts are those of microsaccades, or noise
             if self.segment[at] == self.segment[at - 1] and gap < LEAST_JUMP_DEG:
                 weight += self.duration[at]
                 place = place + (self.place[at] - place) * self.duration[at] / weight

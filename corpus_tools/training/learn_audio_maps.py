@@ -94,6 +94,7 @@ def learn_audio_maps(
 def _read_sounds(observations: Sequence[Observation]) -> Iterator[tuple[Observation, Waveform]]:
     """Each utterance with the sound of its video; each video is read once."""
     last: tuple[object, Waveform] | None = None
+    # by video: the sound of one is read once
     for observation in sorted(observations, key=lambda recorded: str(recorded.video)):
         if last is None or last[0] != observation.video:
             last = observation.video, read_sound(observation.video, FEATURE_RATE)

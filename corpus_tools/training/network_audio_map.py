@@ -19,6 +19,7 @@ from tts2face.models.audio_map import AudioMap
 
 VALIDATION_SHARE = 0.1  # of the utterances, for early stopping
 PATIENCE = 30  # steps without a lower validation error
+# of the optimiser; early stopping ends it sooner
 MAX_STEPS = 600
 Layers = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 

@@ -17,8 +17,10 @@ from tts2face.numeric.kernels import kernel
 BATCH = 128  # samples per step
 LEARNING_RATE = 1e-3  # Kingma and Ba 2015
 DECAY_FROM = 0.3  # share of the epochs after which the learning rate falls linearly to `FINAL_RATE` of it
+# of the learning rate, in the last epoch
 FINAL_RATE = 0.02
 MOMENTS = (0.9, 0.999)  # decay of the moments of the gradient (Kingma and Ba 2015)
+# Kingma and Ba 2015
 EPSILON = 1e-8
 POSITION_SPREAD = 0.3  # of the initial weights of the position within the phone: seconds and a share, all below 1
 Weights = tuple[Float32Array, Float32Array, Float32Array, Float32Array, Float32Array, Float32Array, Float32Array]

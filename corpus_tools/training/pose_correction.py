@@ -73,6 +73,7 @@ def fit_pose_correction(observations: Sequence[PosedLandmarks]) -> PoseCorrectio
 
 def _keep_lip_contact(offsets: FloatArray) -> FloatArray:
     """Offsets averaged over opposite points of the inner lips, so that lip contact does not depend on the pose."""
+    # facing points have a common offset: separate ones lose 3 of 100 contacts (decision 012)
     kept = offsets.copy()
     upper, lower = list(INNER_LIP_UPPER), list(INNER_LIP_LOWER)
     kept[:, upper] = kept[:, lower] = (offsets[:, upper] + offsets[:, lower]) / 2

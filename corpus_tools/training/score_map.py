@@ -12,10 +12,12 @@ from tts2face.numeric.arrays import FloatArray
 from tts2face.types import Trajectory
 from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 
+# of the hidden layer
 N_UNITS = 24
 DECAY = 1e-3  # of the weights of both layers: steep maps are hard to invert
 N_EPOCHS, BATCH = 40, 128
 LEARNING_RATE = 0.004  # of Adam (Kingma and Ba 2015), falling linearly to 0
+# decay of the moments of the gradient (Kingma and Ba 2015)
 MOMENTS = (0.9, 0.999)
 MAX_LOGIT = 6.0  # larger logits are scores of 0 or 1
 LOGIT_SHARE = 0.02  # of the squared error of logits in the loss; the other part is that of scores
