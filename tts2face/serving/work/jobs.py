@@ -22,13 +22,11 @@ INPUT, OUTPUT = "input", "output"  # roles of files
 # ever (workers of earlier versions write another): whether it waits or runs is what DBOS says, and a begun job whose
 # workflow has ended without it counts as running until `JobRunner.end_abandoned`.
 IS_OPEN = "finished IS NULL"  # condition of a query
-_STATE = f"""CASE WHEN NOT {IS_OPEN} THEN state
-    WHEN EXISTS (SELECT 1 FROM {{workflows}} WHERE workflow_uuid = tts2face_jobs.id AND (status = 'PENDING'
-        OR started > 0 AND status NOT IN ('ENQUEUED', 'DELAYED'))) THEN 'running' ELSE 'waiting' END"""
-# Of thousands that wait, those that may run are few: they are read by indexes, in this order of tables (CROSS JOIN).
-_RUNNING = f"""(SELECT id AS begun FROM tts2face_jobs WHERE {IS_OPEN} AND started > 0 UNION
-    SELECT workflow_uuid FROM {{workflows}} WHERE status = 'PENDING' AND name = '{JOB_WORKFLOW}') AS may_run
-    CROSS JOIN tts2face_jobs WHERE id = begun AND {IS_OPEN} AND {_STATE} = 'running'"""
+# Of thousands that wait, those that run are few, and found by indexes; that of an expression has PostgreSQL count them.
+_HAS_BEGUN = "coalesce(started, 0.0)"
+_RUNNING = f"""SELECT workflow_uuid AS running FROM {{workflows}} WHERE status = 'PENDING' AND name = '{JOB_WORKFLOW}'
+    UNION SELECT id FROM tts2face_jobs WHERE {IS_OPEN} AND {_HAS_BEGUN} > 0.0
+    AND (SELECT status FROM {{workflows}} WHERE workflow_uuid = id) NOT IN ('ENQUEUED', 'DELAYED')"""
 _TABLES = (
     """CREATE TABLE IF NOT EXISTS tts2face_jobs (
     id VARCHAR(64) PRIMARY KEY, key_name VARCHAR(200) NOT NULL, kind VARCHAR(40) NOT NULL, state VARCHAR(10) NOT NULL,
@@ -52,7 +50,7 @@ _TABLES = (
     "CREATE INDEX IF NOT EXISTS tts2face_jobs_by_key_state ON tts2face_jobs (key_name, state, created)",
     f"CREATE INDEX IF NOT EXISTS tts2face_jobs_open ON tts2face_jobs (created) WHERE {IS_OPEN}",
     f"CREATE INDEX IF NOT EXISTS tts2face_jobs_open_by_key ON tts2face_jobs (key_name, created) WHERE {IS_OPEN}",
-    f"CREATE INDEX IF NOT EXISTS tts2face_jobs_begun ON tts2face_jobs (started) WHERE {IS_OPEN}",
+    f"CREATE INDEX IF NOT EXISTS tts2face_jobs_begun ON tts2face_jobs ({_HAS_BEGUN}) WHERE {IS_OPEN}",
     "CREATE INDEX IF NOT EXISTS tts2face_job_files_by_hash ON tts2face_job_files (sha256)",
     "CREATE INDEX IF NOT EXISTS tts2face_job_segments_by_address ON tts2face_job_segments (address)",
 )
@@ -170,13 +168,13 @@ class JobTable:
 
     def __init__(self, database: JobDatabase) -> None:
         self.database = database
-        workflows = WORKFLOWS[database.kind]
-        self._state = _STATE.format(workflows=workflows)
-        # Tables and conditions of the jobs of a state; None: of all jobs.
+        running = _RUNNING.format(workflows=WORKFLOWS[database.kind])
+        self._state = f"CASE WHEN NOT {IS_OPEN} THEN state WHEN id IN ({running}) THEN 'running' ELSE 'waiting' END"
+        # Tables and conditions of the jobs of a state; None: of all. CROSS JOIN has SQLite start from those that run.
         self._jobs: dict[str | None, str] = {
             None: "tts2face_jobs WHERE 1 = 1",
-            WAITING: f"tts2face_jobs WHERE {IS_OPEN} AND {self._state} = 'waiting'",
-            RUNNING: _RUNNING.format(workflows=workflows),
+            WAITING: f"tts2face_jobs WHERE {IS_OPEN} AND id NOT IN ({running})",
+            RUNNING: f"({running}) AS found CROSS JOIN tts2face_jobs WHERE id = running AND {IS_OPEN}",
             **{ending: f"tts2face_jobs WHERE state = '{ending}'" for ending in ENDINGS},
         }
 
