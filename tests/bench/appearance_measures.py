@@ -1,4 +1,4 @@
-"""Accuracy of appearance models on held-out recordings (T07 section 2)."""
+"""Accuracy of appearance models on held-out recordings."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -12,7 +12,7 @@ from corpus_tools.appearance.procrustes import align_shapes, apply_similarities,
 from corpus_tools.appearance.train import LearnedAppearance
 from corpus_tools.appearance.videos import AppearanceRecording
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.recordings.sync import LIP_LEAD_S, estimate_sync
+from corpus_tools.recordings.sync import estimate_sync_by_video
 from corpus_tools.training.train_talker import CLOSED_GAP
 from tts2face.models.landmarks import (
     INNER_LIP_LOWER,
@@ -34,7 +34,7 @@ class AppearanceMeasures:
     """Figures of shape and texture; pixels are those of the video, ``held_out`` was not used for training.
 
     ``shape_modes``, ``texture_modes`` and ``mouth_modes`` explain 95 and 99 % of the variance (0: more than were kept).
-    ``lag_ms`` is by how much the loudness follows the opening of the lips where both agree best.
+    ``lag_ms`` is by how much the sound follows the lips that a shipped talker has for its phones.
     """
 
     shape_modes: tuple[int, int]
@@ -73,7 +73,7 @@ def measure_appearance(
         held_out_texture_db=texture,
         held_out_mouth_db=mouth,
         closed=bilabial_closure_share(observations),
-        lag_ms=1000 * (estimate_sync(observations).lag + LIP_LEAD_S),
+        lag_ms=sound_lag_ms(observations),
     )
 
 
@@ -151,6 +151,13 @@ def bilabial_closure_share(observations: Sequence[Observation]) -> float:
             if phone in BILABIALS and here.any():
                 least.append(relative[here].min())
     return float(np.mean(np.array(least) < CLOSED_GAP)) if least else float("nan")
+
+
+def sound_lag_ms(observations: Sequence[Observation]) -> float:
+    """Mean lag of the sound of the videos, by their seconds."""
+    found = list(estimate_sync_by_video(observations).values())
+    seconds = [video.seconds for video in found]
+    return float(1000 * np.average([video.lag for video in found], weights=seconds)) if sum(seconds) else float("nan")
 
 
 def n_modes_for_variance(explained: NDArray[np.float64]) -> tuple[int, int]:

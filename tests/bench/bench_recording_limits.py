@@ -23,10 +23,10 @@ from corpus_tools.measures.methods import build_methods
 from corpus_tools.measures.reference import LipCurves
 from corpus_tools.recordings.expected_opening import shipped_talker_opening
 from corpus_tools.recordings.folder import Recording, find_recordings, pronounce_recording
-from corpus_tools.recordings.limits import check_limits, confidence_measure, landmark_measures, sound_measures
+from corpus_tools.recordings.limits import check_limits, landmark_measures, sound_measures
 from corpus_tools.recordings.observation import Observation, trim_to_picture
 from corpus_tools.recordings.observe import observe
-from corpus_tools.recordings.sound import SOUND_RATE, AlignedSpeech, suppress_noise
+from corpus_tools.recordings.sound import SOUND_RATE, AlignedSpeech
 from corpus_tools.recordings.sync import LAGS_S, NEAR_S, lag_correlations
 from corpus_tools.run_options import RunOptions
 from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA
@@ -142,10 +142,11 @@ def align_damaged(
     """The observation with phones aligned to the damaged sound, and its measures."""
     samples = np.clip(damage(read_sound(recording.video, SOUND_RATE).samples.copy()), -1, 1).astype(np.float32)
     sound = Waveform(samples, SOUND_RATE)
-    found = aligner.align(suppress_noise(sound), pronounce_recording(recording) or ())
-    aligned = AlignedSpeech(found.phones, found.words, found.confidence, sound, is_recognised=False)
+    found = aligner.align(sound, pronounce_recording(recording) or (), may_lack=True)
+    fit = found.fit.share
+    aligned = AlignedSpeech(found.phones, found.words, fit, found.mismatches, sound, is_recognised=False)
     phones, words = trim_to_picture(aligned, 0.0, len(seen.landmarks) / seen.fps)
-    measures = {"confidence": found.confidence, **sound_measures(sound, found.phones)}
+    measures = {"fit": fit, **sound_measures(sound, found.phones)}
     return replace(seen, phones=phones, words=words), measures
 
 
@@ -187,15 +188,14 @@ def sound_rows(recordings: dict[str, Recording], seen: Sequence[Observation]) ->
                 again, measures = align_damaged(recordings[one.name], one, damage, aligner)
                 learnt.append(again)
                 measured.append(measures)
-                fit = confidence_measure(measures["confidence"], measures["snr_db"], is_recognised=False)
-                check_limits({name: value for name, value in measures.items() if name != "confidence"} | fit)
+                check_limits(measures)
             except DataError:
                 refused += 1
         curves = np.array([lag_correlations(one, shipped_talker_opening) for one in learnt])
         near = curves[:, np.abs(LAGS_S) <= NEAR_S].max(axis=1)
         yield (
             f"| {name} | {quantiles([one['snr_db'] for one in measured], 0)} "
-            f"| {quantiles([one['confidence'] for one in measured], 0)} "
+            f"| {quantiles([one['fit'] for one in measured], 2)} "
             f"| {np.mean([one['clipped'] for one in measured]):.1%} | {quantiles(near, 2)} "
             f"| {curves.mean(axis=0).max():.2f} | {refused} of {len(seen)} "
             f"| {effect(learnt, seen) if len(seen) > MIN_FOR_TALKER else ''} |"
