@@ -246,7 +246,7 @@ def spoken_of(text: str, language: str) -> list[list[str]]:
     """Words of each sentence of a text that espeak-ng speaks."""
     models = SpeechModels(lambda _, code: load_voice("espeak", code))
     found = speak_sentences(prepare(Request(text=text, language=language, voice="espeak")), models)
-    return [[word.text for word in spoken.speech.words] for spoken, _, _ in found]
+    return [[word.text for word in spoken.speech.words] for spoken in (part.spoken for part in found)]
 
 
 def test_a_part_without_words_for_the_voice_is_left_out() -> None:

@@ -35,10 +35,9 @@ STEP_S, CUE_RATE = 0.01, 16_000  # s, and Hz of the sound in which cues are look
 CELL_S, MARGIN = 9.0, 0.15
 NOD_SHARE, RAISE_SHARE = 0.75, 0.4  # of responses; one without a nod raises the brows
 NOD_SIZES, RAISE_SIZES = (0.35, 0.8), (0.4, 0.9)
-# share of nods that a smaller one follows, and after how long
-SECOND_NOD = 0.5
-SECOND_S = 0.42
-SECOND_SIZE = 0.6
+SECOND_NOD = 0.5  # share of nods that a smaller one follows
+SECOND_S = 0.42  # after the first
+SECOND_SIZE = 0.6  # of the first
 LASTS_S = 1.0  # a response
 KEPT_S, LOOK_S = 5.0, 0.4  # of arriving sound in which cues are looked for (20 ms), and between two looks
 

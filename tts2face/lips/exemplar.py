@@ -15,6 +15,7 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.lips import blending
 from tts2face.lips.contacts import ChosenExemplars, LipGap, enforce_contacts, find_contacts, shown_contact
 from tts2face.lips.options import ExcludedToken, SynthesisOptions
+from tts2face.lips.rest import is_pause, rest_weights
 from tts2face.lips.similarity import PhoneSimilarity, phone_similarity, token_samples
 from tts2face.lips.targets import Targets, build_targets, target_phones
 from tts2face.lips.token_search import (
@@ -34,15 +35,10 @@ from tts2face.numeric.arrays import interpolate_columns, smoothstep
 from tts2face.processes.shared import shared
 from tts2face.types import Trajectory, YieldTurn, keep_on
 
-RELEASE_FROM_S = 0.08  # distance from speech at which the transition to rest begins
-REST_FROM_S = 0.20  # distance from speech at which the face is at rest; recorded lips settle within 0.2 s
-# Shorter silence between phones is a pause, in which lips stay half open as the networks have learnt (decision 190).
-BREAK_S = 2.0
 NETWORK_HZ = 50.0  # rate at which the networks are evaluated; their input changes in steps of 40 ms
 # Distances of contexts (largest score less the best token's) between which the networks take over from the exemplars;
 # learnt on held-out words and on held-out tracks of another speaker (docs/decisions/039-phone-networks.md).
 NEAR_CONTEXT, FAR_CONTEXT = 0.2, 1.1
-MIN_EASE_S = 0.06  # transition from and to rest if a clip begins or ends within speech
 DEFAULT_OPTIONS = SynthesisOptions()
 N_BLENDED_APPEARANCES = 3  # exemplars; more of them blur teeth and tongue (docs/decisions/032-own-face.md)
 MAX_START_CHANGE_S = 0.001  # times of tokens are written with four decimals
@@ -265,41 +261,6 @@ def interpolated_farness(targets: Targets, farness: NDArray[np.float64], n_insta
     """(n,) farness (N,) of targets at the instants of the clock, linear between the middles of the targets."""
     middles = targets.spans[:, 1:3].mean(axis=1)
     return np.interp(np.arange(n_instants) / blending.CLOCK_HZ, middles, farness).astype(np.float32)
-
-
-def rest_weights(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(T,) weights of the rest pose at T times in seconds: 0 in speech, 1 in silence and at both ends."""
-    starts, ends, next_start = _speech_around(phones, times)
-    if not len(starts):
-        return np.ones(len(times))
-    ahead = np.append(starts, np.inf)[next_start] - times
-    behind = times - np.concatenate([[-np.inf], ends])[next_start]
-    distance = np.minimum(ahead, np.maximum(behind, 0.0))
-    pull = smoothstep(distance, RELEASE_FROM_S, REST_FROM_S)
-    last = times[-1]
-    onset = np.clip(starts[0], MIN_EASE_S, REST_FROM_S)
-    offset = np.clip(last - ends[-1], MIN_EASE_S, REST_FROM_S)
-    if onset < REST_FROM_S:
-        pull = np.maximum(pull, 1.0 - smoothstep(times, 0.0, onset))
-    if offset < REST_FROM_S:
-        pull = np.maximum(pull, 1.0 - smoothstep(last - times, 0.0, offset))
-    return pull
-
-
-def is_pause(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(T,) whether T times in seconds lie in silence between phones that is shorter than `BREAK_S`."""
-    starts, ends, next_start = _speech_around(phones, times)
-    onsets, ended = np.append(starts, np.inf)[next_start], np.concatenate([[-np.inf], ends])[next_start]
-    return np.asarray((ended <= times) & (onsets - ended < BREAK_S))
-
-
-def _speech_around(
-    phones: PhoneSequence, times: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Starts and ends (N,) of the phones but silence, and the number (T,) of them that have begun at T times."""
-    sounding = np.array([label != SILENCE for label in phones.phones])
-    starts = phones.edges[:-1][sounding]
-    return starts, phones.edges[1:][sounding], np.searchsorted(starts, times, side="right")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

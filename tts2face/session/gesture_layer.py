@@ -24,7 +24,7 @@ from tts2face.gestures.noise import NoiseStream
 from tts2face.gestures.stream import GestureFields, GestureStream, GestureValues
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import Palette
-from tts2face.request import FIELDS
+from tts2face.request import FIELDS, OPTIONS, SOURCE_OPTIONS
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.edits import ChannelEdits
 from tts2face.session.prepared import PreparedRequest, marked_styles
@@ -37,6 +37,12 @@ REACH_S = 2.0  # s around a piece within which elements of the timeline affect i
 TURN_REACH_S = 0.6  # before a phrase within which the face listened, where a turn begins
 STATE_BYTES = 200_000  # of a stream between two pieces
 POLL_S = 0.005  # between turns of other requests, while gestures are drawn
+# Options that the key of a piece has by what they change: its sound, its times, its timeline or its lips.
+KEYED_OTHERWISE = {
+    *SOURCE_OPTIONS, "language", "dictionary", "synthesis", "context", "exemplars", "style", "gain", "expression",
+    "timeline", "gaze",
+}  # fmt: skip
+KEYED = tuple(name for name in OPTIONS if name not in KEYED_OTHERWISE)
 Drawn = tuple[GestureValues, GestureStream | NoiseStream]  # gestures of a piece, and the stream for the piece after it
 
 
@@ -104,7 +110,7 @@ class GestureLayer:
         face.check_gains(self._requested.gains.factors)
         self.edits = ChannelEdits(self._requested.edits, face)
         self._body = Body(face.channels, request.seed)
-        self._seed, self._options = request.seed, (request.seed, request.gestures, request.pitch)
+        self._seed, self._options = request.seed, [getattr(request, name) for name in KEYED]
         self._has_microsaccades = method.has_microsaccades
         self._thread = ThreadPoolExecutor(1, "gestures")
         # Building the fields takes 0.5 s, in parallel with loading the voice.

@@ -7,6 +7,7 @@ from fractions import Fraction
 from functools import lru_cache
 from itertools import pairwise
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -113,6 +114,22 @@ class SpokenSentence:
     timeline: Timeline
     marks: tuple[MarkTime, ...]
     sound: Waveform
+
+
+class SpokenPart(NamedTuple):
+    """A spoken sentence with its steps of progress and its written text, or a part of a silence, which has no text."""
+
+    spoken: SpokenSentence
+    n_steps: int
+    text: str = ""
+
+
+class Shortened(NamedTuple):
+    """A sentence without its long silences, and their seconds before and after it."""
+
+    sentence: Sentence
+    before_s: float
+    after_s: float
 
 
 def speak_sentence(
@@ -246,8 +263,8 @@ def _join_sentence(speeches: Sequence[Speech], sentence: Sentence, rate: int) ->
 
 def silent_sentences(
     seconds: float, fps: Fraction, n_steps: int, timeline: Timeline, rate: int = IDLE_RATE
-) -> Iterator[tuple[SpokenSentence, int, str]]:
-    """Yield silence in parts of up to `IDLE_PART_S` that end on frames, each with its progress steps and no text.
+) -> Iterator[SpokenPart]:
+    """Yield silence in parts of up to `IDLE_PART_S` that end on frames.
 
     `timeline` is that of the whole silence, `rate` that of the sound in Hz.
     """
@@ -258,11 +275,12 @@ def silent_sentences(
         silence = silent_frames(first, last, rate, fps)
         start = float(first / fps)
         end = float(last / fps)
-        yield SpokenSentence(silence, timeline.restrict(start, end).shift(-start), (), silence.waveform), steps, ""
+        spoken = SpokenSentence(silence, timeline.restrict(start, end).shift(-start), (), silence.waveform)
+        yield SpokenPart(spoken, steps)
 
 
-def without_long_silence(sentence: Sentence) -> tuple[Sentence, float, float]:
-    """A sentence with at most `MAX_PAUSE_S` of silence at either end, and the seconds beyond it before and after.
+def without_long_silence(sentence: Sentence) -> Shortened:
+    """A sentence with at most `MAX_PAUSE_S` of silence at either end.
 
     Pauses between words add up only where nothing but punctuation is between them.
     """
@@ -270,23 +288,22 @@ def without_long_silence(sentence: Sentence) -> tuple[Sentence, float, float]:
     before = max(sentence.leading_pause - MAX_PAUSE_S, 0.0)
     after = max((last.pause or 0.0) - MAX_PAUSE_S, 0.0)
     if not (before or after):
-        return sentence, 0.0, 0.0
+        return Shortened(sentence, 0.0, 0.0)
     kept = replace(last, pause=None if last.pause is None else last.pause - after)
     shorter = replace(sentence, utterances=(*others, kept), leading_pause=sentence.leading_pause - before)
-    return shorter, before, after
+    return Shortened(shorter, before, after)
 
 
-def long_silence(
-    seconds: float, fps: Fraction, timeline: Timeline, rate: int
-) -> Iterator[tuple[SpokenSentence, int, str]]:
+def long_silence(seconds: float, fps: Fraction, timeline: Timeline, rate: int) -> Iterator[SpokenPart]:
     """`silent_sentences` of some seconds within a text, if there are any, without progress of their own.
 
     The styles without an end in the `timeline` of the sentence before it go on.
     """
     timeline = Timeline(spans=tuple(replace(span, start=0.0) for span in timeline.spans if span.end == math.inf))
-    for spoken, n_steps, text in silent_sentences(seconds, fps, 0, timeline, rate) if seconds > 0.0 else ():
-        sound = spoken.sound.part(0, len(spoken.sound.samples) - 1)  # padded: its frames may have one sample less here
-        yield replace(spoken, speech=Speech.without_phones(sound), sound=sound), n_steps, text
+    for part in silent_sentences(seconds, fps, 0, timeline, rate) if seconds > 0.0 else ():
+        silence = part.spoken.sound
+        sound = silence.part(0, len(silence.samples) - 1)  # padded: its frames may have one sample less here
+        yield part._replace(spoken=replace(part.spoken, speech=Speech.without_phones(sound), sound=sound))
 
 
 def resolve_marks(

@@ -22,6 +22,8 @@ from tts2face.session.speech import (
     NO_DELIVERIES,
     Deliveries,
     MarkTime,
+    Shortened,
+    SpokenPart,
     SpokenSentence,
     Voices,
     long_silence,
@@ -143,7 +145,8 @@ def measure_speech(prepared: PreparedRequest, models: SpeechModels) -> SpeechSpa
     start = 0.0
     end = 0.0
     total = 0.0
-    for spoken, _, _ in speak_sentences(prepared, models):
+    for part in speak_sentences(prepared, models):
+        spoken = part.spoken
         at, phones = first_frame / fps, spoken.speech.phones
         voiced = [number for number, phone in enumerate(phones.phones) if phone != SILENCE]
         if voiced:
@@ -233,11 +236,8 @@ def after_listening(spoken: Spoken) -> Spoken:
 
 def speak_sentences(
     prepared: PreparedRequest, models: SpeechModels, *, has_phones: bool = True
-) -> Iterator[tuple[SpokenSentence, int, str]]:
-    """Spoken sentences with numbers of characters and texts, or parts of idle animation with steps and no text.
-
-    Of an excerpt there is one sentence.
-    """
+) -> Iterator[SpokenPart]:
+    """Spoken sentences, whose steps are characters, or parts of idle animation; of an excerpt there is one."""
     if prepared.excerpt is not None:
         yield _speak_excerpt(prepared, prepared.excerpt, models)
         return
@@ -271,8 +271,7 @@ def speak_sentences(
             lambda made: made.sound.samples.nbytes + made.speech.waveform.samples.nbytes,
         )
 
-    for whole, found in _spoken(prepared.sentences(), lambda whole: speak(without_long_silence(whole)[0])):
-        sentence, before_s, after_s = without_long_silence(whole)
+    for (sentence, before_s, after_s), found in _spoken(map(without_long_silence, prepared.sentences()), speak):
         text = " ".join(phrase.source for phrase in sentence.utterances)
         yield from long_silence(before_s, fps, Timeline(), voice.sample_rate)
         spoken = found
@@ -280,7 +279,7 @@ def speak_sentences(
             phones = prepared.corrected(spoken.speech.phones, text, said[text])
             spoken = replace(spoken, speech=replace(spoken.speech, phones=phones))
         said[text] += 1
-        yield spoken, sentence.n_characters, text
+        yield SpokenPart(spoken, sentence.n_characters, text)
         yield from long_silence(after_s, fps, spoken.timeline, voice.sample_rate)
 
 
@@ -290,9 +289,7 @@ def _require_voices(prepared: PreparedRequest) -> None:
         require_installed(name)
 
 
-def _speak_excerpt(
-    prepared: PreparedRequest, excerpt: Excerpt, models: SpeechModels
-) -> tuple[SpokenSentence, int, str]:
+def _speak_excerpt(prepared: PreparedRequest, excerpt: Excerpt, models: SpeechModels) -> SpokenPart:
     """The kept words of a text that is spoken as a whole, with the request's silence before them."""
     text = prepared.text
     places = [len(text_prefix(text.text, n)) for n in (excerpt.first, excerpt.last)]
@@ -302,7 +299,7 @@ def _speak_excerpt(
     ]
     whole = replace(text, marks=tuple(sorted((*text.marks, *marks), key=lambda mark: mark.at)))
     request = replace(prepared, text=whole, excerpt=None)
-    spoken = [sentence for sentence, _, _ in speak_sentences(request, models)]
+    spoken = [part.spoken for part in speak_sentences(request, models)]
     starts = np.cumsum([0.0, *(sentence.speech.waveform.duration for sentence in spoken)])
     times = {
         mark.name: mark.seconds + start for said, start in zip(spoken, starts, strict=False) for mark in said.marks
@@ -318,7 +315,7 @@ def _speak_excerpt(
     silence = [silent_speech(excerpt.silence, kept.waveform.rate)] if excerpt.silence > 0.0 else []
     kept, sound = (concatenate_speech([shift_start(part, cut), *silence]) for part in (kept, sound))
     written = text.text[places[0] : places[1]].strip()
-    return SpokenSentence(kept, Timeline(), (), sound.waveform), len(written), written
+    return SpokenPart(SpokenSentence(kept, Timeline(), (), sound.waveform), len(written), written)
 
 
 def _with_sound(spoken: SpokenSentence) -> Speech:
@@ -327,18 +324,18 @@ def _with_sound(spoken: SpokenSentence) -> Speech:
 
 
 def _spoken(
-    sentences: Iterator[Sentence], speak: Callable[[Sentence], SpokenSentence]
-) -> Iterator[tuple[Sentence, SpokenSentence]]:
+    sentences: Iterator[Shortened], speak: Callable[[Sentence], SpokenSentence]
+) -> Iterator[tuple[Shortened, SpokenSentence]]:
     """Sentences with their speech, but those in which the voice has nothing to say, unless these are all."""
     silent, n_spoken = None, 0
-    for sentence in sentences:
+    for shortened in sentences:
         try:
-            spoken = speak(sentence)
+            spoken = speak(shortened.sentence)
         except SilentTextError as error:
             silent = error
             continue
         n_spoken += 1
-        yield sentence, spoken
+        yield shortened, spoken
     # single signs are left out; a text of signs alone is an error
     if silent is not None and not n_spoken:
         raise silent

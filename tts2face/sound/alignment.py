@@ -36,10 +36,9 @@ SONORANTS = frozenset({"nasal", "lateral", "approximant", "tap", "trill"})
 PADDING_S, PADDING_LEVEL = 0.1, 3e-4
 USUAL_DELAY_S = 0.035  # of spikes behind the middles of phones
 LEAST_FIT = 0.6  # of a right text; docs/decisions/193-alignment.md
-# confidence of words and of all others, phones of those together
-LEFT_OUT = 0.1
-LEAST_SAID = 0.8
-N_LEFT_OUT = 6
+LEFT_OUT = 0.1  # confidence below which words are left out
+LEAST_SAID = 0.8  # mean confidence of all others; in noise it is lower, and no word is left out
+N_LEFT_OUT = 6  # phones at least of successive words that are left out
 N_UNWRITTEN = 5  # phones heard in a silence
 WORDS_SHOWN = 8
 

@@ -15,10 +15,10 @@ from tts2face.numeric.kernels import kernel
 BAND = 1500  # largest offset in phones between text and sound: two minutes of speech
 SUBSTITUTION_COST = 1.0
 GAP_COST = 0.7  # of an inserted or deleted phone; two of them cost more than a substitution
-# steps back: in both sequences, in the recognised one, in the written one
-MATCHED = 0
-INSERTED = 1
-DELETED = 2
+# Steps back through the table of costs:
+MATCHED = 0  # in both sequences
+INSERTED = 1  # in the recognised one
+DELETED = 2  # in the written one
 Phones = Sequence[str]
 
 

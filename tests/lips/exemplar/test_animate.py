@@ -11,15 +11,14 @@ from hypothesis import strategies as st
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.lips.exemplar import (
-    REST_FROM_S,
     ExemplarModel,
     build_exemplar_model,
-    rest_weights,
     select_tokens,
     speech_trajectory,
 )
 from tts2face.lips.explanation import explain_selection, explanation_json, explanation_text
 from tts2face.lips.options import METHOD_OPTIONS, THEOBALD_2007, SynthesisOptions
+from tts2face.lips.rest import REST_FROM_S, rest_weights
 from tts2face.lips.tokens import MAX_CONTEXT
 from tts2face.models.talker import Talker
 from tts2face.types import frame_count

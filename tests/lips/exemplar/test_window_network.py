@@ -8,7 +8,6 @@ import pytest
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.lips.exemplar import (
-    BREAK_S,
     FAR_CONTEXT,
     NEAR_CONTEXT,
     ExemplarModel,
@@ -18,6 +17,7 @@ from tts2face.lips.exemplar import (
     speech_trajectory,
 )
 from tts2face.lips.options import SynthesisOptions
+from tts2face.lips.rest import BREAK_S
 from tts2face.lips.targets import Targets, target_phones
 from tts2face.lips.token_search import context_weights
 from tts2face.models.phone_network import PhoneNetwork, window_features

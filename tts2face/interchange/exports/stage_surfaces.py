@@ -13,9 +13,8 @@ from tts2face.picture.materials import EYE_KIND, SKIN, STRANDS
 HIDDEN_SKY = 0.045  # share of the sky that a vertex hidden from all sides has in a light field
 HIDDEN_MM = 5.0  # error of hidden skin, which is removed
 SKIN_MM, MOUTH_MM = 0.8, 0.2  # error of skin that no channel moves, and the least one, of lips and lids
-# of eyeballs; teeth, gums and tongue; clothes
-EYE_MM = 0.3
-INSIDE_MM = 0.25
+EYE_MM = 0.3  # of eyeballs
+INSIDE_MM = 0.25  # of teeth, gums and tongue
 CLOTH_MM = 1.2
 CLOTH_LENGTH_MM = 150.0  # of a surface that is no part of the head
 LEAST_TRIANGLES = 200  # of a surface that is reduced

@@ -106,7 +106,7 @@ class FilePlan:
             self._warn(1, "no cue has words that are spoken; there is no clip of this file")
         elif per == "cue":
             for window in windows:
-                segment = self._speech(window, fills=False)
+                segment = self._speech(window)
                 if segment is not None:
                     part = f"-{window.part}" if window.part > 1 else ""
                     name = f"{self.name}-{window.cue.number:04d}{part}"
@@ -156,9 +156,9 @@ class FilePlan:
         margins = (MARGIN_S, MARGIN_S) if self.recordings.track else (self.base.lead, 0.0)
         before, after = (round(margin * fps) for margin in margins)
         windows = cue_windows(cues, fps, (before, after), is_spoken=self.speakers.is_spoken, rate_of=self._rate_of)
-        self._windows = {(window.cue.number, window.part): window for window in windows}
+        self._windows = {window.numbers: window for window in windows}
         self.n_silent = len(read.cues) - len({window.cue.number for window in windows})
-        self._following = {(window.cue.number, window.part): later for window, later in pairwise(windows)}
+        self._following = {window.numbers: later for window, later in pairwise(windows)}
         if self.base.options.audio is None:
             self._find_sentences(windows)
         return windows
@@ -206,7 +206,7 @@ class FilePlan:
             ]
             sentence = _Sentence(inside, tuple(texts))
             if last and self._is_spoken_as_one(sentence):
-                self._sentences |= {(window.cue.number, window.part): sentence for window in inside}
+                self._sentences |= {window.numbers: sentence for window in inside}
 
     def _who(self, window: Window) -> object:
         """Equal for lines of one speaker with equal settings."""
@@ -249,7 +249,7 @@ class FilePlan:
         at = begin
         for window in windows:
             parts += [(None, silence) for silence in self._silences(window, window.begin - at)]
-            speech = self._speech(window, fills=True, is_last=window is windows[-1])
+            speech = self._speech(window, is_last=window is windows[-1])
             if speech is None:
                 parts += [(None, silence) for silence in self._silences(window, window.slot_end - window.begin)]
             else:
@@ -285,10 +285,10 @@ class FilePlan:
         check_faces(output)
         return output
 
-    def _speech(self, window: Window, *, fills: bool, is_last: bool = False) -> Segment | None:
+    def _speech(self, window: Window, *, is_last: bool = False) -> Segment | None:
         """Segment of a cue, which may be the last one of its output; None with a warning if it cannot be spoken."""
         casting = self.speakers.casting(window.cue, window.part)
-        sentence = self._sentences.get((window.cue.number, window.part))
+        sentence = self._sentences.get(window.numbers)
         text = self._written(window.cue.text, window) if sentence is None else self._joined(sentence)
         request: dict[str, Any] = {**casting.request, "text": text}
         if self.base.options.audio is not None:
@@ -298,7 +298,7 @@ class FilePlan:
                 return None
             request = {name: value for name, value in request.items() if name not in ONLY_SPOKEN}
             request["audio"] = str(found)
-        segment = self._segment(window, request, _slot(window, fills=fills), fills=fills)
+        segment = self._segment(window, request, self._slot(window))
         segment = self._fitted(segment, window, sentence, is_last=is_last)
         try:
             prepare(Request(**request))
@@ -306,14 +306,14 @@ class FilePlan:
             self.n_silent += 1
             self._warn(window.cue.line, f"cue {window.cue.number} is silent: {wrong}")
             return None
-        self.segments[(window.cue.number, window.part)] = segment
+        self.segments[window.numbers] = segment
         return segment
 
     def _fitted(self, segment: Segment, window: Window, sentence: _Sentence | None, *, is_last: bool) -> Segment:
         """A segment of speech with what its fit needs: rates, the next cue, and the sentence around it."""
         options, rate = self.base.options, self.speakers.settings(window.cue, window.part).rate
         windows = (window,) if sentence is None else sentence.windows
-        following = self._following.get((windows[-1].cue.number, windows[-1].part))
+        following = self._following.get(windows[-1].numbers)
         overlap = 0.0 if is_last else options.max_overlap
         n_silent = max((window.next_begin or window.slot_end) - window.slot_end, 0)
         silence = float(n_silent / exact_rate(self.base.request.fps))
@@ -329,7 +329,7 @@ class FilePlan:
         if sentence is None:
             return segment
         parts = tuple(
-            Part(n_letters(text), own.end - own.begin, _slot(own, fills=segment.fills_slot), own.margin_begin)
+            Part(n_letters(text), own.end - own.begin, self._slot(own), own.margin_begin)
             for own, text in zip(sentence.windows, sentence.texts, strict=True)
         )
         return replace(segment, parts=parts, part=sentence.windows.index(window))
@@ -344,7 +344,7 @@ class FilePlan:
             part = min(n_frames, longest)
             seed = int(settings.get("seed", 0)) + n_frames  # other motion in each part, and for other lengths
             request = {**settings, "idle": max(part / fps, IDLE_LIMITS_S[0]), "seed": seed}
-            yield self._segment(window, request, part, fills=True, window_frames=part)
+            yield self._segment(window, request, part, part)
             n_frames -= part
 
     def _segment(
@@ -352,8 +352,6 @@ class FilePlan:
         window: Window,
         request: Mapping[str, Any],
         slot: int | None,
-        *,
-        fills: bool,
         window_frames: int | None = None,
     ) -> Segment:
         models = self.speakers.casting(window.cue, window.part).models
@@ -366,7 +364,7 @@ class FilePlan:
             models,
             n_frames,
             slot,
-            fills,
+            self.base.is_joined,
             self.base.options.overflow,
             self.base.options.max_rate,
             audio_begin=first_sample(window.begin, SOUND_RATE, fps) if is_excerpt else None,
@@ -374,6 +372,11 @@ class FilePlan:
             medium=ALPHA_MOVIE if self.base.options.format == "webm" else MOVIE,
         )
         return replace(segment, file_hashes=self._file_hashes(segment))
+
+    def _slot(self, window: Window) -> int | None:
+        """Frames up to the next cue, or of the segment that fills them in a joined output; None: no cue follows."""
+        end = window.slot_end if self.base.is_joined else window.next_begin
+        return None if end is None else end - window.begin
 
     def _file_hashes(self, segment: Segment) -> Mapping[str, str]:
         if segment.audio_begin is not None:
@@ -392,9 +395,3 @@ class FilePlan:
         planned = PlanWarning(str(self.path), line, message)
         if planned not in self.warnings[-8:]:
             self.warnings.append(planned)
-
-
-def _slot(window: Window, *, fills: bool) -> int | None:
-    """Frames up to the next cue, or of the segment that fills them; None: no cue follows."""
-    end = window.slot_end if fills else window.next_begin
-    return None if end is None else end - window.begin

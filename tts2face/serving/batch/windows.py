@@ -29,6 +29,11 @@ class Window:
     margin_end: int = 0
 
     @property
+    def numbers(self) -> tuple[int, int]:
+        """Numbers of the cue and of the part."""
+        return self.cue.number, self.part
+
+    @property
     def cue_begin(self) -> int:
         """Frame at which the cue itself begins."""
         return self.begin + self.margin_begin

@@ -30,11 +30,10 @@ from tts2face.serving.work.jobs import JobRecord
 CALL_S = 10.0  # of a whole call, however often its receiver sends a byte; services that receive webhooks answer in 5
 CONNECT_S = 4.0  # to one address of a host
 POLL_S = 1.0  # between two polls of the messages that are due, while none ends
-# calls at the same time: of all, of a key, to a host
-PLACES = 64
-# places bound what one key and one host delay (decision 205)
-KEY_PLACES = 2
-HOST_PLACES = 8
+# Places bound what one key and one host delay (decision 205).
+PLACES = 64  # calls at the same time, of all
+KEY_PLACES = 2  # of a key
+HOST_PLACES = 8  # to a host
 HEAD_BYTES, BLOCK_BYTES = 16 << 10, 4 << 10  # of an answer, of which only the status counts
 PORTS = {"https": 443, "http": 80}
 Value = TypeVar("Value")

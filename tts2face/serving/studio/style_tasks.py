@@ -19,12 +19,9 @@ if TYPE_CHECKING:
 
 
 SPOKEN = "Hello there, nice to see you."
-# tiles of a swatch, and frames of the clip from one to the next
-N_TILES = 20
-# pixels of a side
-TILE_PX = 144
-# frames of the clip between two tiles
-EVERY = 3
+N_TILES = 20  # of a swatch
+TILE_PX = 144  # of a side
+EVERY = 3  # frames of the clip from one tile to the next
 MIXED = "mixed here"  # name of a style that no palette holds yet
 # of the WebP
 QUALITY = 70
