@@ -23,8 +23,7 @@ N_TILES = 20  # of a swatch
 TILE_PX = 144  # of a side
 EVERY = 3  # frames of the clip from one tile to the next
 MIXED = "mixed here"  # name of a style that no palette holds yet
-# of the WebP
-QUALITY = 70
+QUALITY = 70  # of the WebP
 
 
 def swatch(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
