@@ -71,11 +71,6 @@ class PhotoCamera:
         across = seen[:, :2] * (self.focal_px / seen[:, 2:]) + self.origin
         return np.column_stack([across, (CAMERA_DISTANCE_MM - seen[:, 2]) * self.scale])
 
-    def ways_to_pixels(self, ways: Floats) -> Floats:
-        """Displacements (..., 3) in pixels and depths of those in the head (..., 3), mm."""
-        turned: Floats = ways @ self.turn.T * PIXEL_AXES * self.scale
-        return turned
-
 
 def find_camera(face: FoundFace, head_landmarks: Floats) -> PhotoCamera:
     """Camera that sees the rigid landmarks (478, 3) of a head, mm, where the photograph shows them (least squares)."""

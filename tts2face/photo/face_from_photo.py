@@ -1,6 +1,6 @@
-"""A face that speaks in a photograph, from its file.
+"""Faces that speak in photographs, made of their files.
 
-Faces of photos in the user's cache folder, with their consent, so that each is made and asked for once.
+They are kept in the user's cache folder, with their consent, so that each is made and asked for once.
 """
 
 import hashlib
@@ -25,7 +25,7 @@ from tts2face.photo.teeth import read_teeth
 from tts2face.request import REALISTIC_FACE
 from tts2face.storage.content_store import FolderStore
 from tts2face.storage.user_folders import user_cache
-from tts2face.video.networks import find_segmenter
+from tts2face.video.networks import LandmarkNetwork, find_segmenter
 
 FOLDER, N_KEPT = "photos", 8
 LEAST_AGE_S = 3600.0  # of a face that is removed: another process may be about to read a younger one
@@ -98,9 +98,7 @@ def _made(
 
 
 def _without_background(seen: PhotographedFace, reader: PhotoReader, name: Path) -> PhotographedFace:
-    """An opaque picture in two layers, person and background, if they can be told apart."""
-    from tts2face.video.networks import LandmarkNetwork, find_segmenter
-
+    """An opaque picture in two layers, person and background, if they differ enough."""
     if seen.picture.alpha is not None:
         return seen
     segmenter = find_segmenter(reader.model)

@@ -2,12 +2,10 @@
 
 Places are pixels of the upright picture as the file has it, x right and y down from its left top corner; lines go from
 the left of the picture to its right. The format is described in docs/photo.md.
-
-Landmarks of a photographed face on its vertices.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, make_dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -19,10 +17,7 @@ from scipy.interpolate import PchipInterpolator
 from lexicon.errors import DataError, InputError
 from lexicon.values.json_text import read_json
 from lexicon.values.records import checked, errors_at
-from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
-from tts2face.photo.eyes import IRISES, EyePatch
-from tts2face.photo.lines import LID_MARGINS, N_LID, N_POINTS, InnerLips, LidLines
-from tts2face.photo.mesh import PhotoMesh
+from tts2face.photo.lines import InnerLips, LidLines
 from tts2face.storage.files import write_atomically
 
 Floats = NDArray[np.float64]
@@ -41,7 +36,6 @@ _Point = Annotated[tuple[float, float], "[x, y] in pixels"]
 _Parts: dict[str, Any] = {
     part: make_dataclass(part, [(edge, tuple[_Point, ...] | None, None) for edge in LINES[part]]) for part in LINES
 }
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,6 +76,7 @@ class PhotoFit:
         return content | {name: _rounded(point) for name, point in self.points.items()}
 
 
+NOTHING_GIVEN = PhotoFit({}, {})
 _Written: Any = make_dataclass(
     "_Written", [(part, _Parts.get(part, _Point) | None, None) for part in (*LINES, *POINTS)]
 )
@@ -172,8 +167,9 @@ class PhotoPlaces:
         eyes = []
         for part, upper, lower, step in zip(("right_eye", "left_eye"), found.upper, found.lower, (1, -1), strict=True):
             given = self._opening(part, upper[::step], lower[::step])
-            if (part, "upper") in self.fit.lines or (part, "lower") in self.fit.lines:
-                self._refuse_shut(part, *given)
+            is_given = any((part, edge) in self.fit.lines for edge in LINES[part])
+            if is_given and _gaps(*given)[len(given[0]) // 2] < CROSSING * self.scale:
+                raise DataError(f"{self.fit.name}: the lids of {part} are shut; give those of an open eye")
             eyes.append([line[::step] for line in given])
         (right, left) = eyes
         return LidLines((right[0], left[0]), (right[1], left[1]), found.fold)
@@ -245,10 +241,6 @@ class PhotoPlaces:
         first[crossed] = second[crossed] = ((first + second) / 2)[crossed]
         return first, second
 
-    def _refuse_shut(self, part: str, upper: Floats, lower: Floats) -> None:
-        if _gaps(upper, lower)[len(upper) // 2] < CROSSING * self.scale:
-            raise DataError(f"{self.fit.name}: the lids of {part} are shut; give those of an open eye")
-
 
 def _gaps(upper: Floats, lower: Floats) -> Floats:
     """(N,) distance of lines, pixels, down from the line between the corners."""
@@ -286,58 +278,3 @@ def _forward(line: Floats) -> Floats:
         if _goes_on(place - kept[-1], along) and _goes_on(line[-1] - place, along):
             kept.append(place)
     return np.array([*kept, line[-1]])
-
-
-NOTHING_GIVEN = PhotoFit({}, {})
-
-
-def place_landmarks(
-    mesh: PhotoMesh, landmarks: Floats, eyes: Sequence[tuple[EyePatch, Ints]]
-) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Three vertices (478, 3) and their weights for each landmark (478, 2 or more), pixels.
-
-    Eyes are given with the numbers of their vertices.
-    """
-    corners, weights = np.zeros((N_LANDMARKS, 3), np.int32), np.tile(np.array([1, 0, 0], np.float32), (N_LANDMARKS, 1))
-    own = _vertices(mesh)
-    for number in range(N_LANDMARKS):
-        place = landmarks[number, :2]
-        eye = next((eye for eye, iris in enumerate(IRISES) if number in iris), None)
-        if number in own:
-            corners[number] = own[number]
-        elif eye is None:
-            corners[number], weights[number] = _triangle_around(place, mesh.places, mesh.triangles)
-        else:
-            patch, vertices = eyes[eye]
-            at, weights[number] = _triangle_around(place, patch.places, patch.triangles)
-            corners[number] = vertices[at]
-    return corners, weights
-
-
-def _vertices(mesh: PhotoMesh) -> Mapping[int, int]:
-    """Vertices that are landmarks: their own, and those of lips and lids on the lines through them."""
-    lines: list[tuple[Ints, Sequence[int], int]] = [
-        (mesh.upper_lip, INNER_LIP_UPPER, (N_POINTS - 1) // (len(INNER_LIP_UPPER) - 1)),
-        (mesh.lower_lip, INNER_LIP_LOWER, (N_POINTS - 1) // (len(INNER_LIP_LOWER) - 1)),
-    ]
-    for upper, lower, lids in zip(mesh.upper_lids, mesh.lower_lids, LID_MARGINS, strict=True):
-        lines += [
-            (line, numbers, (N_LID - 1) // (len(numbers) - 1))
-            for line, numbers in zip((upper, lower), lids, strict=True)
-        ]
-    on_lines = {int(number): int(line[k * step]) for line, numbers, step in lines for k, number in enumerate(numbers)}
-    return mesh.vertex_of | on_lines
-
-
-def _triangle_around(place: Floats, places: Floats, triangles: Ints) -> tuple[Ints, Floats]:
-    """Corners (3,) of the triangle around a place (2,), or nearest to it, and the weights of the place in it."""
-    a, b, c = (places[triangles[:, k]] for k in range(3))
-    first, second, off = b - a, c - a, place - a
-    area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    area = np.where(np.abs(area) < 1e-12, 1e-12, area)
-    along = (off[:, 0] * second[:, 1] - off[:, 1] * second[:, 0]) / area
-    across = (first[:, 0] * off[:, 1] - first[:, 1] * off[:, 0]) / area
-    weights = np.stack([1 - along - across, along, across], axis=1)
-    best = int(weights.min(axis=1).argmax())
-    inside = np.clip(weights[best], 0, None)
-    return triangles[best], inside / inside.sum()

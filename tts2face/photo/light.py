@@ -1,9 +1,7 @@
-"""Light of a photograph: that of its skin, which turns with it, and that in the mouth, which comes through the lips.
+"""Light of a photograph: that of its skin, which turns and wrinkles with it, and that in the mouth, through the lips.
 
-Wrinkles of a photographed face: shading that deepens with the motion of raised brows and of smiles.
-
-Lines that the picture shows become deeper, and faint ones appear. Each vertex answers to its own movement (terms 4 to 6
-of `tts2face.picture.baked.response`).
+Wrinkles are shading that deepens with raised brows and smiles: lines that the picture shows become deeper, and faint
+ones appear. Each vertex answers to its own movement (terms 4 to 6 of `tts2face.picture.baked.response`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -61,7 +59,7 @@ UNLIKE_SMILES = ("jawOpen", "mouthPucker")  # whose motion of the cheeks is none
 LEAST_MM = 0.6  # of movement, below which skin has no wrinkles
 BROW_EDGES = (70, 63, 105, 66, 107, 336, 296, 334, 293, 300)  # upper edges, from the person's right to the left
 FOREHEAD_TOP, NOSE_TIP = 10, 1  # landmarks
-FOREHEAD = (0.12, 0.3, 0.75, 1.0)  # of the way from brows to its top, over which lines begin and end
+FOREHEAD = (0.12, 0.3, 0.75, 1.0)  # of the way from brows to its top, over which lines rise and fade
 LEAST_HIGH = 0.1  # of that half width, of the height of a forehead
 N_LINES = 3.0  # from brows to top
 FOREHEAD_SIDE = (0.75, 1.05)  # of the half width of the brows, over which lines end
@@ -69,7 +67,7 @@ FOLDS = ((129, 203, 206, 216, 212), (358, 423, 426, 436, 432))  # from the wings
 FOLD_ENDS = (0.1, 0.3, 0.75, 1.0)  # of the way along it, over which it begins and ends
 FOLD_REACH, CHEEK_REACH = 0.024, 0.045  # of the eye distance, of the shade of a fold and of the light beside it
 CHEEK_SHARE = 0.5  # of that light
-FOLD_BAND = 0.1  # of the eye distance to either side of a fold, beyond which nothing is looked for
+FOLD_BAND = 0.1  # of the eye distance to either side of a fold, beyond which nothing is searched
 NEAR_FOLD = 2.0  # reaches of a fold, in which what the picture shows is one
 N_FOLD_POINTS = 81  # points along a fold
 TINY = 1e-9  # mm squared
@@ -198,7 +196,6 @@ def picture_light(
     mouth_rows, lit, openings = mouth.light()
     mouth_answers, mouth_sizes = quantised(openings, least=LEAST_RESPONSE)
     n_texels = N_PAGES * LEAST_SIDE**2 + LEAST_SIDE * (LEAST_SIDE // BLACK_SHARE)
-    no_colours = np.zeros((0, 3), np.float32)
     return BakedLight(
         pages=pages,
         triangles=drawn.astype(np.int32),
@@ -222,7 +219,7 @@ def picture_light(
         mouth_sizes=mouth_sizes,
         mouth_limits=equal_limits(255.0, len(mouth_rows)),
         ball_rows=np.zeros(0, np.int32),
-        ball_base=no_colours,
+        ball_base=np.zeros((0, 3), np.float32),
         ball_responses=np.zeros((N_BALL_TERMS, 3, 0), np.int8),
         ball_sizes=np.ones(N_BALL_TERMS, np.float32),
         lamps=np.zeros((0, N_LAMP_NUMBERS), np.float32),
@@ -322,7 +319,7 @@ def _shown_lines(pixels: NDArray[np.uint8], places: Floats, direction: Floats, s
         return np.zeros(0)
     side = np.column_stack([-direction[:, 1], direction[:, 0]])
     on = [places + way * scale * direction for way in ON_LINE]
-    off = [one + way * scale * side for way in BESIDE_LINE for one in on]
+    off = [place + way * scale * side for way in BESIDE_LINE for place in on]
     grey = grey_at(pixels, np.stack([*on, *off], axis=1), max(LEAST_BLUR_PX, LINE_BLUR * scale))
     own, others = grey[:, : len(on)].mean(axis=1), grey[:, len(on) :].mean(axis=1)
     found: Floats = np.clip((own - others) / np.maximum(others, 1.0), -MOST_SHOWN, MOST_SHOWN)

@@ -1,9 +1,4 @@
-"""The line between the lips of a photograph: the tracker's landmarks, moved onto the edges that the picture shows.
-
-Margins of the lids of a photograph, and the folds above them.
-
-Colours of a picture at places in it.
-"""
+"""Lines of lips and lids in a photograph: the tracker's landmarks, moved onto the edges that its colours show."""
 
 from dataclasses import dataclass
 
@@ -22,7 +17,7 @@ from tts2face.models.landmarks import (
 from tts2face.photo.found_face import FoundFace
 
 Floats = NDArray[np.float64]
-N_POINTS = 41  # along a lip, from the person's right corner to the left one
+N_LIP = 41  # along a lip, from the person's right corner to the left one
 CLOSED_GAP = 0.02  # of the eye distance, as all lengths below; closed lips have up to .017, narrow smiles from .024
 SEARCHED = 0.03  # to either side of the landmarks
 N_PLACES = 25  # that are compared across the line at each point
@@ -130,7 +125,7 @@ def find_lip_line(pixels: NDArray[np.uint8], face: FoundFace) -> InnerLips:
     Closed lips meet in the darkest seam near the landmarks, open ones end where the colour of the lip does; both are
     cheapest paths (dynamic programming) over places across the line.
     """
-    weights = spline_weights(len(INNER_LIP_UPPER), N_POINTS)
+    weights = spline_weights(len(INNER_LIP_UPPER), N_LIP)
     inner = [weights @ face.landmarks[list(numbers)] for numbers in (INNER_LIP_UPPER, INNER_LIP_LOWER)]
     gap = float(np.linalg.norm((inner[0] - inner[1])[:, :2], axis=1).max() / face.eye_distance_px)
     scale = face.eye_distance_px
@@ -162,7 +157,7 @@ def darken_lip_edges(pixels: NDArray[np.uint8], lips: InnerLips, scale: float) -
     high = np.minimum(np.ceil(every.max(axis=0)).astype(int) + margin, pixels.shape[1::-1])
     down, across = np.mgrid[low[1] : high[1], low[0] : high[0]]
     places = np.column_stack([across.ravel(), down.ravel()]).astype(np.float64)
-    fine = spline_weights(N_POINTS, EDGE_FINE * N_POINTS)
+    fine = spline_weights(N_LIP, EDGE_FINE * N_LIP)
     edges = np.concatenate([fine @ lips.upper, fine @ lips.lower])[:, :2]
     away = np.asarray(cKDTree(edges).query(places)[0]).reshape(down.shape)
     bright = 1 - EDGE_DARKNESS * np.exp(-((away / (EDGE_SHADE * scale)) ** 2))
@@ -206,7 +201,7 @@ def _edge(pixels: NDArray[np.uint8], line: Floats, outer: Floats, scale: float) 
     behind = (sums[:, at + 1 + N_SIDE] - sums[:, at + 1]) / N_SIDE
     cost[:, at] = -EDGE_GAIN * (before - behind)
     steps = cheapest_path(cost + LIP_REST * offsets**2, offsets, LIP_STIFFNESS)
-    from_corner = np.minimum(np.arange(N_POINTS), np.arange(N_POINTS)[::-1])
+    from_corner = np.minimum(np.arange(N_LIP), np.arange(N_LIP)[::-1])
     moved = line.copy()
     moved[:, :2] += (steps * np.minimum(1, from_corner / CORNER_POINTS))[:, None] * scale * inwards
     return moved

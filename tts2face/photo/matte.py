@@ -1,4 +1,7 @@
-"""The person and the background of an opaque photograph: a segmentation network's reading, refined by colours."""
+"""The person and the background of an opaque photograph, which goes on behind the person.
+
+A segmentation network reads who is seen; colours refine it.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -8,7 +11,7 @@ from numpy.typing import NDArray
 
 from tts2face.models.landmarks import FACE_OVAL
 from tts2face.numeric.arrays import smoothstep
-from tts2face.photo.photograph import Photograph, paint_hole
+from tts2face.photo.photograph import Photograph
 
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -38,6 +41,12 @@ LEAST_FACE, LEAST_BACKGROUND = 0.9, 0.02  # mean share of the person in the face
 AROUND_RIM = 0.03  # of the eye distance beyond the rim, where the person may still be seen faintly
 RIM_NOISE = 25.0  # of 255: how faintly
 BACKGROUND_CHANGE = 0.005  # of that of the person, by which its colour changes where both are mixed
+PAINT_EYES_PX, PAINT_REACH_PX = 50.0, 3.0  # eye distance in which what is nearest goes on, and from how far
+HALF_KNOWN = 0.5  # share of a pixel from which its colour is known
+AGREED = 12.0  # of 255: difference of the colours of one thing
+LEAST_AGREED = 0.02  # weight of what is nearest
+GAP = 0.3  # of the eye distance: a gap over which a line weighs half as much as over none
+STANDS_OUT_REACH = 0.3  # of the eye distance, from whose mean colour lines stand out
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,7 +58,7 @@ class MatteReading:
 
 
 def part_background(picture: Photograph, landmarks: NDArray[np.float64], scale: float, network: Network) -> Photograph:
-    """Picture with the person as its opaque part and the background behind; as it is if they are not told apart.
+    """Picture with the person as its opaque part and the background behind; as it is if they are too much alike.
 
     Parameters
     ----------
@@ -78,7 +87,7 @@ def part_background(picture: Photograph, landmarks: NDArray[np.float64], scale: 
     cover, of_person = _cover(small, reading.share, oval > 0, scale)
     cover = _joined(cover, oval > 0, RIM_REACH * scale)
     around = _grown(cover > 0, AROUND_RIM * scale)
-    behind = paint_hole(small, around, scale)
+    behind = _paint_hole(small, around, scale)
     layers = [of_person.clip(0, 255).astype(np.uint8), behind]
     if shrink < 1:
         cover = np.asarray(cv2.resize(cover, (width, height)))
@@ -184,7 +193,7 @@ def _layered(picture: Photograph, cover: Floats, near: Mask, layers: Sequence[Pi
     person, background = layers
     np.copyto(person, picture.pixels, where=((cover == 1) | ~near)[..., None])
     np.copyto(background, picture.pixels, where=~near[..., None])
-    every, own, other = (one.reshape(-1, 3) for one in (picture.pixels, person, background))
+    every, own, other = (layer.reshape(-1, 3) for layer in (picture.pixels, person, background))
     beside = np.flatnonzero(near & (cover == 0))
     behind = other[beside].astype(np.float32)
     missing = every[beside] - behind
@@ -192,7 +201,7 @@ def _layered(picture: Photograph, cover: Floats, near: Mask, layers: Sequence[Pi
     rim = np.flatnonzero((cover > 0) & (cover < 1))
     share = cover.ravel()[rim, None]
     rest = (1 - share) * BACKGROUND_CHANGE
-    colours, of_person, behind = (one[rim].astype(np.float32) for one in (every, own, other))
+    colours, of_person, behind = (layer[rim].astype(np.float32) for layer in (every, own, other))
     missing = (colours - share * of_person - (1 - share) * behind) / (share**2 + rest * (1 - share))
     own[rim] = np.rint(of_person + share * missing).clip(0, 255)
     other[rim] = np.rint(behind + rest * missing).clip(0, 255)
@@ -224,3 +233,59 @@ def _spread(colours: Floats, known: Mask, scale: float) -> tuple[Floats, Floats]
         found = (sums + LEAST_KNOWN * found) / (share + LEAST_KNOWN)[..., None]
     variance = np.maximum(found[..., 3] - (found[..., :3] ** 2).sum(axis=2), 0) / 3
     return found[..., :3].astype(np.float32), variance.astype(np.float32)
+
+
+def _paint_hole(pixels: Pixels, hole: Mask, scale: float) -> Pixels:
+    """Picture (H, W, 3) whose surroundings go on in a hole (H, W); `scale` is an eye distance, pixels.
+
+    Rows and columns whose colours at both ends of the hole agree go on between these, as door frames do, and those
+    that stand out before others; elsewhere what is nearest does.
+    """
+    import cv2
+
+    known = 1 - hole.astype(np.float32)
+    side = 2 * round(STANDS_OUT_REACH * scale) + 1
+    share = np.maximum(cv2.blur(known, (side, side)), 1e-3)
+    mean = cv2.blur(pixels * known[..., None], (side, side)) / share[..., None]
+    stands_out = (1 + ((pixels - mean) ** 2).sum(axis=2) / AGREED**2).astype(np.float32)
+    found = _nearest(pixels, known, scale)
+    down, across = np.nonzero(hole)
+    sums, weights = LEAST_AGREED * found[down, across].astype(np.float32), np.full((len(down), 1), LEAST_AGREED)
+    for colours, weight in (
+        _between(pixels, ~hole, stands_out, (down, across), scale),
+        _between(pixels.swapaxes(0, 1), ~hole.T, stands_out.T, (across, down), scale),
+    ):
+        sums, weights = sums + weight * colours, weights + weight
+    found[down, across] = (sums / weights).clip(0, 255)
+    return found
+
+
+def _between(
+    pixels: Pixels, free: Mask, stands_out: Floats, places: tuple[NDArray[np.int64], NDArray[np.int64]], scale: float
+) -> tuple[Floats, Floats]:
+    """Colours (N, 3) on the way between the free ends of rows around places (N,), (N,), and their weights (N, 1)."""
+    line, at = places
+    columns = np.arange(free.shape[1])
+    before = np.maximum.accumulate(np.where(free, columns, 0), axis=1)[line, at]
+    after = np.minimum.accumulate(np.where(free, columns, columns[-1])[:, ::-1], axis=1)[:, ::-1][line, at]
+    first, last = (pixels[line, end].astype(np.float32) for end in (before, after))
+    weight = np.exp(-((first - last) ** 2).sum(axis=1) / (6 * AGREED**2)) * (free[line, before] & free[line, after])
+    weight *= np.minimum(stands_out[line, before], stands_out[line, after]) / (GAP + (after - before) / scale)
+    share = ((at - before) / np.maximum(after - before, 1))[:, None]
+    return ((1 - share) * first + share * last).astype(np.float32), weight[:, None].astype(np.float32)
+
+
+def _nearest(pixels: Pixels, known: Floats, scale: float) -> Pixels:
+    """Picture (H, W, 3) whose nearest surroundings go on where it is not known (H, W), in a smaller picture.
+
+    Source: Bertalmio, Bertozzi and Sapiro 2001, Navier-Stokes, fluid dynamics, and image and video inpainting.
+    """
+    import cv2
+
+    shrink = min(1.0, PAINT_EYES_PX / scale)
+    size = tuple(max(2, round(side * shrink)) for side in pixels.shape[1::-1])
+    share = cv2.resize(known, size, interpolation=cv2.INTER_AREA)
+    sums = cv2.resize(pixels * known[..., None], size, interpolation=cv2.INTER_AREA)
+    small = (sums / np.maximum(share, 1e-3)[..., None]).clip(0, 255).astype(np.uint8)
+    painted = cv2.inpaint(small, (share < HALF_KNOWN).astype(np.uint8), PAINT_REACH_PX, cv2.INPAINT_NS)
+    return np.asarray(cv2.resize(painted, pixels.shape[1::-1], interpolation=cv2.INTER_CUBIC))

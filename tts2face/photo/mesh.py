@@ -2,8 +2,6 @@
 
 Between the fold and the margin of an upper lid lies a band that moves with the margin, as lashes do; where it leaves
 the fold, the lid appears (`tts2face.photo.shapes`).
-
-Displacements of a mesh that are known at some vertices, spread smoothly over the others.
 """
 
 from collections.abc import Iterator, Sequence
@@ -11,8 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.linalg import splu
 from scipy.spatial import Delaunay, cKDTree
 
 from tts2face.models.landmarks import (
@@ -45,8 +41,6 @@ GRID_CLEAR = 0.55  # of its step, which a point of a grid keeps from all others
 ROW_STEP = 0.87  # between the rows of a grid, of its step
 MOST_REACH = 4.0  # of what moves from the oval of the face, of the eye distance
 EDGE_PX = 2.0  # from the picture's edge, which landmarks keep
-LEAST_LENGTH = 0.004  # of an edge, of the size of the face: shorter ones weigh no more
-RIDGE = 1e-9  # so that pieces of the mesh where nothing is known have a solution
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -273,7 +267,7 @@ def way_outside(places: Floats, oval: Floats) -> Floats:
 
 
 def _frame(size: tuple[int, int], oval: Floats, scale: float) -> Frame:
-    """What may move of a picture (width, height) around the oval of a face."""
+    """Corners of the part of a picture (width, height), around the oval of a face, that may move."""
     low = np.maximum(oval.min(axis=0) - MOST_REACH * scale, -0.5)
     high = np.minimum(oval.max(axis=0) + MOST_REACH * scale, np.array(size) - 0.5)
     return low, high
@@ -327,66 +321,3 @@ def grid_triangles(numbers: Ints) -> Ints:
     """Triangles of a grid of vertices (R, C), of rows from above and columns from the left, seen from ahead."""
     a, b, c, d = (part.ravel() for part in (numbers[:-1, :-1], numbers[:-1, 1:], numbers[1:, :-1], numbers[1:, 1:]))
     return np.concatenate([np.column_stack([a, c, d]), np.column_stack([a, d, b])])
-
-
-class Spreading:
-    """Smooth displacements over a mesh: least squares of its Laplacian, weighted by the inverse lengths of edges.
-
-    Parameters
-    ----------
-    places : (V, 2)
-        Vertices, pixels.
-    triangles : (F, 3)
-    scale
-        Size of the face, pixels.
-
-    Notes
-    -----
-    Source: Sorkine et al. 2004, Laplacian surface editing.
-    """
-
-    def __init__(self, places: Floats, triangles: Ints, scale: float) -> None:
-        edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-        edges = np.unique(np.sort(edges, axis=1), axis=0)
-        lengths = np.linalg.norm(places[edges[:, 0]] - places[edges[:, 1]], axis=1) / scale
-        weights = 1 / np.maximum(lengths, LEAST_LENGTH)
-        n = len(places)
-        both = (np.concatenate([weights, weights]), (edges.T.ravel(), edges[:, ::-1].T.ravel()))
-        near = sparse.coo_matrix(both, shape=(n, n)).tocsr()
-        total = np.asarray(near.sum(axis=1)).ravel()
-        total[total == 0] = 1
-        laplacian = sparse.eye(n) - sparse.diags(1 / total) @ near
-        self._n = n
-        self._bending = (laplacian.T @ laplacian).tocsr()
-
-    def exact(self, vertices: Ints, values: Floats) -> Floats:
-        """(V, ...) values that are those given (N, ...) at vertices (N,)."""
-        n = self._n
-        found = np.zeros((n, values[0].size))
-        found[vertices] = values.reshape(len(vertices), -1)
-        free = np.setdiff1d(np.arange(n), vertices)
-        system = self._bending[free]
-        inside = (system[:, free] + RIDGE * sparse.eye(len(free))).tocsc()
-        found[free] = _solved(inside, -(system[:, vertices] @ found[vertices]))
-        return found.reshape(n, *values.shape[1:])
-
-    def near(self, vertices: Ints, values: Floats, weights: Floats, still: Ints | None = None) -> Floats:
-        """(V, ...) values near those given (N, ...) at vertices (N,), by weights (N,); 0 at those that are still."""
-        n = self._n
-        pull, wanted = np.zeros(n), np.zeros((n, values[0].size))
-        pull[vertices] = weights
-        wanted[vertices] = values.reshape(len(vertices), -1)
-        free = np.setdiff1d(np.arange(n), [] if still is None else still)
-        system = (self._bending[free][:, free] + sparse.diags(pull[free] + RIDGE)).tocsc()
-        found = np.zeros_like(wanted)
-        found[free] = _solved(system, pull[free, None] * wanted[free])
-        return found.reshape(n, *values.shape[1:])
-
-
-def _solved(system: sparse.csc_matrix, values: Floats) -> Floats:
-    """Solution (N, K) of a symmetric system, whose own order keeps its factors sparse, for values (N, K).
-
-    One column after the other: all at once go through a threaded BLAS, which takes eight times as long.
-    """
-    factors = splu(system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    return np.stack([factors.solve(np.ascontiguousarray(column)) for column in values.T], axis=1)

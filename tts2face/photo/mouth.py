@@ -1,4 +1,4 @@
-"""What a photograph does not show of a mouth: the head's teeth, gums and tongue, and the walls of the mouth."""
+"""The mouth that a photograph does not show: the head's teeth, gums and tongue, and the walls of the mouth."""
 
 from dataclasses import dataclass, replace
 
@@ -32,7 +32,7 @@ LIGHT_FROM = np.array([0.1, 0.35, 0.93])
 CHEEKS = (50, 280, 205, 425, 101, 330)
 LIP_RED = (15, 16, 86, 316, 12)
 CHEEK_PX, LIP_PX = 3, 1  # around these, whose colours are taken
-EDGE_MM = 4.0  # around the middle of the upper teeth, and behind their front, within which their edge is looked for
+EDGE_MM = 4.0  # around the middle of the upper teeth, and behind their front, within which their edge is searched
 TEETH_OVER_SKIN = 1.05  # least luminance of teeth, of the cheeks'
 TINT_POWERS, SKIN_SHARE = (0.6, 0.35), 0.25  # of the hues of the eyes' white and the skin in teeth; the skin's share
 TEETH_LIMITS = (0.06, 0.75)  # of the luminance of teeth
@@ -69,7 +69,7 @@ class MouthInside:
         return place
 
     def moved(self, way: Floats) -> "MouthInside":
-        """What lies in the mouth, moved by a way (3,), mm."""
+        """The parts, moved by a way (3,), mm."""
         return replace(self, vertices=self.vertices + way)
 
 
@@ -109,7 +109,7 @@ def head_mouth(
         if part.name in names
     }
     used, rows = np.unique(np.concatenate(list(by_part.values())), return_inverse=True)
-    ends = np.cumsum([len(one) for one in by_part.values()])
+    ends = np.cumsum([len(triangles) for triangles in by_part.values()])
     by_part = dict(zip(by_part, np.split(rows.reshape(-1, 3), ends[:-1]), strict=True))
     vertices = place.to_face(head.vertices[used].astype(np.float64))
     shapes = head.shapes[:, used].astype(np.float64) * place.size

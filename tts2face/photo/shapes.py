@@ -18,9 +18,9 @@ from tts2face.models.landmarks import (
 )
 from tts2face.numeric.arrays import smoothstep
 from tts2face.photo.camera import PhotoCamera
-from tts2face.photo.lines import LID_MARGINS, N_LID, InnerLips, spline_weights
-from tts2face.photo.lines import N_POINTS as N_LIP
-from tts2face.photo.mesh import LIP_RINGS, PhotoMesh, Spreading
+from tts2face.photo.lines import LID_MARGINS, N_LID, N_LIP, InnerLips, spline_weights
+from tts2face.photo.mesh import LIP_RINGS, PhotoMesh
+from tts2face.photo.spreading import Spreading
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -18,15 +18,26 @@ from tts2face.models.light import Photographed
 from tts2face.models.photo_view import PhotoView
 from tts2face.photo.camera import PhotoCamera, find_camera
 from tts2face.photo.eyes import EYE_BEHIND_MM, SIDES, EyePatch, eye_patches, gaze_shapes
-from tts2face.photo.fit import NOTHING_GIVEN, PhotoFit, PhotoPlaces, place_landmarks
+from tts2face.photo.fit import NOTHING_GIVEN, PhotoFit, PhotoPlaces
 from tts2face.photo.found_face import PhotographedFace
 from tts2face.photo.light import SMILING, MouthRows, picture_light, wrinkles
 from tts2face.photo.lines import InnerLips, LidLines, darken_lip_edges, find_lid_lines, find_lip_line
-from tts2face.photo.mesh import PhotoMesh, Spreading, build_mesh
+from tts2face.photo.mesh import PhotoMesh, build_mesh
 from tts2face.photo.mouth import MouthInside, MouthPlace, cheek_light, mouth_light, mouth_walls
 from tts2face.photo.photograph import OPAQUE, Photograph
 from tts2face.photo.shapes import GAZE_LIDS, PhotoPerson, blink, breathing, closing, depths, face_shapes, head_follow
-from tts2face.photo.surface import EYES, SKIN, PhotoPages, PhotoSurface, Vertices, add_lids, lay_pages, moves
+from tts2face.photo.spreading import Spreading
+from tts2face.photo.surface import (
+    EYES,
+    SKIN,
+    PhotoPages,
+    PhotoSurface,
+    Vertices,
+    add_lids,
+    lay_pages,
+    moves,
+    place_landmarks,
+)
 from tts2face.photo.teeth import OwnTeeth, find_teeth, teeth_and_tongue
 
 Floats = NDArray[np.float64]

@@ -28,8 +28,11 @@ HALF_WIDTH_MM, AROUND_MM = 26.0, 3.0  # that are searched: to either side, and a
 HIGHEST_MM, LOWEST_MM = 30.0, 35.0  # of the opening, over and under the edges of the head's teeth
 COLUMN_MM, ROW_MM = 0.75, 0.25  # steps of the search
 TEETH_BLUR = 0.003  # of the eye distance
-BRIGHTER, LESS_RED, LIKE_TOOTH = 60.0, 8.0, (0.5, 1.5)  # than lips, of L and a in 8 bits: their sum tells teeth
-LIP_HUE, GREY_BRIGHTER = 3.0, 30.0  # of a: lips that are less redder than cheeks, as in grey pictures; L alone tells
+BRIGHTER, LESS_RED, LIKE_TOOTH = 60.0, 8.0, (0.5, 1.5)  # than lips, of L and a in 8 bits: their sum shows teeth
+LIP_HUE, GREY_BRIGHTER = (
+    3.0,
+    30.0,
+)  # of a: lips that are less redder than cheeks, as in grey ones; L alone shows teeth
 TOOTH = 0.5  # likeness from which something is a tooth
 ARCH_STEP_MM = 2.0  # between places along the arch whose depths are measured, and to either side of them
 LEAST_BRIGHT = (0.45, 0.65)  # of the brightest teeth
@@ -173,7 +176,7 @@ def read_teeth(reader: PhotoReader, smile: str | Path, photo: str | Path, face: 
 def _unlikeness(face: FoundFace, other: FoundFace) -> float:
     """Distance of the rigid landmarks of two faces after a similarity, of the eye distance (root mean square)."""
     indices, _, weights = rigid_points()
-    own, target = ((one.landmarks * TO_CAMERA)[indices] / one.eye_distance_px for one in (face, other))
+    own, target = ((seen.landmarks * TO_CAMERA)[indices] / seen.eye_distance_px for seen in (face, other))
     turns, scales = similarity_transforms(own[None], target, weights)
     off = scales[0] * (own - weights @ own) @ turns[0].T - (target - weights @ target)
     return float(np.sqrt(weights @ (off**2).sum(axis=1)))
@@ -298,7 +301,7 @@ def _mirror_gain(colours: Floats, is_seen: Mask, columns: Floats) -> float:
 
 
 def teeth_and_tongue(head: Face, place: MouthPlace, light: MouthLight, teeth: OwnTeeth | None) -> list[MouthInside]:
-    """What a head has in its mouth, after a sheet with the picture of the person's own upper teeth, if there is one.
+    """Parts of a head's mouth, after a sheet with the picture of the person's own upper teeth, if there is one.
 
     The head's upper teeth give way to the sheet, and go on beside it at the height of its ends.
     """

@@ -10,12 +10,12 @@ from tests.photo.build.test_found_face import SIDE, found
 from tests.photo.pictures import projected, still
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.photo.found_face import FoundFace
-from tts2face.photo.lines import N_POINTS, InnerLips, find_lip_line, spline_weights
+from tts2face.photo.lines import N_LIP, InnerLips, find_lip_line, spline_weights
 from tts2face.video.tracking import FaceTracker
 
 CORNERS = 5  # points at each end whose place depends on what one calls a corner
 OPEN = 0.35
-SPREAD_LINES = spline_weights(len(INNER_LIP_UPPER), N_POINTS)
+SPREAD_LINES = spline_weights(len(INNER_LIP_UPPER), N_LIP)
 
 
 @pytest.fixture(scope="module")
