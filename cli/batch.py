@@ -112,6 +112,7 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     from tts2face.serving.batch.run import SEGMENT_FOLDER
     from tts2face.serving.batch.store import open_store
 
+    # absolute: workers of a database may run in other folders
     place = store if store is not None else str((out / SEGMENT_FOLDER).resolve())
     opened = open_store(place)
     engine = _open_engine(database, place, jobs, priority)
@@ -127,6 +128,7 @@ def batch(  # noqa: PLR0913 - one parameter a flag
 
 
 def _check_work(jobs: int, priority: int, *, has_database: bool) -> None:
+    # with a database, workers elsewhere may do all the work
     if jobs < (0 if has_database else 1):
         raise InputError(f"--jobs must be 1 or more (0 with --database: other workers only), not {jobs}")
     if priority < 1:
@@ -134,6 +136,7 @@ def _check_work(jobs: int, priority: int, *, has_database: bool) -> None:
 
 
 def _check_places(out: Path, table: Path | None, subtitles: Sequence[Path]) -> None:
+    # a Path has made s3:/bucket of s3://bucket
     if "://" in str(out) or str(out).startswith(("s3:", "gs:", "az:")):
         raise InputError(f"--out must be a folder of this machine, not {out}; give a bucket by --store")
     if table is not None and not table.resolve().parent.is_dir():
@@ -173,6 +176,7 @@ def _write_output(entry: dict[str, Any]) -> None:
 
 def _write_line(content: dict[str, Any]) -> None:
     sys.stdout.write(json.dumps(content, ensure_ascii=False) + "\n")
+    # a program that reads a pipe would get its lines late, many at once
     sys.stdout.flush()
 
 

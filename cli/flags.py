@@ -98,6 +98,7 @@ def add_option_flags(
             for option in option_fields(options)
             if option.name not in without
         ]
+        # cyclopts reads the flags of a command from both
         command.__signature__ = inspect.Signature([*own, *added])  # type: ignore[attr-defined]
         command.__annotations__ = {parameter.name: parameter.annotation for parameter in [*own, *added]}
         return command
@@ -108,6 +109,7 @@ def add_option_flags(
 def _option_parameter(option: "Field[Any]", kind: Any, group: Group, *, has_defaults: bool) -> inspect.Parameter:
     default = inspect.Parameter.empty if option.default is MISSING else option.default
     converter = parse_whole_number if kind in (int, int | None) else None
+    # only a switch that is on by default needs one
     negative = f"--no-{option.name.replace('_', '-')}" if default is True else ""
     if not has_defaults:
         kind, default = kind | None, None
@@ -134,6 +136,7 @@ def check_options(app: App, arguments: Sequence[str]) -> None:
     before_end = list(arguments[: arguments.index(END_OF_OPTIONS)] if END_OF_OPTIONS in arguments else arguments)
     names = [argument.partition("=")[0] for argument in before_end if is_option(argument)]
     flags = {*app.help_flags, *app.version_flags}
+    # --help and --version answer whatever stands beside them
     if not names or flags & set(before_end):
         return
     command = app.parse_commands(before_end)[1][-1]
@@ -142,6 +145,7 @@ def check_options(app: App, arguments: Sequence[str]) -> None:
     known = [*flags, *option_names(command)]
     for name in names:
         if name not in known:
+            # a name with a space is a text that begins with a hyphen
             close = difflib.get_close_matches(name, known, n=1, cutoff=0.6) if " " not in name else []
             hint = f"did you mean {close[0]}? " if close else ""
             raise InputError(

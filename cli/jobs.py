@@ -40,6 +40,7 @@ def worker(
     from tts2face.serving.work.database import database_url, prepare_database
     from tts2face.serving.work.local_workers import LocalWorkers, local_workers
 
+    # before workers start, each of which would fail in a process of its own
     open_store(store).check()
     prepare_database(database_url(database))
     wanted = LocalWorkers(database, store, jobs, on_message=write_message)
@@ -149,6 +150,7 @@ def _prune_store(store: str, database: str | None, outputs: tuple[Path, ...], da
     from tts2face.serving.batch.prune import prune_segments
     from tts2face.serving.batch.store import open_store
 
+    # opening it would create it, and a wrong path would look like an empty store
     if "://" not in store and not Path(store).is_dir():
         raise InputError(f"there is no store {store}; give --store as for `tts2face batch`, or its folder .segments")
     unfinished: frozenset[str] = frozenset()

@@ -163,6 +163,7 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     if photo is not None:  # before a text is read: a command that has to set up the landmark model is run again
         check_photo(photo, files, {"--out": out, "--explain": explain, **{path: path for path in export or ()}})
         face = face_of_photo(photo, consent, fit=fit, smile=smile, quiet=quiet)
+    # a wrong option is refused before the modules of a session are loaded
     from cli.speak import SpeakOptions, run_request
 
     request = options_from_flags(
@@ -196,6 +197,7 @@ def _read_text(text: str | None, file: Path | None, *, is_needed: bool) -> str:
         return ""
     if text is not None and file is not None:
         raise InputError("--file cannot be combined with a text on the command line; remove one of them")
+    # "-" is standard input, by custom
     if text is not None and text != "-":
         return text
     try:
@@ -241,7 +243,9 @@ def run(arguments: Sequence[str]) -> int:
         if isinstance(ended, BrokenPipeError):
             discard_output()
             return BROKEN_PIPE_CODE
+        # any other error is a bug, whose traceback is shown
         if isinstance(ended, (Tts2faceError, CycloptsError, OSError)):
+            # no path: standard output, whose rest would fail again at the exit
             if isinstance(ended, OSError) and ended.filename is None:
                 discard_output()
             write_message(f"tts2face: {error_message(ended)}")

@@ -68,6 +68,7 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     inputs = {"the take": take, "--audio": audio, "--talker": talker, "--face": face, "--background": background}
     outputs = {"--out": out} | {f"--export {given}": split_format(given)[0] for given in exports}
     refuse_overwriting(outputs, inputs | {"--model": model})
+    # a talker's own face lies in the talker
     if (face == OWN_FACE) != (talker is not None):
         raise InputError("--face self and --talker need each other; add the missing one, or remove both")
     if append_missing and talker is None:

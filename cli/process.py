@@ -110,14 +110,17 @@ class Interruption:
     def install(self) -> None:
         """Watch for SIGINT, SIGTERM and SIGHUP from now on; ignored signals (``nohup``) stay ignored."""
         for name in SIGNAL_NAMES:
+            # an ignored signal (`nohup`) has another handler, and stays ignored
             number = getattr(signal, name, None)  # Windows has no SIGHUP
             if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
                 signal.signal(number, self._note)
+        # the exception that a callback drops would be shown with its traceback
         show = sys.unraisablehook
         sys.unraisablehook = lambda dropped: None if self.number else show(dropped)
         if hasattr(signal, "setitimer"):  # not on Windows, where a second Ctrl-C is needed after one that was dropped
             signal.signal(signal.SIGALRM, self._raise_again)
             reader, writer = os.pipe()
+            # Python requires it of a wake-up descriptor
             os.set_blocking(writer, False)
             signal.set_wakeup_fd(writer, warn_on_full_buffer=False)  # its thread runs while compiled code occupies this
             threading.Thread(target=self._watch, args=(reader,), name="signals", daemon=True).start()
@@ -145,6 +148,7 @@ class Interruption:
 
     def _note_dropped(self, _: object) -> None:
         if not self._is_over and hasattr(signal, "setitimer"):
+            # no exception is raised here: it would be dropped, too
             signal.setitimer(signal.ITIMER_REAL, REPEAT_S)
 
     def _watch(self, reader: int) -> None:
@@ -153,10 +157,12 @@ class Interruption:
         first, first_s = 0, 0.0
         while True:
             if not select.select([reader], [], [], HANDLED_S if first else None)[0]:
+                # as long as the exception lives, its clean-up runs, however long
                 if not self._is_over and (self._raised is None or self._raised() is None):
                     _exit_at_once(first)
                 continue
             number = os.read(reader, 1)[0]
+            # the descriptor receives all signals: SIGALRM is this class's own
             if number not in numbers:
                 continue
             if not first:
@@ -173,7 +179,9 @@ def _exit_at_once(number: int) -> None:
     """End this process without any clean-up but that of the files that it was writing."""
     with contextlib.suppress(OSError):
         remove_held()
+        # past sys.stderr, whose lock the interrupted thread may hold
         os.write(2, (SHOW_CURSOR if os.isatty(2) else b"") + f"\n{INTERRUPTED.format(UNCHANGED)}\n".encode())
+    # not sys.exit, which only raises: a clean-up that hangs would go on
     os._exit(128 + number)
 
 
@@ -205,6 +213,7 @@ def discard_output(stream: TextIO | None = None) -> None:
     with contextlib.suppress(OSError, ValueError):
         number = (stream or sys.stdout).fileno()
         null_device = os.open(os.devnull, os.O_WRONLY)
+        # the number stays open, so that no other file gets it
         os.dup2(null_device, number)
         os.close(null_device)
 
@@ -238,6 +247,7 @@ def _escape_characters(error: UnicodeError) -> tuple[str, int]:
     r"""Characters as ``\uXXXX``, those beyond the BMP as two surrogates: valid JSON, and readable elsewhere."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
+    # a lone surrogate (a byte of a path that is not UTF-8) passes, too
     units = error.object[error.start : error.end].encode("utf-16-be", "surrogatepass")
     return "".join(f"\\u{units[at]:02x}{units[at + 1]:02x}" for at in range(0, len(units), 2)), error.end
 
@@ -254,6 +264,7 @@ def return_large_blocks(size: int = LARGE_BYTES) -> bool:
     """
     if not sys.platform.startswith("linux"):
         return False
+    # other C libraries of Linux, as musl, lack it
     set_option = getattr(ctypes.CDLL(None), "mallopt", None)  # glibc
     if set_option is None:
         return False

@@ -46,6 +46,7 @@ def stage_bar(quiet: bool = False) -> Iterator[Callable[[str], Progress] | None]
 
 @contextmanager
 def _bar() -> Iterator[Callable[[str], Progress]]:
+    # imported late: --help and --quiet do without
     from rich.console import Console
     from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar

@@ -120,6 +120,7 @@ def _check_options(request: Request, picture: Picture, options: SpeakOptions) ->
     if needs_text and not source.text.strip():
         raise InputError("the text is empty; add words to speak, or the words of --audio")
     if options.view:
+        # it consists of pictures of a video, and the window draws meshes
         if options.models.face == OWN_FACE:
             raise InputError("--view cannot show the talker's own face; remove it, or use --face head")
         from tts2face.picture.display import require_display
@@ -176,6 +177,7 @@ def _write_speech(prepared: "PreparedRequest", picture: Picture, options: SpeakO
     """Write exports that hold no motion without loading the shipped models; False if models are needed or chosen."""
     if options.out is not None or not options.exports or options.explain is not None or options.view:
         return False
+    # a wrong name would pass unnoticed if nothing loaded it
     if options.models != Models():  # others are checked while they are loaded
         return False
     from tts2face.session.outputs import is_speech_only, plan_outputs, write_speech
@@ -197,6 +199,7 @@ def _report_writing(write: "Callable[[Progress | None], WrittenClip]", options: 
 
         def report(done: int, of: int) -> None:
             nonlocal has_begun
+            # from the first picture on; before it, mapping each block costs more (`FIRST_BYTES`)
             if not has_begun:
                 return_large_blocks()
                 has_begun = True

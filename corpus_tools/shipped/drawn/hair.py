@@ -13,7 +13,7 @@ from corpus_tools.shipped.drawn.fields import arc_length, profile, smooth_rows, 
 from corpus_tools.shipped.drawn.tiles import hair_tiles, in_tile
 from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
 from corpus_tools.shipped.head.skin import HeadSkin, vertex_normals
-from corpus_tools.shipped.head.subdivision import grid_triangles, triangulate
+from corpus_tools.shipped.head.subdivision import grid_triangles, join_triangles, triangulate
 from tts2face.models.lit_hair import swing_shapes
 from tts2face.numeric.arrays import FloatArray, IntArray, smoothstep, unit_vectors
 
@@ -75,7 +75,7 @@ def hair_piece(skin: HeadSkin, style: Hairstyle, palette: CharacterColours) -> H
     still = [scalp.shell(), *(() if style.curls is None else (curled_tube(style.curls, scalp),))]
     locks = [lock_tube(lock, scalp) for lock in style.locks]
     tubes = [*still, *locks]
-    points, faces, colours, uv, count = [], [], [], [], 0
+    colours, uv = [], []
     shares = [np.zeros(len(tube.points)) for tube in still]
     for lock, tube in zip(style.locks, locks, strict=True):
         shares.append(lock.loose * (np.ones_like(tube.along) if lock.is_ball else tube.along**LOOSE_FROM))
@@ -84,15 +84,13 @@ def hair_piece(skin: HeadSkin, style: Hairstyle, palette: CharacterColours) -> H
         if style.fade and number == 0:
             own = np.array(palette.skin) * FADED_SKIN
             colour = own + (colour - own) * scalp.fade()[:, None]
-        points.append(tube.points)
-        faces.append(tube.triangles + count)
         colours.append(colour)
         uv.append(in_tile(tile, *tube.places.T))
-        count += len(tube.points)
-    span = MaterialSpan("hair", np.concatenate(faces), MATERIAL)
+    points = [tube.points for tube in tubes]
+    triangles = join_triangles([tube.triangles for tube in tubes], map(len, points))
     return HeadPart(
         np.concatenate(points),
-        (span,),
+        (MaterialSpan("hair", triangles, MATERIAL),),
         np.concatenate(colours),
         shapes=swing_shapes(np.concatenate(points), np.concatenate(shares), MIDDLE),
         uv=np.concatenate(uv),

@@ -12,7 +12,7 @@ from corpus_tools.shipped.head.correspondence import nearest_surface_points
 from corpus_tools.shipped.head.haircut import split_seams
 from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
 from corpus_tools.shipped.head.skin import HeadSkin, vertex_normals
-from corpus_tools.shipped.head.subdivision import triangulate
+from corpus_tools.shipped.head.subdivision import join_triangles, triangulate
 from tts2face.numeric.arrays import FloatArray, IntArray
 
 OFF_MM = 0.45  # above the skin
@@ -47,13 +47,11 @@ def bind_brows(folder: Path, cage: Cage, skin: HeadSkin) -> dict[str, BrowCards]
 def brow_piece(skin: HeadSkin, bound: dict[str, BrowCards], shown: str) -> HeadPart:
     """All sets of brows on a skin; those that are not shown lie inside the skull."""
     normals = vertex_normals(skin.vertices, skin.quads, skin.base)
-    points, faces, coordinates, count = [], [], [], 0
+    points = []
     for name, cards in bound.items():
         on_skin = np.einsum("nk,nkd->nd", cards.weights, (skin.vertices + OFF_MM * normals)[cards.corners])
         points.append(on_skin if name == shown else np.tile(HIDDEN, (len(on_skin), 1)))
-        faces.append(cards.triangles + count)
-        coordinates.append(cards.uv)
-        count += len(on_skin)
+    triangles = join_triangles([cards.triangles for cards in bound.values()], map(len, points))
     corners = np.concatenate([cards.corners for cards in bound.values()])
     weights = np.concatenate([cards.weights for cards in bound.values()])
     vertices = np.concatenate(points)
@@ -61,9 +59,9 @@ def brow_piece(skin: HeadSkin, bound: dict[str, BrowCards], shown: str) -> HeadP
     along = np.einsum("nk,nkd->nd", weights, skin.vertices[corners])[:, :1]
     return HeadPart(
         vertices,
-        (MaterialSpan("brows", np.concatenate(faces), BROW_MATERIAL),),
+        (MaterialSpan("brows", triangles, BROW_MATERIAL),),
         np.tile([0.27, 0.20, 0.15], (len(vertices), 1)),
         {name: shape for name, shape in moved.items() if np.abs(shape).max() > 1e-3},
-        np.concatenate(coordinates),
+        np.concatenate([cards.uv for cards in bound.values()]),
         np.sign(along) * np.array([0.95, 0.2, -0.25]),
     )

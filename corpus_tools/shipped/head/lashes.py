@@ -16,6 +16,7 @@ from corpus_tools.shipped.head.lid_edges import LidEdge
 from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
 from corpus_tools.shipped.head.skin import HeadSkin
 from corpus_tools.shipped.head.strands import number_islands
+from corpus_tools.shipped.head.subdivision import join_triangles
 from tts2face.numeric.arrays import FloatArray, IntArray
 
 COLOUR = np.array([0.07, 0.05, 0.04])
@@ -65,7 +66,7 @@ def bind_lashes(folder: Path, cage: Cage, skin: HeadSkin, edges: tuple[LidEdge, 
 
 def lash_piece(cage: Cage, skin: HeadSkin, bound: Mapping[str, LashCards], shown: str) -> HeadPart:
     """All sets of lashes of a head; those that are not shown lie inside the skull."""
-    points, faces, coordinates, tangents, count = [], [], [], [], 0
+    points, tangents = [], []
     shapes: dict[str, list[FloatArray]] = {name: [] for name in skin.shapes}
     for name, own in bound.items():
         places = own.asset.fit(cage.vertices, cage.source.vertices)[own.order]
@@ -75,18 +76,16 @@ def lash_piece(cage: Cage, skin: HeadSkin, bound: Mapping[str, LashCards], shown
             follow = np.einsum("nk,nkd->nd", own.weights, moved[own.roots])
             shapes[shape].append(follow + _turn(off, shape, own.is_upper & _is_beside(shape, root)))
         points.append(root + off if name == shown else np.tile(HIDDEN, (len(root), 1)))
-        faces.append(own.triangles + count)
-        coordinates.append(own.uv)
         tangents.append(off / np.maximum(np.linalg.norm(off, axis=1, keepdims=True), 1e-6))
-        count += len(root)
+    triangles = join_triangles([own.triangles for own in bound.values()], map(len, points))
     vertices = np.concatenate(points)
     joined = {name: np.concatenate(blocks) for name, blocks in shapes.items()}
     return HeadPart(
         vertices,
-        (MaterialSpan("lashes", np.concatenate(faces), MATERIAL),),
+        (MaterialSpan("lashes", triangles, MATERIAL),),
         np.tile(COLOUR, (len(vertices), 1)),
         {name: moved for name, moved in joined.items() if np.abs(moved).max() > 1e-3},
-        np.concatenate(coordinates),
+        np.concatenate([own.uv for own in bound.values()]),
         np.concatenate(tangents),
     )
 

@@ -8,7 +8,7 @@ from corpus_tools.shipped.head.edge_rings import EdgeRings, find_narrowest_ring
 from corpus_tools.shipped.head.eyes import RECEDE_MM, ball_radius
 from corpus_tools.shipped.head.parts import Eyeball, HeadPart, MaterialSpan
 from corpus_tools.shipped.head.skin import HeadSkin
-from corpus_tools.shipped.head.subdivision import grid_triangles
+from corpus_tools.shipped.head.subdivision import grid_triangles, join_triangles
 from tts2face.numeric.arrays import IntArray
 
 REACH_MM = 30.0
@@ -41,26 +41,24 @@ def find_lid_edges(skin: HeadSkin, balls: tuple[Eyeball, Eyeball]) -> tuple[LidE
 
 def wet_piece(skin: HeadSkin, balls: tuple[Eyeball, Eyeball], edges: tuple[LidEdge, LidEdge]) -> HeadPart:
     """Thin strips of tear fluid between the lower lids and the eyeballs."""
-    points, triangles, shapes, count = [], [], [], 0
-    for ball, edge in zip(balls, edges, strict=True):
-        line = edge.lower[1:-1]
+    points = []
+    lines = [edge.lower[1:-1] for edge in edges]
+    for ball, line in zip(balls, lines, strict=True):
         rim = skin.vertices[line]
         off = rim + np.array([0.0, WET_MM, 0.0]) - ball.centre
         distance = np.linalg.norm(off, axis=1)
         angle = np.arccos(np.clip(off[:, 2] / distance, -1, 1))
         on_ball = ball.centre + off * ((ball_radius(ball, angle) + WET_OFF_MM) / distance)[:, None]
         points += [rim, on_ball]
-        triangles.append(grid_triangles(2, len(line)) + count)
-        shapes += [line, line]
-        count += 2 * len(line)
-    rows = np.concatenate(shapes)
+    rows = np.concatenate([np.tile(line, 2) for line in lines])
+    triangles = join_triangles([grid_triangles(2, len(line)) for line in lines], (2 * len(line) for line in lines))
     vertices = np.concatenate(points)
     moved = {name: shape[rows] for name, shape in skin.shapes.items() if shape[rows].any()}
     for side, sign in (("Left", 1.0), ("Right", -1.0)):  # behind the shut lids, as the eyeball
         moved[f"eyeBlink{side}"] = moved[f"eyeBlink{side}"] - np.outer(sign * vertices[:, 0] > 0, [0, 0, RECEDE_MM])
     return HeadPart(
         vertices,
-        (MaterialSpan("wet", np.concatenate(triangles), WET_MATERIAL),),
+        (MaterialSpan("wet", triangles, WET_MATERIAL),),
         np.tile(WET_COLOUR, (len(vertices), 1)),
         moved,
     )

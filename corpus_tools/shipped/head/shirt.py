@@ -6,7 +6,7 @@ import numpy as np
 
 from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
 from corpus_tools.shipped.head.skin import HeadSkin, vertex_normals
-from corpus_tools.shipped.head.subdivision import triangulate
+from corpus_tools.shipped.head.subdivision import join_triangles, triangulate
 from tts2face.numeric.arrays import FloatArray, IntArray
 
 COLLAR_Y, COLLAR_SLOPE = -164.0, -0.30  # height in front of the neck, mm, and rise per mm towards the back
@@ -38,16 +38,11 @@ def shirt_piece(default: HeadSkin, own: HeadSkin, colour: FloatArray) -> HeadPar
     below = clip_sheet(whole, -height_above_collar(whole.points))
     band = clip_sheet(below, height_above_collar(below.points) + BAND_MM)
     body = clip_sheet(below, -height_above_collar(below.points) - BAND_MM + 0.6)
-    points, faces, colours, count = [], [], [], 0
-    for sheet, off, shade in ((body, BODY_OFF, 1.0), (band, BAND_OFF, 0.88)):
-        rolled = _roll_collar(sheet, off)
-        points.append(rolled.points)
-        faces.append(rolled.triangles + count)
-        colours.append(np.tile(colour * shade, (len(rolled.points), 1)))
-        count += len(rolled.points)
-    return HeadPart(
-        np.concatenate(points), (MaterialSpan("shirt", np.concatenate(faces), MATERIAL),), np.concatenate(colours)
-    )
+    rolled = [_roll_collar(body, BODY_OFF), _roll_collar(band, BAND_OFF)]
+    points = [sheet.points for sheet in rolled]
+    triangles = join_triangles([sheet.triangles for sheet in rolled], map(len, points))
+    shades = np.repeat([1.0, 0.88], [len(own) for own in points])
+    return HeadPart(np.concatenate(points), (MaterialSpan("shirt", triangles, MATERIAL),), np.outer(shades, colour))
 
 
 def clip_sheet(sheet: Sheet, inside: FloatArray | None) -> Sheet:

@@ -1,5 +1,8 @@
 """Catmull-Clark subdivision of a quad mesh as a matrix, which also applies to shapes and texture coordinates."""
 
+from collections.abc import Iterable, Sequence
+from itertools import accumulate
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -69,6 +72,12 @@ def grid_triangles(n_rows: int, n_columns: int, *, is_closed: bool = False) -> N
             np.stack([here, beside + n_columns, here + n_columns], axis=1),
         ]
     ).astype(np.int64)
+
+
+def join_triangles(triangles: Sequence[NDArray[np.int64]], n_points: Iterable[int]) -> NDArray[np.int64]:
+    """(F, 3) triangles of pieces, one after the other, over the joined points of all; `n_points` is of each piece."""
+    firsts = accumulate(n_points, initial=0)  # one more than there are pieces
+    return np.concatenate([own + first for own, first in zip(triangles, firsts, strict=False)])
 
 
 def _edges(quads: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.shipped.head.cage import SCALE
 from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
-from corpus_tools.shipped.head.subdivision import grid_triangles
+from corpus_tools.shipped.head.subdivision import grid_triangles, join_triangles
 from tts2face.numeric.arrays import FloatArray, smoothstep
 
 # Sizes after Wheeler, Dental Anatomy. The incisors touch the inner side of the lips, 2.5 mm (upper) and 6 mm (lower)
@@ -94,21 +94,21 @@ LOWER = Arch(
 def arch_piece(arch: Arch, name: str) -> HeadPart:
     """Crowns and gum of an arch; its two spans are ``teeth_<name>`` and ``gums_<name>``."""
     path = arch_path(arch.curve)
-    points, colours, triangles, count = [], [], [], 0
+    points, colours = [], []
     for side in (1.0, -1.0):
         along = 0.0
         for width, height, depth, light in zip(arch.widths, arch.heights, arch.depths, SHADE, strict=True):
             crown, enamel = _crown(width, height, depth)
             points.append(_place_crown(crown, path, side * (along + width / 2), arch))
             colours.append(light * enamel)
-            triangles.append(_tube_triangles(len(LEVELS), N_AROUND, closed_start=True) + count)
-            count += len(crown)
             along += width
-    vertices, faces = np.concatenate(points), np.concatenate(triangles)
+    vertices = np.concatenate(points)
+    tube = _tube_triangles(len(LEVELS), N_AROUND, closed_start=True)
+    faces = join_triangles([tube] * len(points), map(len, points))
     gum = gum_piece(path, arch, GUM)
     spans = (
         MaterialSpan(f"teeth_{name}", _wind_outward(faces, arch.up), MATERIALS["teeth"]),
-        MaterialSpan(f"gums_{name}", gum.spans[0].triangles + count, MATERIALS["gums"]),
+        MaterialSpan(f"gums_{name}", gum.spans[0].triangles + len(vertices), MATERIALS["gums"]),
     )
     return HeadPart(np.concatenate([vertices, gum.vertices]), spans, np.concatenate([*colours, gum.colours]))
 
