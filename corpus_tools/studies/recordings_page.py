@@ -89,6 +89,7 @@ def thumbnails(found: Observations) -> dict[str, NDArray[np.uint8]]:
 
 
 def _read_pictures(video: Path, moments: Sequence[tuple[float, str]]) -> Iterator[tuple[str, NDArray[np.uint8]]]:
+    # the next one is last, where it is popped
     remaining = list(reversed(moments))
     try:
         for picture in read_frames(video):
@@ -143,6 +144,7 @@ def _kept_item(observation: Observation, picture: NDArray[np.uint8] | None) -> s
     texts = []
     for measure, (label, unit, factor) in MEASURES.items():
         value = factor * getattr(observation.quality, measure)
+        # 0 is a finding of these; of the others it says that nothing is wrong
         if measure in {"fit", "snr_db", "turn_deg"} or (value != 0 and measure != "score"):
             texts.append(f"{label} {value:.3g} {unit}".strip())
     how = " (phones recognised)" if observation.is_recognised else ""

@@ -82,5 +82,6 @@ def mapped_motion(
     found = []
     for utterance in utterances:
         motion = map_audio_to_motion(sounds[utterance.name], talker.audio_maps[name], talker, utterance.fps)[1].values
+        # the sound may end a little before the pictures: its last motion is held
         found.append(motion[np.minimum(np.arange(len(utterance.landmarks)), len(motion) - 1)])
     return found

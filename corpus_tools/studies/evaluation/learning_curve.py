@@ -115,6 +115,7 @@ def choose_material(
         for amount in sorted(set(amounts_s))
         if amount < SAME_AMOUNT * total
     ]
+    # all material leaves nothing to choose, so it is measured once
     return (*found, (tuple(train),))
 
 
@@ -123,6 +124,7 @@ def _nearest_choice(
 ) -> tuple[Observation, ...]:
     ends = np.cumsum([len(train[at].landmarks) / train[at].fps for at in order])
     n_chosen = int(np.argmin(np.abs(ends - amount_s))) + 1
+    # in the order of the recordings, as all material is
     return tuple(train[at] for at in np.sort(order[:n_chosen]))
 
 

@@ -45,6 +45,7 @@ class FeatureMap:
             features.append(talker_features(talker, at)[here])
             parameters.append(utterance.shape[here, :n_speech].astype(np.float64))
         seen, wanted = np.concatenate(features), np.concatenate(parameters)
+        # a feature that never changes has no spread to divide by
         scored = (seen - seen.mean(axis=0)) / np.maximum(seen.std(axis=0), 1e-9)
         centred = wanted - wanted.mean(axis=0)
         # Features are nearly linear in the parameters: the slopes of that regression give the features back exactly,
@@ -79,6 +80,7 @@ def lip_observations(pooled: Sequence[PooledSpeech], talker: Talker) -> tuple[Ob
 
 def _touching_opening(feature_map: FeatureMap, talker: Talker) -> float:
     """z-scored opening at which the talker's lips touch, at the median of its other features."""
+    # standard deviations, in steps of .05
     steps = np.linspace(-6.0, 6.0, 241)
     features = np.zeros((len(steps), feature_map.matrix.shape[1]))
     features[:, OPENING] = steps
@@ -105,6 +107,7 @@ def _part(track: PooledSpeech, landmarks: NDArray[np.float32], number: int, firs
     inside = [at for at in range(len(track.phones)) if edges[at + 1] > start and edges[at] < stop]
     times = np.concatenate([[start], edges[[at + 1 for at in inside[:-1]]], [stop]]) - start
     phones = PhoneSequence([track.phones.phones[at] for at in inside], times)
+    # lip tracks hold neither the pose nor the loudness
     head = np.zeros((end - first_frame, 6), np.float32)
     name = f"{track.name}-{number:03d}"
     return Observation(

@@ -39,6 +39,7 @@ def read_material(
         return read_person(folder)
     if base is None:
         raise InputError(f"{folder} holds lip tracks, which a base talker's recordings align; give --base")
+    # what is held out here may have trained them
     if "pooled" in base.metadata:
         raise InputError(
             f"the networks of the base {base.metadata.get('name', '')} were pooled with lip tracks, perhaps these; "

@@ -265,6 +265,7 @@ def _frame_phones(test: TestUtterance) -> NDArray[np.int64]:
     """(T,) index of the phone at each evaluated frame."""
     phones = test.observation.phones
     times = np.arange(test.evaluated.start, test.evaluated.start + len(test.real)) / test.observation.fps
+    # frames beyond the labelled phones count to the first or the last
     return np.clip(np.searchsorted(phones.edges, times, side="right") - 1, 0, len(phones) - 1)
 
 

@@ -73,6 +73,7 @@ def map_tracks(
         [tracks[recording.name].at(np.arange(len(recording.shape)) / talker.fps) for recording in known]
     )
     targets = np.concatenate([recording.shape[:, :n_speech] for recording in known]).astype(np.float64)
+    # a channel that is constant in training has no spread to divide by
     spread = np.maximum(terms.std(axis=0), 1e-9)
     middle = targets.mean(axis=0)
     fit = fit_ridge(terms / spread, targets - middle)

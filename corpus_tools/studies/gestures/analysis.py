@@ -283,6 +283,7 @@ def _compare_motion(palette: Palette, held_out: Style, kinds: list[list[Motion]]
     intensity = frame_midpoints(held_out.intensity, held_out.lengths)
     found = []
     for trait in style_traits(palette, held_out):
+        # one row for each motion; blinks are events, compared by their own traits
         if not trait.name.endswith(" speed") or trait.feature == "blink":
             continue
         feature = trait.feature
@@ -316,6 +317,7 @@ def _compare_motion(palette: Palette, held_out: Style, kinds: list[list[Motion]]
 
 def _diversity(clips: list[NDArray[np.floating]], real: NDArray[np.floating], held_out: Style) -> float:
     """Mean of `diversity` over the sounds of the recordings."""
+    # distances between recordings need two
     if len(held_out.lengths) < 2:
         return float("nan")
     least = int(held_out.lengths.min())

@@ -76,10 +76,12 @@ def _blink_phases(lids: FloatArray, fps: float) -> FloatArray:
     starts = np.flatnonzero(~closed[:-1] & closed[1:])
     for start in starts:
         after = np.flatnonzero(~closed[start + 1 :])
+        # the recording ends while they are closed
         if not len(after):
             break
         end = start + 1 + int(after[0])  # the first open frame
         top = start + int(np.argmax(lids[start : end + 1]))
+        # lids that only narrow are no blink
         if lids[top] <= SHUT:
             continue
         first = start + (OPEN - lids[start]) / (lids[start + 1] - lids[start])

@@ -56,6 +56,7 @@ def spectrum(values: Motion, lengths: Lengths, fps: float) -> Spectrum:
     hz: Motion = np.zeros(0)
     used = 0
     for part in split_recordings(values, lengths):
+        # welch would shorten its window, and the frequencies would differ from the others'
         if len(part) < SEGMENT:
             continue
         level = part.astype(np.float64) - part.mean(axis=0, dtype=np.float64)

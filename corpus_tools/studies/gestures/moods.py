@@ -63,6 +63,7 @@ class MoodOptions:
     def __post_init__(self) -> None:
         """Check the types and the numbers."""
         check_fields(self)
+        # half of them train the classifier, half test it
         if self.seeds < 4 or self.seeds % 2:
             raise InputError(f"the seeds must be an even number of 4 or more, not {self.seeds}")
         if self.first_seed < 0:

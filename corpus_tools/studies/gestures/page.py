@@ -88,6 +88,7 @@ def distribution_panel(style: StyleStudy, compared: TraitComparison) -> Panel:
                 axes.stairs(shares, edges, color=colour, linestyle=dash, linewidth=1.5, label=name)
                 highest = max(highest, shares.max() if name in names[:2] else 0.0)
         axes.set(title=compared.trait.name, xlabel=f"{compared.trait.name}{unit}", ylabel="% of values")
+        # room above for the legend
         axes.set(xlim=edges[[0, -1]], ylim=(0, 1.25 * highest or 1.0))
         if axes.patches:
             axes.legend()
@@ -107,6 +108,7 @@ def spectrum_panel(style: StyleStudy, moving: FeatureComparison) -> Panel:
         ]
         top = float(np.ceil(np.log10(max(highest, default=1.0))))
         for name, spectrum, (colour, dash) in zip(series_names(style), moving.spectra, SERIES, strict=False):
+            # without 0 Hz (the mean was removed); the scale is logarithmic, where 0 has no place
             axes.plot(spectrum.hz[1:], np.maximum(spectrum.power[1:], 1e-30), color=colour, linestyle=dash, label=name)
         axes.set(
             title=title, xlabel="frequency, Hz", ylabel=f"power, {moving.unit}²/Hz" if moving.unit else "power, 1/Hz"

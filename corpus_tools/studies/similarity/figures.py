@@ -81,6 +81,7 @@ def difference_figure(analysis: Analysis, compared: TableComparison, labels: str
     """The differences of two talkers, ordered by similarity of the differences."""
     distance = np.sqrt(np.square(compared.difference[:, None] - compared.difference[None, :]).sum(axis=2))
     order = cluster_tree(distance).order
+    # a round end of the scale, and equal tables have one, too
     largest = max(0.1, float(np.ceil(np.abs(compared.difference).max() * 10) / 10))
     return TableFigure(
         f"{analysis.name} minus {compared.other}",
@@ -145,6 +146,7 @@ def _draw_tree(axes: "Axes", joins: FloatArray, cut: float | None) -> None:
     axes.add_collection(LineCollection(list(joins), colors=INK, linewidths=1.3))
     if cut is not None:
         axes.axvline(cut, color=SECOND, linestyle="dashed")
+    # leaves at the right, beside their rows
     axes.set(xlim=(1.04 * joins[..., 0].max(), 0), ylim=(len(joins) + 0.5, -0.5), yticks=(), xlabel="1 - similarity")
     axes.spines["left"].set_visible(False)
     axes.grid(visible=False)

@@ -50,6 +50,7 @@ def mantel(
         raise InputError(
             "all pairs of a table have the same value, so that no correlation is defined; compare other tables"
         )
+    # an order that leaves all as it is must count, whatever the rounding of its sum
     as_high = shuffled_correlations(first, second, orders) >= found - 1e-12
     return Agreement(found, (1 + int(as_high.sum())) / (1 + n_permutations), n_permutations, len(upper_triangle(first)))
 

@@ -87,6 +87,7 @@ def split_half(
         if on_half is not None:
             on_half()
         enough = is_included & (np.minimum(tables[0].counts, tables[1].counts) >= LEAST_TOKENS)
+        # a half drew too few tokens; the others decide
         if enough.sum() < LEAST_PHONES:
             continue
         row, r = _agreement(tables, enough)

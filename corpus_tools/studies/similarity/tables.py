@@ -59,6 +59,7 @@ def collect_spoken_tokens(talker: Talker, name: str) -> SpokenTokens:
     """Tokens of a talker."""
     tokens = collect_tokens(talker)
     n_speech = talker.model.n_speech
+    # a mode that never moves must not divide by 0
     spread = np.maximum(talker.model.spread[:n_speech], 1e-6).astype(np.float32)
     counts = np.bincount(tokens.phone, minlength=len(tokens.inventory))
     sounding = [label for label in tokens.inventory if label != SILENCE]

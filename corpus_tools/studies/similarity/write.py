@@ -90,6 +90,7 @@ def _round_values(values: NDArray[np.floating]) -> Any:
     """Lists with four decimals, None for NaN."""
     if values.ndim > 1:
         return [_round_values(row) for row in values]
+    # JSON has no NaN
     return [round(float(value), 4) if np.isfinite(value) else None for value in values]
 
 
