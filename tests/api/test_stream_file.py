@@ -90,7 +90,7 @@ def test_sound_is_that_of_the_clip(format: str, session: tts2face.Session, clip:
     exact = format in {"wav", "pcm", "flac"}
     assert len(samples) == len(sound.samples) if exact else len(samples) >= len(sound.samples) - 240
     at = 0 if exact else int(np.argmax(np.correlate(samples[:60_000], sound.samples[12_000:36_000]))) - 12_000
-    assert abs(at) <= 2400  # delay of a codec
+    assert abs(at) <= 0.005 * 24_000
     shared = samples[max(at, 0) :][: len(sound.samples) - 3000]
     given = sound.samples[max(-at, 0) :][: len(shared)]
     if exact:
@@ -157,6 +157,12 @@ def test_a_complete_file_has_its_length_in_its_header(
     if format == "wav":
         with wave.open(io.BytesIO(content(iter(chunks)))) as sound:
             assert sound.getnframes() == len(clip.speech.waveform.samples)
+
+
+def test_flac_is_sent_with_its_length(session: tts2face.Session, clip: tts2face.Clip) -> None:
+    with av.open(io.BytesIO(content(session.stream_file(TEXT, "flac", fps=25)))) as file:
+        stream = file.streams.audio[0]
+        assert stream.duration * stream.time_base == pytest.approx(clip.speech.waveform.duration, abs=1e-4)
 
 
 @pytest.mark.parametrize("format", ["mp4", "webm"])

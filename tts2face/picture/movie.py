@@ -60,11 +60,12 @@ MKV_MOVIE = MovieKind(
 )  # parts that are joined into .webm
 
 
-# Movies that are sent while they are made: fragments of a fifth of a second that refer to no later picture.
+# Movies that are sent while they are made: fragments of a fifth of a second that refer to no later picture. The header
+# waits for the first fragment: only then does it know the encoder's delay, by which sound is late without an edit list.
 STREAMED_MP4 = MovieKind(
     "mp4", "libx264", "aac", 128_000,
     MappingProxyType({**MP4_MOVIE.video_options, "bf": "0", "rc-lookahead": "0"}),
-    MappingProxyType({"movflags": "+frag_keyframe+empty_moov+default_base_moof", "frag_duration": "200000",
+    MappingProxyType({"movflags": "+frag_keyframe+empty_moov+default_base_moof+delay_moov", "frag_duration": "200000",
                       "flush_packets": "1"}),
 )  # fmt: skip
 

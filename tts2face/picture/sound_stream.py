@@ -1,13 +1,14 @@
 """Encoded sound, sent while it is made or written as a complete file."""
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from tts2face.picture.write_buffer import WriteBuffer
@@ -17,28 +18,48 @@ from tts2face.types import Chunk, Waveform
 UNKNOWN_BYTES = 0xFFFFFFFF  # size of a WAV file that is not yet known; players read to the end of the stream
 HEAD_BYTES = 44  # of a WAV file, before its samples
 OPUS_RATE = 48_000  # Hz
+PCM_RATE = 24_000  # Hz of samples without a header, whatever the voice: what OpenAI's and HeadTTS' clients play
 BLOCK_S = 0.5  # of sound that a codec encodes at a time; a sentence takes up to 0.2 s
 
 
 @dataclass(frozen=True, slots=True)
 class SoundKind:
-    """Container and codec of a sound format, its media type, and its sample rate if the codec fixes it."""
+    """Container and codec of a sound format.
+
+    Parameters
+    ----------
+    bits
+        Per second.
+    rate
+        Sample rate, where the codec or the clients fix it.
+    lead
+        Samples of silence with which the encoder's delay is whole packets. They are left out of what is sent while it
+        is made and cannot name the delay, so that its first sample is that of the sound. None: its header names it.
+    names_delay
+        So does that of a complete file, which is written at last.
+    is_sent_whole
+        Without its length in its header the file is damaged for some readers: it is sent when all is made.
+    """
 
     media_type: str
     container: str = ""
     codec: str = ""
     bits: int = 0
     rate: int | None = None
+    lead: int | None = None
+    names_delay: bool = True
+    is_sent_whole: bool = False
 
 
 SOUND_KINDS = {
     "wav": SoundKind("audio/wav"),
-    "pcm": SoundKind("audio/pcm"),
-    "mp3": SoundKind("audio/mpeg", "mp3", "libmp3lame", 64_000),
+    "pcm": SoundKind("audio/pcm", rate=PCM_RATE),
+    # LAME's 576 samples and a decoder's 529 are two packets of 576 at 8 to 24 kHz, or one of 1,152 above.
+    "mp3": SoundKind("audio/mpeg", "mp3", "libmp3lame", 64_000, lead=47),
     "opus": SoundKind("audio/ogg", "ogg", "libopus", 48_000, OPUS_RATE),
     "weba": SoundKind("audio/webm", "webm", "libopus", 48_000, OPUS_RATE),  # Opus for MediaSource, which takes no Ogg
-    "aac": SoundKind("audio/aac", "adts", "aac", 96_000),
-    "flac": SoundKind("audio/flac", "flac", "flac"),
+    "aac": SoundKind("audio/aac", "adts", "aac", 96_000, lead=0, names_delay=False),  # one packet of 1,024
+    "flac": SoundKind("audio/flac", "flac", "flac", is_sent_whole=True),  # libsndfile cannot seek without it (238)
 }
 _NO_RANDOM_IDS = {"fflags": "+bitexact"}
 _CONTAINER_OPTIONS = {"ogg": _NO_RANDOM_IDS, "webm": _NO_RANDOM_IDS}
@@ -51,7 +72,7 @@ def encode_sound(sounds: Iterator[Waveform], format: str, path: Path | None = No
     Parameters
     ----------
     format
-        One of `SOUND_KINDS`; ``wav`` and ``pcm`` have 16 bits, ``pcm`` has no header.
+        One of `SOUND_KINDS`; ``wav`` and ``pcm`` have 16 bits, ``pcm`` has no header and `PCM_RATE`.
     path
         Where a complete file is written, whose header has its length; chunks are empty then.
 
@@ -69,7 +90,7 @@ def encode_sound(sounds: Iterator[Waveform], format: str, path: Path | None = No
         for sound in sounds:
             if encoder is None:
                 rate = sound.rate
-                encoder = _open_encoder(kind, rate, path, has_header=format == "wav")
+                encoder = _CodecEncoder(kind, rate, path) if kind.codec else _PcmEncoder(kind, rate, path)
             if sound.rate != rate:
                 raise InputError(f"sounds of one file must share the sample rate {rate} Hz; one has {sound.rate} Hz")
             for block in _blocks(sound) if kind.codec else [sound]:
@@ -80,10 +101,6 @@ def encode_sound(sounds: Iterator[Waveform], format: str, path: Path | None = No
     finally:
         if encoder is not None:
             encoder.finish()
-
-
-def _open_encoder(kind: SoundKind, rate: int, path: Path | None, *, has_header: bool) -> "_PcmEncoder | _CodecEncoder":
-    return _CodecEncoder(kind, rate, path) if kind.codec else _PcmEncoder(rate, path, has_header=has_header)
 
 
 def _blocks(sound: Waveform) -> Iterator[Waveform]:
@@ -105,33 +122,44 @@ def wav_header(rate: int, n_bytes: int | None) -> bytes:
 
 
 class _PcmEncoder:
-    """Encoder without compression."""
+    """Encoder without compression; a kind with a rate of its own has no header."""
 
-    def __init__(self, rate: int, path: Path | None, *, has_header: bool) -> None:
-        self._rate = rate
-        self._has_header = has_header
-        self._n_bytes = 0
+    def __init__(self, kind: SoundKind, rate: int, path: Path | None) -> None:
+        self._rate, self._n_bytes = kind.rate or rate, 0
+        self._has_header = kind.rate is None
+        self._resampler: Any = None
+        if self._rate != rate:
+            import soxr
+
+            self._resampler = soxr.ResampleStream(rate, self._rate, 1, dtype="float32")
         self._file = None if path is None else path.open("wb")
-        self._header = wav_header(rate, None) if has_header else b""
+        self._header = wav_header(self._rate, None) if self._has_header else b""
 
     def add(self, sound: Waveform) -> bytes:
-        header, self._header = self._header, b""
-        samples = pcm_bytes(sound.samples)
-        if self._file is None:
-            return header + samples
-        self._n_bytes += len(samples)
-        # the size has 32 bits
-        if self._has_header and self._n_bytes > UNKNOWN_BYTES - HEAD_BYTES:
-            raise InputError("a .wav file has at most 4 GB of sound; choose flac, or divide the text")
-        self._file.write(header + samples)
-        return b""
+        samples = sound.samples
+        return self._written(samples if self._resampler is None else self._resampler.resample_chunk(samples))
 
     def finish(self) -> bytes:
+        rest = b""
+        if self._resampler is not None:
+            rest = self._written(self._resampler.resample_chunk(np.zeros(0, np.float32), last=True))
         if self._file is not None:
             if self._has_header:
                 self._file.seek(0)
                 self._file.write(wav_header(self._rate, self._n_bytes))
             self._file.close()
+        return rest
+
+    def _written(self, samples: NDArray[np.float32]) -> bytes:
+        content = self._header + pcm_bytes(samples.clip(-1.0, 1.0))
+        self._n_bytes += len(content) - len(self._header)
+        self._header = b""
+        if self._file is None:
+            return content
+        # the size has 32 bits
+        if self._has_header and self._n_bytes > UNKNOWN_BYTES - HEAD_BYTES:
+            raise InputError("a .wav file has at most 4 GB of sound; choose flac, or divide the text")
+        self._file.write(content)
         return b""
 
 
@@ -149,17 +177,28 @@ class _CodecEncoder:
         self._stream: Any = self._container.add_stream(kind.codec, rate=kind.rate or rate, layout="mono")
         if kind.bits:
             self._stream.codec_context.bit_rate = kind.bits
+        self._keeps_all = kind.lead is None or (path is not None and kind.names_delay)
+        if not self._keeps_all and kind.lead:
+            self._n_samples = -kind.lead
+            self._encode(np.zeros(kind.lead, np.float32))
 
     def add(self, sound: Waveform) -> bytes:
-        import av
-
-        frame = av.AudioFrame.from_ndarray(np.ascontiguousarray(sound.samples[None, :]), format="fltp", layout="mono")
-        frame.sample_rate, frame.pts, frame.time_base = self._rate, self._n_samples, Fraction(1, self._rate)
-        self._n_samples += len(sound.samples)
-        self._container.mux(self._stream.encode(frame))
+        self._encode(sound.samples)
         return self._buffer.take()
 
     def finish(self) -> bytes:
-        self._container.mux(self._stream.encode(None))
+        self._mux(self._stream.encode(None))
         self._container.close()
         return self._buffer.take()
+
+    def _encode(self, samples: NDArray[np.float32]) -> None:
+        import av
+
+        frame = av.AudioFrame.from_ndarray(np.ascontiguousarray(samples[None, :]), format="fltp", layout="mono")
+        frame.sample_rate, frame.pts, frame.time_base = self._rate, self._n_samples, Fraction(1, self._rate)
+        self._n_samples += len(samples)
+        self._mux(self._stream.encode(frame))
+
+    def _mux(self, packets: Iterable[Any]) -> None:
+        """Write packets, but for those before the sound, whose number no header would name."""
+        self._container.mux([packet for packet in packets if self._keeps_all or packet.pts >= 0])

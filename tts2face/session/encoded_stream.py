@@ -77,14 +77,29 @@ def encode_stream(prepared: PreparedRequest, models: SessionModels, format: Stre
     """Synthesise and encode a request; yields consecutive chunks of a file."""
     request, name = prepared.request, format.name
     if name in MOVIE_KINDS or name in SOUND_KINDS:
-        if not format.is_complete:
-            return _encode_media(prepared, models, format, None)
-        return encode_complete(lambda path: _encode_media(prepared, models, format, path), name)
+        return encode_media(
+            lambda path: _encode_media(prepared, models, format, path), name, is_complete=format.is_complete
+        )
     if name not in line_formats():
         file, face = f"clip.{name}", models.face(has_gestures=request.has_gestures)
         return encode_whole(models.pieces(prepared), file, face, lambda folder: folder / file)
     mesh = models.face(has_gestures=request.has_gestures).mesh if line_formats()[name].uses_face else None
     return encode_lines(models.pieces(prepared), name, mesh)
+
+
+def encode_media(write: Callable[[Path | None], Iterator[Chunk]], format: str, *, is_complete: bool) -> Iterator[Chunk]:
+    """Chunks of a movie or sound while it is made, or of a complete file, as the format may demand.
+
+    Parameters
+    ----------
+    write
+        Writes the file to a path, or gives its chunks where there is none.
+    format
+        A movie, or one of `SOUND_KINDS`.
+    """
+    if is_complete or (format in SOUND_KINDS and SOUND_KINDS[format].is_sent_whole):
+        return _encode_complete(write, format)
+    return write(None)
 
 
 def _encode_media(
@@ -103,7 +118,7 @@ def _encode_media(
     return encode_sound((piece.speech.waveform for piece in pieces), format.name, path)
 
 
-def encode_complete(write: Callable[[Path], Iterator[Chunk]], format: str) -> Iterator[Chunk]:
+def _encode_complete(write: Callable[[Path], Iterator[Chunk]], format: str) -> Iterator[Chunk]:
     """Chunks without content while a file is written to the path that `write` gets, then its bytes."""
     with tempfile.TemporaryDirectory(prefix="tts2face-") as folder:
         path = Path(folder, f"clip.{format}")

@@ -60,7 +60,7 @@ def timed_speech(session: "Session", work: Work, _: Inputs) -> Iterator[Event | 
     The format of a task without one is PCM. The sound of a complete file comes after all events.
     """
     from tts2face.picture.sound_stream import encode_sound
-    from tts2face.session.encoded_stream import encode_complete
+    from tts2face.session.encoded_stream import encode_media
 
     format = work.format or "pcm"
     events: list[Event] = []
@@ -70,10 +70,10 @@ def timed_speech(session: "Session", work: Work, _: Inputs) -> Iterator[Event | 
             events.append(_timed_event(timed))
             yield timed.speech.waveform
 
-    def write(path: Path | None = None) -> Iterator[Chunk]:
+    def write(path: Path | None) -> Iterator[Chunk]:
         return encode_sound(sounds(), format, path)
 
-    for chunk in encode_complete(write, format) if work.is_complete else write():
+    for chunk in encode_media(write, format, is_complete=work.is_complete):
         yield from events
         events.clear()
         yield chunk
@@ -88,7 +88,6 @@ def _timed_event(timed: "Piece") -> Event:
     times = [(float(a) + start, float(b) + start) for a, b in zip(phones.edges, phones.edges[1:], strict=False)]
     labels = [Label(phone, *span) for phone, span in zip(phones.phones, times, strict=True)]
     return Event({
-        "rate": spoken.waveform.rate,
         "marks": [[mark.name, mark.seconds] for mark in timed.marks],
         "words": [[word.text, times[word.first][0], times[word.last - 1][1]] for word in spoken.words],
         "phones": [[label.text, label.start, label.end] for label in labels],

@@ -14,7 +14,7 @@ from fastapi.responses import JSONResponse, PlainTextResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from tts2face.interchange.exports.labels import Label
-from tts2face.picture.sound_stream import wav_header
+from tts2face.picture.sound_stream import PCM_RATE, wav_header
 from tts2face.serving.service.client_names import Adjustments, choose_voice, limited_rate
 from tts2face.serving.service.clip_options import described, resolve_dictionary
 from tts2face.serving.service.errors import ErrorBody, RefusedError
@@ -162,8 +162,7 @@ async def _speak(
     await adjustments.note_words(state, text, body.language)
     fields = await resolve_dictionary(state.library, request.state.key, fields)
     events, pcm = await timed_speech(request, state.results.work(kind="speech", request=fields))
-    rate = events[0]["rate"] if events else 24_000
-    sound = pcm if body.audioEncoding == "pcm" else wav_header(rate, len(pcm)) + pcm
+    sound = pcm if body.audioEncoding == "pcm" else wav_header(PCM_RATE, len(pcm)) + pcm
     return audio_fields(events, subtitles) | {"audioEncoding": body.audioEncoding}, sound
 
 
