@@ -29,6 +29,7 @@ def service_with_harness(folder: Path) -> AbstractContextManager[ServeProcess]:
 def create_project(browser: Browser, url: str, text: str) -> str:
     """Id of a project that is made of a text on the first page; its own page is open then."""
     browser.open(f"{url}/studio/")
+    browser.wait("return window.did_handshake")  # a page that waits long for its socket is loaded again, and empty then
     browser.type("Text to speak", text)
     browser.click("Create from text")
     browser.wait("return location.pathname.includes('/animate/')")

@@ -199,7 +199,7 @@ def test_a_deleted_job_takes_its_results_along_unless_another_has_them(api: http
 
 def test_a_cancelled_job_frees_the_worker(api: httpx.Client) -> None:
     long = submit(api, {"text": "This is a long clip, which nobody wants. " * 12, "format": "mp4"}).json()
-    eventually(lambda: api.get(f"/v1/jobs/{long['id']}").json()["state"] != "waiting")
+    eventually(lambda: api.get(f"/v1/jobs/{long['id']}").json()["started"])
     cancelled = api.post(f"/v1/jobs/{long['id']}/cancel").json()
     assert (cancelled["state"], cancelled["results"]) == ("cancelled", [])
     assert api.post(f"/v1/jobs/{long['id']}/cancel").json() == cancelled
