@@ -18,6 +18,8 @@ from tts2face.storage.output_paths import refuse_overwriting
 if TYPE_CHECKING:
     from tts2face.picture.options import Picture
     from tts2face.session.named_models import Models
+    from tts2face.session.outputs import WrittenClip
+    from tts2face.session.performance import Performance
 
 
 def mimic(  # noqa: PLR0913 - one parameter a flag
@@ -82,9 +84,17 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
         written = session.write_performance(performance, out, picture=picture, exports=exports, stages=stages)
     if quiet:
         return
+    _report(written, performance, time.perf_counter() - began)
+
+
+def _report(written: "WrittenClip", performance: "Performance", took: float) -> None:
+    """Say what is written, and what is guessed about the sound."""
+    from tts2face.video.media import channel_notes
+
+    for note in channel_notes([performance.audio or performance.take]):
+        write_message(f"tts2face: note: {note}")
     if written.is_silent:
-        write_message(f"{take} contains no sound; the clip is silent")
-    took = time.perf_counter() - began
+        write_message(f"{performance.take} contains no sound; the clip is silent")
     write_message(
         f"wrote {written.names}: {written.seconds:.1f} s, made in {took:.1f} s "
         f"({written.seconds / took:.1f} x real time)"

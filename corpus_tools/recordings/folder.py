@@ -13,7 +13,7 @@ from lexicon.normalize import normalize
 from lexicon.values.tables import read_table
 from tts2face.sound.word_lattice import PronouncedWords, Pronunciations
 
-VIDEO_SUFFIXES = frozenset({".mkv", ".mp4", ".mov", ".webm", ".avi", ".mpg", ".mpeg", ".m4v"})
+VIDEO_SUFFIXES = frozenset({".mkv", ".mp4", ".mov", ".webm", ".avi", ".mpg", ".mpeg", ".m4v", ".ts", ".mts"})
 MANIFEST = "manifest.csv"
 # Names of letters in ARPABET, in southern British and in American English.
 LETTER_NAMES = {

@@ -22,6 +22,7 @@ from corpus_tools.recordings.video import CachedTracker, TrackedVideo
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.sound.praat import intensity
+from tts2face.video.media import channel_notes
 from tts2face.video.pose import PoseFreeLandmarks, head_angles, remove_pose
 from tts2face.video.resampling import resample_to_grid, trim_and_fill
 
@@ -163,7 +164,7 @@ def observe_recording(
         ),
         video=recording.video,
         is_recognised=sound.is_recognised,
-        mismatches=tuple(mismatch.sentence for mismatch in sound.mismatches),
+        mismatches=(*(mismatch.sentence for mismatch in sound.mismatches), *channel_notes([recording.video])),
     )
 
 

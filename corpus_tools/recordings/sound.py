@@ -24,9 +24,9 @@ from tts2face.video.media import read_sound
 # seconds
 LEVEL_WINDOW_S = 0.02
 ALIGNMENT_KIND = "alignment"
-ALIGNMENT_VERSION = 7  # increased when alignment gives other edges, which invalidates cached ones
+ALIGNMENT_VERSION = 8  # increased when alignment gives other edges, which invalidates cached ones
 RECOGNITION_KIND = "hearing"
-RECOGNITION_VERSION = 2  # increased when other phones are recognised
+RECOGNITION_VERSION = 3  # increased when other phones are recognised
 SOUND_RATE = 16_000  # Hz; input of the aligner and the recogniser
 MAX_UTTERANCE_S = 20.0  # longer recordings are cut at pauses
 

@@ -23,10 +23,9 @@ from corpus_tools.recordings.light import measure_light
 
 TRACKING_KIND = "tracking"
 LIGHT_KIND = "light"
-LIGHT_VERSION = 1  # increased when the measures of light change
-TRACKING_VERSION = 2  # increased when tracking gives other values, which invalidates cached ones
-# of the faces of a frame
-NOT_COUNTED = -1
+LIGHT_VERSION = 2  # increased when the measures of light change
+TRACKING_VERSION = 3  # increased when tracking gives other values, which invalidates cached ones
+NOT_COUNTED = -1  # of the faces of a frame
 ShareCallback = Callable[[float], None]  # called with the finished share of a video
 
 

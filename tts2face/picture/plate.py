@@ -12,7 +12,7 @@ from lexicon.errors import DataError
 from tts2face.models.appearance import Appearance, Plate, TextureModel
 from tts2face.numeric.arrays import Float32Array
 from tts2face.picture.options import SIDE_LIMITS_PX, Picture
-from tts2face.video.media import metadata_options
+from tts2face.video.container import metadata_options
 
 if TYPE_CHECKING:
     from PIL.Image import Image as PilImage

@@ -140,7 +140,7 @@ def prepare(request: Request) -> PreparedRequest:
         synthesis_options(request),
         read_dictionary(request.dictionary).entries if request.dictionary else {},
         listening=listening_timeline(request),
-        notes=notes,
+        notes=(*notes, *_notes_on(source)),
     )
     if not source.text and not isinstance(source, Spoken):
         return prepared
@@ -160,6 +160,16 @@ def recordings(source: Source) -> dict[str, Path]:
             return {"partner": source.partner}
         case _:
             return {}
+
+
+def _notes_on(source: Source) -> tuple[str, ...]:
+    """Sentences on what is guessed about the recordings of a source."""
+    found = recordings(source).values()
+    if not found:
+        return ()
+    from tts2face.video.media import channel_notes
+
+    return channel_notes(found)
 
 
 def prepare_request(text: str | Request | PreparedRequest, options: dict[str, Any]) -> PreparedRequest:

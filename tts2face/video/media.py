@@ -1,37 +1,47 @@
 """Decoding of the pictures and sound of media files.
 
-Times are presentation times of the file, in seconds, for pictures and sound alike, so that both are synchronous.
+Times are seconds from the start of the file, for pictures and sound alike, so that both are synchronous. As in players,
+the file starts where the first of them does, whatever its clock says there: that of a broadcast runs on for hours.
 """
 
-import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from lexicon.values.files import check_regular_file
 from tts2face.types import Waveform
+from tts2face.video.channels import ChannelMix, choose_mix
+from tts2face.video.container import (
+    decode_frames,
+    decode_packets,
+    file_version,
+    first_decodable,
+    open_container,
+    sound_stream,
+    start_time,
+    video_stream,
+)
 
 if TYPE_CHECKING:
     from av.audio.frame import AudioFrame
-    from av.audio.stream import AudioStream
     from av.container import InputContainer
     from av.video.frame import VideoFrame
     from av.video.stream import VideoStream
 
-
-Stream = TypeVar("Stream", "AudioStream", "VideoStream")
-
-AV_WITHOUT_OPTION = 19  # version of PyAV from which on other characters in metadata never raise
-MAX_SHORTFALL_S = 0.25  # a file that ends this much before its stated end is truncated; codecs pad by less
-MAX_DELAY_S = 60.0  # largest start time of the sound; larger values indicate damage
+MAX_DELAY_S = 60.0  # of the sound behind the pictures, and of a gap in it; beyond, a clock was set anew
+LEAST_GAP_S = 0.1  # in the times of the sound that is silence; less is rounding of the file's clock
+ABSOLUTE_DURATION = "matroska"  # whose duration ends at its last time stamp, wherever it starts
+DEFAULT_FPS = 25  # of a broadcast that states none
 MAX_FPS = 240.0  # upper limit of cameras; higher stated rates are those of the file's time base
 QUARTER_TURN_DEG = 90
+BROADCASTS = ("mpegts", "mpeg")  # formats whose clock may be set anew, as where two files are joined
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,13 +73,15 @@ def read_media_info(path: Path) -> MediaInfo:
     DataError
         The file is damaged or has no video.
     """
-    with _open_container(path) as container:
-        stream = _video_stream(container, path)
+    with open_container(path) as container:
+        stream = video_stream(container, path)
         context = stream.codec_context
-        sound = _first_decodable(container.streams.audio)
+        sound = first_decodable(container.streams.audio)
+        duration = (container.duration or 0) / 1e6  # FFmpeg counts it in microseconds
+        if ABSOLUTE_DURATION in container.format.name:
+            duration -= start_time(path)
         return MediaInfo(
-            # FFmpeg counts the duration of a file in microseconds
-            (container.duration or 0) / 1e6,
+            duration,
             _frame_rate(container, stream, path),
             context.width,
             context.height,
@@ -87,17 +99,18 @@ def read_frames(path: Path) -> Iterator[TimedFrame]:
     DataError
         The file has no video, a frame cannot be decoded, or the file ends before its stated duration.
     """
-    with _open_container(path) as container:
-        stream = _video_stream(container, path)
+    start = start_time(path)
+    with open_container(path) as container:
+        stream = video_stream(container, path)
         stream.thread_type = "NONE"  # recordings are read in parallel, one process each
-        for frame in _decode_frames(container, stream, path):
+        for time, frame in _timed_frames(container, stream, path, start):
             if frame.is_corrupt:
-                raise DataError(f"{path} is damaged at {frame.time or 0:.2f} s; copy or record it again")
-            yield TimedFrame(_presentation_time(frame, path), _upright_pixels(frame))
+                raise DataError(f"{path} is damaged at {time:.2f} s; copy or record it again")
+            yield TimedFrame(time, _upright_pixels(frame))
 
 
 def read_sound(path: Path, rate: int) -> Waveform:
-    """Read the sound of a file as mono at `rate` Hz; sample 0 is at time 0 of the file.
+    """Read the sound of a file as mono at `rate` Hz; sample 0 is at the start of the file.
 
     Raises
     ------
@@ -108,21 +121,18 @@ def read_sound(path: Path, rate: int) -> Waveform:
     """
     import soxr
 
-    blocks: list[NDArray[np.float32]] = []
-    with _open_container(path) as container:
-        stream = _sound_stream(container, path)
-        start = 0.0
-        for frame in _decode_frames(container, stream, path):
-            if not blocks:
-                start = _first_sample_time(frame, path)
-            blocks.append(_mix_to_mono(frame))
-        source_rate = stream.rate
-    sound = _shift_samples(np.concatenate(blocks), round(start * source_rate))
+    with _open_sound(path) as (source_rate, blocks):
+        sound = np.concatenate(list(blocks))
     return Waveform(np.clip(soxr.resample(sound, source_rate, rate), -1.0, 1.0), rate)
 
 
-def sound_blocks(path: Path, rate: int) -> Iterator[NDArray[np.float32]]:
+def sound_blocks(path: Path, rate: int, formats: str | None = None) -> Iterator[NDArray[np.float32]]:
     """Yield the sound of a file, as `read_sound` returns it, in blocks, for bounded memory.
+
+    Parameters
+    ----------
+    formats
+        As `tts2face.video.container.open_container`, for the file of a stranger.
 
     Raises
     ------
@@ -131,70 +141,74 @@ def sound_blocks(path: Path, rate: int) -> Iterator[NDArray[np.float32]]:
     """
     import soxr
 
-    with _open_container(path) as container:
-        stream = _sound_stream(container, path)
-        resampler = soxr.ResampleStream(stream.rate, rate, 1, dtype="float32")
-        n_early: int | None = None  # number of samples before time 0 that remain to be skipped
-        for frame in _decode_frames(container, stream, path):
-            samples = _mix_to_mono(frame)
-            if n_early is None:
-                offset = round(_first_sample_time(frame, path) * stream.rate)
-                samples, n_early = _shift_samples(samples, max(offset, 0)), max(-offset, 0)
-            cut = min(n_early, len(samples))
-            n_early -= cut
-            yield np.clip(resampler.resample_chunk(samples[cut:]), -1.0, 1.0)
+    with _open_sound(path, formats) as (source_rate, blocks):
+        resampler = soxr.ResampleStream(source_rate, rate, 1, dtype="float32")
+        for samples in blocks:
+            yield np.clip(resampler.resample_chunk(samples), -1.0, 1.0)
         yield np.clip(resampler.resample_chunk(np.zeros(0, np.float32), last=True), -1.0, 1.0)
 
 
-def _first_sample_time(frame: "AudioFrame", path: Path) -> float:
-    start = float(frame.time or 0.0)
-    if abs(start) > MAX_DELAY_S:
-        raise DataError(f"{path} is damaged: its sound starts at {start:.0f} s; copy or convert it")
-    return start
+def channel_mix(path: Path, formats: str | None = None) -> ChannelMix:
+    """How the channels of a file become one; from all of its sound, if it has several channels."""
+    return _channel_mix(path, file_version(path), formats)
 
 
-def metadata_options() -> dict[str, Any]:
-    """Arguments of `av.open` for metadata that are not UTF-8, which older programs write."""
-    import av
+def channel_notes(paths: Iterable[Path]) -> tuple[str, ...]:
+    """Sentences for the user on what is guessed about the channels of files; none of files that cannot be read."""
+    notes = []
+    for path in paths:
+        with suppress(InputError, DataError):  # who reads the sound says so
+            notes.append(channel_mix(path).note(path.name))
+    return tuple(filter(None, notes))
 
-    return {"metadata_errors": "replace"} if int(av.__version__.partition(".")[0]) < AV_WITHOUT_OPTION else {}
+
+@lru_cache(maxsize=64)
+def _channel_mix(path: Path, version: tuple[int, int, int], formats: str | None) -> ChannelMix:
+    with open_container(path, formats) as container:
+        stream = sound_stream(container, path)
+        if stream.codec_context.channels == 1:
+            return ChannelMix(np.ones(1))
+        return choose_mix(decode_packets(container.demux(stream), path, start_time(path, formats)))
 
 
 @contextmanager
-def _open_container(path: Path) -> Iterator["InputContainer"]:
-    import av
-
-    if not os.path.lexists(path):
-        raise InputError(f"there is no recording {path}; check the path")
-    check_regular_file(path)
-    # FFmpeg says "invalid data" of an empty file
-    if path.stat().st_size == 0:
-        raise DataError(f"{path} is empty (0 bytes); copy or record it again")
-    try:
-        with av.open(str(path), **metadata_options()) as container:
-            yield container
-    except (av.FFmpegError, OSError) as broken:
-        reason = getattr(broken, "strerror", None) or broken
-        raise DataError(f"{path} cannot be read as video or sound ({reason}); copy or convert it") from broken
+def _open_sound(path: Path, formats: str | None = None) -> Iterator[tuple[int, Iterator[NDArray[np.float32]]]]:
+    """Sample rate of a file's sound, and its samples as one channel, in blocks from the start of the file."""
+    start, mix = start_time(path, formats), channel_mix(path, formats)
+    with open_container(path, formats) as container:
+        stream = sound_stream(container, path)
+        yield stream.rate, _timed_samples(decode_frames(container, stream, path, start), mix, start, path)
 
 
-def _video_stream(container: "InputContainer", path: Path) -> "VideoStream":
-    stream = _first_decodable(container.streams.video)
-    if stream is None:
-        raise DataError(f"{path} holds no video; give a recording with pictures")
-    return stream
+def _timed_samples(
+    frames: Iterator["AudioFrame"], mix: ChannelMix, start: float, path: Path
+) -> Iterator[NDArray[np.float32]]:
+    """Samples of frames, with silence where the file has a time but no sound."""
+    expected = start
+    for number in count():
+        frame = next(frames, None)
+        if frame is None:
+            return
+        samples = mix.mono(frame)
+        gap = 0.0 if frame.time is None else float(frame.time) - expected
+        if number == 0 and gap > MAX_DELAY_S:
+            raise DataError(
+                f"the sound of {path} begins {gap:.0f} s after its pictures, more than {MAX_DELAY_S:g} s; cut the "
+                "file where the sound begins"
+            )
+        if number == 0 or LEAST_GAP_S < gap <= MAX_DELAY_S:
+            samples = _shift_samples(samples, round(gap * frame.sample_rate))
+        if number == 0 or abs(gap) > LEAST_GAP_S:
+            expected += gap
+        expected += frame.samples / frame.sample_rate
+        yield samples
 
 
-def _sound_stream(container: "InputContainer", path: Path) -> "AudioStream":
-    stream = _first_decodable(container.streams.audio)
-    if stream is None:
-        raise DataError(f"{path} holds no sound; give a recording with its sound track")
-    return stream
-
-
-def _first_decodable(streams: Sequence[Stream]) -> Stream | None:
-    """The first stream that can be decoded; damaged files may have streams of unknown kinds."""
-    return next((stream for stream in streams if stream.codec_context is not None), None)
+def _shift_samples(samples: NDArray[np.float32], offset: int) -> NDArray[np.float32]:
+    """Samples delayed by `offset` samples: padded with zeros, or cut if the offset is negative."""
+    if offset >= 0:
+        return np.concatenate([np.zeros(offset, np.float32), samples])
+    return samples[-offset:]
 
 
 def _frame_rate(container: "InputContainer", stream: "VideoStream", path: Path) -> float:
@@ -210,6 +224,23 @@ def _frame_rate(container: "InputContainer", stream: "VideoStream", path: Path) 
     return counted
 
 
+def _timed_frames(
+    container: "InputContainer", stream: "VideoStream", path: Path, start: float
+) -> "Iterator[tuple[float, VideoFrame]]":
+    """Frames with their times after `start`; a broadcast whose clock is set anew goes on with the next frame."""
+    is_broadcast = not {*container.format.name.split(",")}.isdisjoint(BROADCASTS)
+    before: float | None = None
+    offset = start
+    for frame in decode_frames(container, stream, path, start):
+        time = _presentation_time(frame, path) - offset
+        if is_broadcast and before is not None and not before < time <= before + MAX_DELAY_S:
+            step = float(1 / (stream.average_rate or stream.guessed_rate or DEFAULT_FPS))
+            offset += time - before - step
+            time = before + step
+        yield time, frame
+        before = time
+
+
 def _presentation_time(frame: "VideoFrame", path: Path) -> float:
     if frame.time is None:
         raise DataError(f"{path} has frames without a time; convert it with ffmpeg")
@@ -221,41 +252,3 @@ def _upright_pixels(frame: "VideoFrame") -> NDArray[np.uint8]:
     # telephones film upright by turning the picture when it is shown
     turns = round(frame.rotation / QUARTER_TURN_DEG) % 4
     return np.ascontiguousarray(np.rot90(pixels, turns)) if turns else pixels
-
-
-def _decode_frames(container: "InputContainer", stream: Any, path: Path) -> Iterator[Any]:
-    """Decode the frames of one stream; DataError after the last one if the file is truncated."""
-    n_frames, end = 0, 0.0
-    for packet in container.demux():
-        if packet.pts is not None and packet.time_base:
-            end = max(end, float((packet.pts + (packet.duration or 0)) * packet.time_base))
-        if packet.stream is stream:
-            for frame in packet.decode():
-                yield frame
-                n_frames += 1
-    if n_frames == 0:
-        raise DataError(f"{path} holds a {stream.type} track without a frame; copy or record it again")
-    stated = (container.duration or 0) / 1e6
-    if end < stated - MAX_SHORTFALL_S:
-        raise DataError(f"{path} is truncated: it ends at {end:.2f} s of {stated:.2f} s; copy it again")
-
-
-def _mix_to_mono(frame: "AudioFrame") -> NDArray[np.float32]:
-    samples: NDArray[Any] = frame.to_ndarray()
-    channels = frame.layout.nb_channels
-    if not frame.format.is_planar:
-        samples = samples.reshape(-1, channels).T
-    mean: NDArray[np.float64] = samples.astype(np.float64).mean(axis=0)
-    if samples.dtype == np.uint8:
-        # 8-bit sound is unsigned
-        mean = (mean - 128.0) / 128.0
-    elif np.issubdtype(samples.dtype, np.integer):
-        mean = mean / -float(np.iinfo(samples.dtype).min)
-    return mean.astype(np.float32)
-
-
-def _shift_samples(samples: NDArray[np.float32], offset: int) -> NDArray[np.float32]:
-    """Samples delayed by `offset` samples: padded with zeros, or cut if the offset is negative."""
-    if offset >= 0:
-        return np.concatenate([np.zeros(offset, np.float32), samples])
-    return samples[-offset:]

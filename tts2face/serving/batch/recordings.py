@@ -8,7 +8,7 @@ from pathlib import Path
 from lexicon.errors import InputError
 
 SOUND_SUFFIXES = frozenset({".wav", ".flac", ".mp3", ".m4a", ".ogg", ".opus", ".aac", ".aif", ".aiff", ".mp4", ".mov",
-                            ".mkv", ".webm"})  # fmt: skip
+                            ".mkv", ".webm", ".ts", ".mpg", ".mpeg", ".avi", ".m4v"})  # fmt: skip
 _NUMBERED = re.compile(r"(?:(?P<name>.*)[-_ .])?0*(?P<number>\d{1,9})")
 
 

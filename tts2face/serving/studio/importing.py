@@ -24,6 +24,7 @@ from tts2face.session.project import MAX_NAME, Project
 
 SOUND_SUFFIXES = (
     ".wav", ".mp3", ".ogg", ".oga", ".opus", ".flac", ".aac", ".m4a", ".mp4", ".mov", ".webm", ".mkv", ".aiff",
+    ".ts", ".mpg", ".mpeg", ".avi", ".m4v", ".ac3", ".wma", ".caf",
 )  # fmt: skip
 TEXT_SUFFIXES = (".txt", ".ssml", ".md")
 RECORDING = "recording.wav"

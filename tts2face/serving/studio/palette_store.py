@@ -26,7 +26,7 @@ MAX_OWN_STYLES = 50
 TAKE = "take"
 CACHE = "cache"
 MADE = "made.palette"
-SUFFIXES = frozenset({".webm", ".mp4", ".mov", ".mkv", ".avi", ".mpg", ".csv"})  # of takes
+SUFFIXES = frozenset({".webm", ".mp4", ".mov", ".mkv", ".avi", ".mpg", ".ts", ".csv"})  # of takes
 
 
 def own_palette(studio: Path, owner: str) -> Path:

@@ -16,6 +16,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from lexicon.errors import DataError, Tts2faceError
 from tts2face.processes.child import Call, Handler
 from tts2face.processes.program import ProcessLimits, Program
@@ -45,10 +47,12 @@ PLACES = "places"
 LIMITS = ProcessLimits(memory_bytes=2 << 30, cpu_s=60, file_bytes=1 << 30, n_files=64)
 MEDIA_BYTES = 1 << 30  # of addresses of a reader of sounds, videos and subtitles; 265 MB measured
 RESOURCE_CPU_S = 180  # a resource with its picture takes 3 to 5 s, at the first time with the compilation of kernels
-SOUND_FORMATS = "wav,mp3,ogg,flac,aac,mov,mp4,m4a,matroska,webm,aiff,caf"
+SOUND_FORMATS = "wav,mp3,ogg,flac,aac,mov,mp4,m4a,matroska,webm,aiff,caf,w64,au,ac3,eac3,amr,asf,avi,flv,mpegts,mpeg"
+HALF_RANGE = 1 << 15  # of 16 bits: a sound of 16 bits stays as it is
 # Formats of recordings, with the endings under which other readers recognise them.
 VIDEO_FORMATS = {
     "mov": ".mp4", "mp4": ".mp4", "matroska": ".mkv", "webm": ".webm", "avi": ".avi", "mpegps": ".mpg", "mpeg": ".mpg",
+    "mpegts": ".ts",
 }  # fmt: skip
 MAX_VIDEO_PIXELS, MAX_VIDEO_FPS = 4096 * 2304, 240
 PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TIFF")
@@ -79,30 +83,27 @@ def _decoding(kind: str, source: Path, *errors: type[Exception]) -> Iterator[Non
 
 
 def decode_sound(source: Path, target: Path, max_seconds: float) -> None:
-    """Write the first sound stream of a file as mono 16-bit .wav at `SOUND_RATE`."""
-    import wave
+    """Write the sound of a file as mono 16-bit .wav at `SOUND_RATE`."""
+    from tts2face.storage.wave_files import open_wave
+    from tts2face.video.media import sound_blocks
 
-    import av
-
-    # A playlist could name other files: only formats without references, and no protocol to open them.
-    options = {"format_whitelist": SOUND_FORMATS, "protocol_whitelist": "none"}
-    with (
-        _decoding("sound", source, av.FFmpegError, ValueError, EOFError),
-        source.open("rb") as file,
-        av.open(file, "r", options=options) as container,
-    ):
-        if not container.streams.audio:
-            raise RefusedFileError("it has no sound")
-        resampler = av.AudioResampler(format="s16", layout="mono", rate=SOUND_RATE)
-        n_left = int(max_seconds * SOUND_RATE)
-        with wave.open(str(target), "wb") as out:
-            out.setparams((1, 2, SOUND_RATE, 0, "NONE", "not compressed"))
-            for frame in container.decode(audio=0):
-                for part in resampler.resample(frame):
-                    n_left -= part.samples
-                    if n_left < 0:
-                        raise RefusedFileError(f"it is longer than {max_seconds:g} s")
-                    out.writeframesraw(bytes(part.planes[0])[: 2 * part.samples])
+    n_left = int(max_seconds * SOUND_RATE)
+    try:
+        with _decoding(SOUND, source), open_wave(str(target), SOUND_RATE) as out:
+            for block in sound_blocks(source, SOUND_RATE, SOUND_FORMATS):
+                n_left -= len(block)
+                if n_left < 0:
+                    raise RefusedFileError(f"it is longer than {max_seconds:g} s")
+                steps = np.clip(np.rint(block * HALF_RANGE), -HALF_RANGE, HALF_RANGE - 1).astype("<i2")
+                out.writeframesraw(steps.tobytes())
+    except RefusedFileError:
+        raise
+    except DataError as wrong:
+        if "cannot be read as" in str(wrong):
+            raise RefusedFileError(
+                "it is no sound that can be decoded; send WAV, MP3, FLAC, Ogg, MP4, WebM or MPEG"
+            ) from wrong
+        raise RefusedFileError(str(wrong).replace(f"{source} ", "it ", 1)) from wrong
     if n_left == int(max_seconds * SOUND_RATE):
         raise RefusedFileError("its sound is empty")
 
