@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from cli.batch_plan import print_plan
+from cli.batch_plan import place_of, print_plan
 from cli.flags import Face, Hair, HairColor, add_option_flags, options_from_flags, switch, whole_number
 from cli.process import WhatRemains, write_message
 from cli.progress import progress_bar
@@ -31,7 +31,12 @@ MAX_WARNINGS = 40  # on the terminal; all are in the manifest
 
 @add_option_flags(("Batch", BatchOptions), ("Speech and motion", Request), ("Picture", Picture), without=NOT_IN_BATCH)
 def batch(  # noqa: PLR0913 - one parameter a flag
-    *subtitles: Annotated[Path, Parameter(help="Subtitle files: .srt, .vtt, .ass, .ssa, .ttml.")],
+    *subtitles: Annotated[
+        Path,
+        Parameter(
+            help="Subtitle files: .srt, .vtt, .ass, .ssa, .ttml, .sbv, .sub, .lrc, .smi, or films with a track of them."
+        ),
+    ],
     out: Annotated[Path, Parameter(help="Folder of the clips and of manifest.json and manifest.csv.", alias="-o")],
     cast: Annotated[
         Path | None, Parameter(help="TOML file that gives speakers their talker, voice, face, style, ...")
@@ -108,6 +113,8 @@ def batch(  # noqa: PLR0913 - one parameter a flag
         raise InputError("no cue can be spoken, so there is nothing to make; the warnings say why")
     if dry_run:
         return print_plan(plan, out, (store, write_lines), quiet=quiet)
+    for note in () if quiet else plan.notes:
+        write_message(f"tts2face: {place_of(note)}: {note.message}")
     from tts2face.serving.batch.report import measure_plan, write_table
     from tts2face.serving.batch.run import SEGMENT_FOLDER
     from tts2face.serving.batch.store import open_store
@@ -200,7 +207,6 @@ def _finish(result: "BatchResult", out: Path, *, quiet: bool) -> None:
 
 def _print_warnings(plan: "Plan") -> None:
     for warning in plan.warnings[:MAX_WARNINGS]:
-        place = f"{warning.file}, line {warning.line}" if warning.line else warning.file
-        write_message(f"tts2face: warning: {place}: {warning.message}")
+        write_message(f"tts2face: warning: {place_of(warning)}: {warning.message}")
     if len(plan.warnings) > MAX_WARNINGS:
         write_message(f"{len(plan.warnings) - MAX_WARNINGS} more warnings will be in the manifest")

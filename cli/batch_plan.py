@@ -7,8 +7,13 @@ from typing import TYPE_CHECKING
 from cli.progress import progress_bar
 
 if TYPE_CHECKING:
-    from tts2face.serving.batch.output import Plan
+    from tts2face.serving.batch.output import Plan, PlanWarning
     from tts2face.serving.batch.segment_result import SegmentResult
+
+
+def place_of(warning: "PlanWarning") -> str:
+    """File and line of a warning or note."""
+    return f"{warning.file}, line {warning.line}" if warning.line else warning.file
 
 
 def print_plan(plan: "Plan", out: Path, files: tuple[str | None, Path | None], *, quiet: bool) -> None:
@@ -27,6 +32,8 @@ def print_plan(plan: "Plan", out: Path, files: tuple[str | None, Path | None], *
     for output in plan.outputs:
         length = max((cue.end_s for cue in output.cues), default=output.begin_s) - output.begin_s
         print(f"{output.name}  {output.begin_s:.2f} s  {length:.2f} s  {len(output.cues)} cues")  # noqa: T201 - the result
+    for note in plan.notes:
+        print(f"{place_of(note)}: {note.message}")  # noqa: T201 - the result
     _print_speakers(plan)
     _print_rates(plan, results)
     print(  # noqa: T201 - the result

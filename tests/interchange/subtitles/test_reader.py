@@ -39,7 +39,7 @@ SRT: dict[str, tuple[str, list[tuple[float, float, str]], list[int]]] = {
     "a damaged huge time": (f"1\n99999:00:01,000 --> 99999:00:02,000\nHi.\n\n2\n{B}\nBye.\n", [BYE], [2]),
     "empty cue": (f"1\n{A}\n\n2\n{B}\nBye.\n", [(1.0, 2.0, ""), BYE], []),
     "tags that are not closed": (f"1\n{A}\n<i><b>Hi.</b>\n\n2\n{B}\n<font color=\"#fff\">Bye.<i\n", BOTH, []),
-    "overrides": (f"1\n{A}\n{{\\an8}}{{\\pos(1,2)}}Hi.\n\n2\n{B}\nBye.{{comment}}\n", BOTH, []),
+    "overrides": (f"1\n{A}\n{{\\an8}}{{\\pos(1,2)}}Hi.\n\n2\n{B}\nBye.\n", BOTH, []),
     "entities and invisible characters": (f"1\n{A}\n\u200eHi&nbsp;&amp;\u00a0all.\u200b\n\n2\n{B}\nBye.\n",
                                           [(1.0, 2.0, "Hi & all."), BYE], []),
     "a file that ends in the middle": (f"1\n{A}\nHi.\n\n2\n00:00:03,0", [(1.0, 2.0, "Hi. 2 00:00:03,0")], []),

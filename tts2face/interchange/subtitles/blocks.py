@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from tts2face.interchange.subtitles.clock import HAS_ARROW, TIMING, clock_seconds
 from tts2face.interchange.subtitles.cues import SubtitleWarning, WrittenCue
@@ -43,20 +43,19 @@ def read_webvtt(lines: Sequence[str]) -> tuple[list[WrittenCue], list[SubtitleWa
     for block in _blocks(kept, warnings, are_ids_words=True):
         if block.begin_s is None:
             continue
-        cue = _cue(block)
-        voice, language = _VOICE.search(cue.text), _LANGUAGE.search(cue.text)
-        cues.append(
-            WrittenCue(
-                cue.begin_s,
-                cue.end_s,
-                cue.text,
-                cue.line,
-                speaker=" ".join(voice["name"].split()) if voice else "",
-                style=voice["classes"].lstrip(".") if voice else "",
-                language=language[1] if language else None,
-            )
-        )
+        cues.append(with_voice(_cue(block)))
     return cues, warnings
+
+
+def with_voice(cue: WrittenCue) -> WrittenCue:
+    """A cue of WebVTT with the speaker, class and language of its tags."""
+    voice, language = _VOICE.search(cue.text), _LANGUAGE.search(cue.text)
+    return replace(
+        cue,
+        speaker=" ".join(voice["name"].split()) if voice else "",
+        style=voice["classes"].lstrip(".") if voice else "",
+        language=language[1] if language else None,
+    )
 
 
 def _without_unspoken(lines: Sequence[str]) -> list[str]:

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from tts2face.interchange.subtitles.markup import SUBRIP_MARKUP, Markup
+
 
 @dataclass(frozen=True, slots=True)
 class WrittenCue:
@@ -20,6 +22,10 @@ class WrittenCue:
         Name of the speaker and of the style, where the format has them; else empty.
     language
         Language tag of the cue or of the whole file; else None.
+    markup
+        What its text holds besides words.
+    kind
+        One of `tts2face.interchange.subtitles.unspoken.KINDS`, where the file says that it is not said; else empty.
     """
 
     begin_s: float
@@ -29,6 +35,8 @@ class WrittenCue:
     speaker: str = ""
     style: str = ""
     language: str | None = None
+    markup: Markup = SUBRIP_MARKUP
+    kind: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +95,7 @@ class Cue:
 
 @dataclass(frozen=True, slots=True)
 class SubtitleWarning:
-    """A defect of a subtitle file and how it was read."""
+    """A defect of a subtitle file and how it was read, or a note of what was found in it."""
 
     line: int
     message: str
@@ -95,8 +103,12 @@ class SubtitleWarning:
 
 @dataclass(frozen=True, slots=True)
 class Subtitles:
-    """Cues of a file in order of time, and its defects in order of their lines."""
+    """Cues of a file in order of time, its defects in order of their lines, and what else is worth saying.
+
+    `notes` say what is shown and not spoken, and who speaks.
+    """
 
     path: Path
     cues: tuple[Cue, ...]
     warnings: tuple[SubtitleWarning, ...]
+    notes: tuple[SubtitleWarning, ...] = ()

@@ -1,153 +1,201 @@
-"""Reading of subtitle files: SubRip, WebVTT, SubStation Alpha and TTML, with warnings in place of refusals.
+"""Reading of subtitle files, with warnings in place of refusals.
 
 How the next format is made:
 
 1. Write a function from the lines of a file to `WrittenCue` objects and `SubtitleWarning` objects in a module of its
    own here, as `tts2face.interchange.subtitles.substation` does; a DataError only where nothing can be read.
-2. Name the format below, with its endings in `SUFFIXES`, recognise its content in `subtitle_format`, and call the
-   function in `_read`; order, missing ends and speakers are the same for all formats.
+2. Name the format in `tts2face.interchange.subtitles.formats`, with its endings in `SUFFIXES`, recognise its content
+   in `subtitle_format`, and call the function in `read_format`; order, missing ends, repeats and speakers are the same
+   for all formats.
 3. Say in docs/subtitles.md what is read of it, and add its file and its defects to tests/interchange/subtitles.
 """
 
-import re
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from lexicon.errors import DataError
-from tts2face.interchange.subtitles.blocks import read_subrip, read_webvtt
-from tts2face.interchange.subtitles.clock import HAS_ARROW
+from lexicon.values.files import check_regular_file
+from tts2face.interchange.subtitles.binary import HEAD_BYTES, check_text, is_ebu, is_film
 from tts2face.interchange.subtitles.cues import Cue, Subtitles, SubtitleWarning, WrittenCue
-from tts2face.interchange.subtitles.decoding import read_text
-from tts2face.interchange.subtitles.spoken_text import spoken_text
-from tts2face.interchange.subtitles.substation import read_substation
-from tts2face.interchange.subtitles.ttml import read_ttml
+from tts2face.interchange.subtitles.decoding import decode_file
+from tts2face.interchange.subtitles.encodings import Decoded
+from tts2face.interchange.subtitles.formats import NAMES, read_format
+from tts2face.interchange.subtitles.labels import find_speakers
+from tts2face.interchange.subtitles.markup import plain_text
+from tts2face.interchange.subtitles.reading import AS_IS, Reading
+from tts2face.interchange.subtitles.repeats import without_carried, without_copies
+from tts2face.interchange.subtitles.spoken_text import SpokenText, spoken_lines, spoken_text
+from tts2face.interchange.subtitles.timing import MAX_S, estimated_end, placed
+from tts2face.interchange.subtitles.unspoken import LYRICS, REPEATS, SIGNS, notes_of, with_credits
 
-SUBRIP = "SubRip"
-WEBVTT = "WebVTT"
-SUBSTATION = "SubStation Alpha"
-TTML = "TTML"
-SUFFIXES = {
-    ".srt": SUBRIP,
-    ".vtt": WEBVTT,
-    ".ass": SUBSTATION,
-    ".ssa": SUBSTATION,
-    ".ttml": TTML,
-    ".dfxp": TTML,
-    ".itt": TTML,
-    ".xml": TTML,
-}
-CHARACTERS_PER_S = 15.0  # of speech; for the end of a cue whose own end is missing
-MIN_ESTIMATED_S = 1.0
-MAX_S = 1e6  # 11 days; larger times are damaged
-_XML = re.compile(r"\s*<(?:\?xml|!DOCTYPE|!--|(?:\w+:)?tt[\s>])")
-_SECTION = re.compile(r"^\s*\[(?:Script Info|V4\+? Styles|Events)\]", re.IGNORECASE | re.MULTILINE)
+MAX_NAMED = 12  # speakers in a note
+OVERLAP_S = 1e-6
 
 
-def read_subtitles(path: Path | str, encoding: str | None = None) -> Subtitles:
-    """Cues of a subtitle file in order of time, and warnings of its defects.
+@dataclass(slots=True)
+class _File:
+    """A file while it is read: its cues as they are written, its film, and what is worth saying."""
+
+    written: list[WrittenCue] = field(default_factory=list)
+    warnings: list[SubtitleWarning] = field(default_factory=list)
+    film_s: float | None = None
+
+
+def read_subtitles(path: Path | str, encoding: str | None = None, reading: Reading = AS_IS) -> Subtitles:
+    """Cues of a subtitle file, or of a film's track of subtitles, in order of time, and warnings of its defects.
 
     The content decides the format where it is unmistakable, else the suffix. Defects are read as players do and
     reported with their lines: missing blank lines and numbers, unreadable times, cues out of order, ends before begins,
-    overlaps, duplicates, missing headers.
+    overlaps, duplicates, missing headers. What is shown twice is spoken once, and what nobody says has no words; notes
+    say how much.
 
     Parameters
     ----------
     encoding
-        Encoding of text that is neither UTF-8 nor marked; None: Windows 1252.
+        Encoding of text that is neither UTF-8 nor marked; None: it is guessed, with a warning.
+    reading
+        Other choices, as the language, speakers, and what is spoken of what is only shown.
 
     Raises
     ------
     InputError
-        There is no such encoding.
+        There is no such encoding or track.
     DataError
-        The file cannot be read or contains no cue.
+        The file cannot be read, contains no cue, or its times cannot be meant.
     """
     path = Path(path)
-    text = read_text(path, encoding).replace("\r\n", "\n").replace("\r", "\n")
     try:
-        written, warnings = _read(text, path)
+        file = _read(path, encoding, reading)
+        cues = placed(file.written, file.warnings, shift=reading.shift, film_s=file.film_s)
     except DataError as wrong:
-        raise DataError(f"{path}, {wrong}") from wrong
-    cues = _timed(_ordered(written, warnings), warnings)
+        raise wrong if str(path) in str(wrong) else DataError(f"{path}, {wrong}") from wrong
     if not cues:
-        raise DataError(f"{path} contains no subtitles; export them again")
-    return Subtitles(path, cues, tuple(sorted(warnings, key=lambda warning: warning.line)))
+        raise DataError(_nothing(path, file.warnings))
+    notes: list[SubtitleWarning] = []
+    if REPEATS not in reading.keep:
+        cues = without_carried(without_copies(cues, file.warnings), notes)
+    cues = _without_styles_of_all(with_credits(cues))
+    timed = _timed(cues, reading, file.warnings, notes)
+    by_line = sorted(file.warnings, key=lambda warning: warning.line)
+    return Subtitles(path, timed, tuple(by_line), tuple(notes))
 
 
-def subtitle_format(text: str, suffix: str) -> str:
-    """Format of the text of a subtitle file: by its content where that is unmistakable, else by its suffix."""
-    head = text.lstrip("\ufeff \t\n")
-    if head.startswith("WEBVTT"):
-        return WEBVTT
-    if _XML.match(text):
-        return TTML
-    if _SECTION.search(text):
-        return SUBSTATION
-    named = SUFFIXES.get(suffix.lower(), SUBRIP)
-    return SUBRIP if named in (SUBSTATION, TTML) and HAS_ARROW.search(text) else named
+def _read(path: Path, encoding: str | None, reading: Reading) -> _File:
+    """Cues of a file as they are written, in its order."""
+    check_regular_file(path)
+    try:
+        with path.open("rb") as opened:
+            head = opened.read(HEAD_BYTES)
+    except OSError as refused:
+        raise DataError(f"{path} cannot be read ({refused.strerror}); check the file") from refused
+    check_text(head, str(path))
+    if is_ebu(head):
+        raise DataError(f"{path} is EBU STL, which is not read; convert it to .srt, as with Subtitle Edit")
+    if is_film(head):
+        from tts2face.interchange.subtitles.film_track import read_film
+
+        written, warnings, film_s = read_film(path, reading.language, reading.track)
+        return _File(written, warnings, reading.film_s or film_s)
+    decoded = decode_file(path, encoding, reading.language)
+    text = decoded.text.replace("\r\n", "\n").replace("\r", "\n")
+    written, warnings = read_format(text, path.suffix, reading)
+    return _File(written, [*_encoding_warnings(decoded), *warnings], reading.film_s)
 
 
-def _read(text: str, path: Path) -> tuple[list[WrittenCue], list[SubtitleWarning]]:
-    kind = subtitle_format(text, path.suffix)
-    if kind == TTML:
-        return read_ttml(text)
-    lines = text.split("\n")
-    if kind == SUBSTATION:
-        return read_substation(lines)
-    return read_webvtt(lines) if kind == WEBVTT else read_subrip(lines)
+def _encoding_warnings(decoded: Decoded) -> list[SubtitleWarning]:
+    if decoded.n_damaged:
+        message = f"{decoded.n_damaged} bytes are no UTF-8, as the rest is; --encoding names another encoding"
+        return [SubtitleWarning(1, message)]
+    if not decoded.is_guess:
+        return []
+    message = f"the encoding is not stated and was guessed as {decoded.encoding}; --encoding names another"
+    return [SubtitleWarning(1, message)]
 
 
-def _ordered(written: Sequence[WrittenCue], warnings: list[SubtitleWarning]) -> list[WrittenCue]:
-    """Cues in order of time, without duplicates and without times that no film has."""
-    kept: list[WrittenCue] = []
-    latest, seen = 0.0, set()
-    for cue in written:
-        if cue.begin_s > MAX_S:
-            warnings.append(SubtitleWarning(cue.line, f"the start {cue.begin_s:.0f} s is damaged; the cue is left out"))
-            continue
-        if cue.begin_s < 0:
-            warnings.append(SubtitleWarning(cue.line, "the start is negative; the cue begins at 0 s"))
-            cue = replace(cue, begin_s=0.0)  # noqa: PLW2901 - the corrected cue
-        if cue.begin_s < latest:
-            warnings.append(SubtitleWarning(cue.line, "this cue begins before the one above it; cues are sorted"))
-        # milliseconds, as files have them
-        key = (round(cue.begin_s, 3), cue.text)
-        if key in seen:
-            warnings.append(SubtitleWarning(cue.line, "this cue repeats another one; it is left out"))
-            continue
-        seen.add(key)
-        latest = max(latest, cue.begin_s)
-        kept.append(cue)
-    return sorted(kept, key=lambda cue: cue.begin_s)
+def _nothing(path: Path, warnings: Sequence[SubtitleWarning]) -> str:
+    """Why a file has no cue."""
+    if warnings:
+        first = warnings[0]
+        return f"{path} contains no subtitles that can be read (line {first.line}: {first.message}); correct its times"
+    return f"{path} contains no subtitles of a format that is read ({', '.join(NAMES)}); convert it to .srt"
 
 
-def _timed(written: Sequence[WrittenCue], warnings: list[SubtitleWarning]) -> tuple[Cue, ...]:
+def _without_styles_of_all(cues: Sequence[WrittenCue]) -> list[WrittenCue]:
+    """Cues, of which those of signs and songs are dialogue where the file has nothing else."""
+    has_dialogue = any(not cue.kind and cue.text.strip() for cue in cues)
+    if has_dialogue:
+        return list(cues)
+    return [replace(cue, kind="") if cue.kind in {SIGNS, LYRICS} else cue for cue in cues]
+
+
+def _timed(
+    written: Sequence[WrittenCue], reading: Reading, warnings: list[SubtitleWarning], notes: list[SubtitleWarning]
+) -> tuple[Cue, ...]:
+    """Cues with their ends, words and speakers."""
+    said = [not cue.kind or cue.kind in reading.keep for cue in written]
+    plain = [plain_text(cue.text, cue.markup) for cue, is_said in zip(written, said, strict=True) if is_said]
+    labels = find_speakers(["\n".join(spoken_lines(text)) for text in plain])
+    speakers: Collection[str] = labels.keys() if reading.speakers else ()
     cues: list[Cue] = []
-    for number, cue in enumerate(written, start=1):
-        text = spoken_text(cue.text)
-        following = written[number].begin_s if number < len(written) else None
-        end = cue.end_s
-        is_estimated = end is None or end <= cue.begin_s or end > MAX_S
-        if is_estimated:
-            if end is not None:
-                warnings.append(SubtitleWarning(cue.line, "the cue ends before it begins; its end is estimated"))
-            end = _estimated_end(cue.begin_s, following, text.spoken or text.shown)
-        # an end that is the next start differs by rounding at most
-        elif following is not None and end is not None and end > following + 1e-6:
-            message = f"this cue overlaps the next one by {end - following:.2f} s"
-            warnings.append(SubtitleWarning(cue.line, message))
-        parts = text.parts if len(text.parts) > 1 else ()
-        if parts and not parts[0].speaker:
-            parts = (replace(parts[0], speaker=cue.speaker), *parts[1:])
-        cues.append(
-            Cue(number, cue.begin_s, end or 0.0, text.spoken, cue.line, text.shown, text.speaker or cue.speaker,
-                cue.style, cue.language, is_estimated, parts)
-        )  # fmt: skip
+    left_out: list[tuple[str, int, str]] = []
+    for number, (cue, is_said) in enumerate(zip(written, said, strict=True)):
+        text = spoken_text(cue.text, cue.markup, keep=reading.keep, speakers=speakers)
+        if is_said:
+            left_out += [(kind, cue.line, words) for kind, words in text.left_out]
+        else:
+            left_out.append((cue.kind, cue.line, text.shown))
+            text = SpokenText("", text.shown, ())
+        cues.append(_cue(number, written, text, warnings))
+    notes += notes_of(left_out)
+    notes += _note_of_speakers(cues, labels if reading.speakers else {})
     return tuple(cues)
 
 
-def _estimated_end(start: float, following: float | None, text: str) -> float:
-    """End of a cue by the length of its text, but not after the start of the next one."""
-    end = start + max(MIN_ESTIMATED_S, len(text) / CHARACTERS_PER_S)
-    return min(end, following) if following is not None and following > start else end
+def _cue(number: int, written: Sequence[WrittenCue], text: SpokenText, warnings: list[SubtitleWarning]) -> Cue:
+    cue = written[number]
+    following = written[number + 1].begin_s if number + 1 < len(written) else None
+    end = cue.end_s
+    is_estimated = end is None or end <= cue.begin_s or end > MAX_S
+    if is_estimated:
+        if end is not None:
+            reason = "has no length" if end == cue.begin_s else "ends before it begins"
+            warnings.append(SubtitleWarning(cue.line, f"the cue {reason}; its end is estimated"))
+        end = estimated_end(number, written, text.spoken or text.shown)
+    elif following is not None and end is not None and end > following + OVERLAP_S:
+        warnings.append(SubtitleWarning(cue.line, f"this cue overlaps the next one by {end - following:.2f} s"))
+    parts = text.parts if len(text.parts) > 1 else ()
+    if parts and not parts[0].speaker:
+        parts = (replace(parts[0], speaker=cue.speaker), *parts[1:])
+    return Cue(
+        number + 1,
+        cue.begin_s,
+        end or 0.0,
+        text.spoken,
+        cue.line,
+        text.shown,
+        text.speaker or cue.speaker,
+        cue.style,
+        cue.language,
+        is_estimated,
+        parts,
+    )
+
+
+def _note_of_speakers(cues: Sequence[Cue], labels: Mapping[str, str]) -> list[SubtitleWarning]:
+    """A note of the speakers who were found by their labels, with their numbers of cues."""
+    counts: dict[str, int] = {}
+    first = 0
+    for cue in cues:
+        named = {part.speaker for part in cue.parts} if cue.parts else {cue.speaker}
+        for name in sorted(named):
+            if name and " ".join(name.split()).casefold() in labels:
+                counts[name] = counts.get(name, 0) + 1
+                first = first or cue.line
+    if not counts:
+        return []
+    ordered = sorted(counts.items(), key=lambda count: -count[1])
+    shown = ", ".join(f"{name} ({n})" for name, n in ordered[:MAX_NAMED])
+    more = f" and {len(counts) - MAX_NAMED} more" if len(counts) > MAX_NAMED else ""
+    message = f"names before a colon are speakers, here with their cues: {shown}{more}; --no-speakers makes them words"
+    return [SubtitleWarning(first, message)]

@@ -1,30 +1,19 @@
 """The spoken words of a cue, and its speaker's label."""
 
-import html
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from tts2face.interchange.subtitles.cues import CuePart
+from tts2face.interchange.subtitles.labels import split_label, without_manners
+from tts2face.interchange.subtitles.markup import SUBRIP_MARKUP, Markup, plain_text
+from tts2face.interchange.subtitles.unspoken import ANNOTATIONS, LYRICS
 
-_BREAK_TAG = re.compile(r"<br\s*/?\s*>", re.IGNORECASE)
-_RUBY_TEXT = re.compile(r"<rt\b[^<>]*>.*?(?:</rt\s*>|(?=</ruby)|$)", re.IGNORECASE | re.DOTALL)
-# Tags of SubRip and WebVTT, inner timestamps, and tags of known names that are not closed.
-_TAG = re.compile(
-    r"<\s*/?\s*[A-Za-z][^<>\n]*>|<\d[\d:.,]*>|<\s*/?\s*(?:i|b|u|s|c|v|em|font|ruby|lang|span)(?:[\s.=][^<>\n]*)?(?:$|(?=\n))",
-    re.IGNORECASE,
-)
-_OVERRIDE = re.compile(r"\{[^{}]*\}")  # of SubStation Alpha, also found in SubRip
-_ENTITY = re.compile(r"&(?:amp|lt|gt|nbsp|quot|apos|lrm|rlm|#\d{1,7}|#[xX][0-9a-fA-F]{1,6});")
-_INVISIBLE = re.compile(r"[\u200b-\u200f\u202a-\u202e\u2060-\u2069\ufeff\u00ad]")
 # Additions of subtitles for the deaf: noises in brackets, lyrics between notes.
-_NOISE = re.compile(
-    r"\[[^\]]*(?:\]|$)|\([^()]*\)|（[^（）]*）|【[^【】]*】|［[^［］]*］"
-    r"|[♪♫♬♩][^♪♫♬♩]*(?:[♪♫♬♩]+|$)|(?m:^[^\S\n]*#\s.*(?:\s#)?\s*$)"
-)
-_LABEL = re.compile(
-    r"^(?P<lead>\s*(?:[-–—‐]\s*|>>\s*|•\s*)?)(?P<label>[^\W\d_][^:：\n?!,;]{0,40}?)\s*(?::(?=\s|$)|：)", re.MULTILINE
-)
+_ANNOTATION = re.compile(r"\[[^\]]*(?:\]|$)|\([^()]*\)|（[^（）]*）|【[^【】]*】|［[^［］]*］")
+_LYRICS = re.compile(r"[♪♫♬♩][^♪♫♬♩]*(?:[♪♫♬♩]+|$)|(?m:^[^\S\n]*#\s.*(?:\s#)?\s*$)")
+_BRACKETS = re.compile(r"[\[\]()（）【】［］]")
+_NOTES = re.compile(r"[♪♫♬♩]|(?m:^[^\S\n]*#\s|\s#\s*$)")
 _DASH = re.compile(r"^\s*(?:[-–—‐]\s*(?=\S)|>>\s*|•\s*)", re.MULTILINE)
 _INNER_DASH = re.compile(r"(?<!\s)\s++(?=(?P<dash>[-–—‐]|>>)\s*[\"'“‘«¿¡….(\[]{0,4}(?P<letter>\w))")
 _ENDS_SENTENCE = re.compile(r"[.!?…♪][\"'”’»)\]]*\s*$")
@@ -37,12 +26,14 @@ _VOICE_MARK = re.compile(r"^\s*\x02([^\x03]*)\x03")
 class SpokenText:
     """Text of a cue: as it is spoken, on one line, the text as shown, and its parts by speaker.
 
-    The speaker of a part is a label or WebVTT voice, or empty for a dash without a name.
+    The speaker of a part is a label or WebVTT voice, or empty for a dash without a name. `left_out` has the kind and
+    text of each passage that is not spoken.
     """
 
     spoken: str
     shown: str
     parts: tuple[CuePart, ...]
+    left_out: tuple[tuple[str, str], ...] = ()
 
     @property
     def speaker(self) -> str:
@@ -50,27 +41,58 @@ class SpokenText:
         return next((part.speaker for part in self.parts if part.speaker), "")
 
 
-def spoken_text(written: str) -> SpokenText:
+def spoken_text(
+    written: str,
+    markup: Markup = SUBRIP_MARKUP,
+    *,
+    keep: Collection[str] = (),
+    speakers: Collection[str] | None = None,
+) -> SpokenText:
     """Divide the text of a cue into words, tags, noises, lyrics and speakers.
 
-    A label is a name in capitals before a colon and a space (``JOHN:``), at the start of a line. A part begins at a
-    label, at a tag of one of several WebVTT voices, and at each of two or more dashes that begin a line or follow a
-    sentence in it; a line after a sentence needs only a dash of its own.
+    A label is a name before a colon and a space (``JOHN:``), at the start of a line. A part begins at a label, at a tag
+    of one of several WebVTT voices, and at each of two or more dashes that begin a line or follow a sentence in it; a
+    line after a sentence needs only a dash of its own.
+
+    Parameters
+    ----------
+    keep
+        Kinds of what is not said, annotations and lyrics, that are spoken nevertheless.
+    speakers
+        Keys of the labels of the file; None: names in capitals.
     """
-    is_dialogue = len({name.strip() for name in _VOICE.findall(written)}) > 1
-    plain = _plain(_VOICE.sub("\n\x02\\1\x03", written) if is_dialogue else written)
-    lines = [part for line in _NOISE.sub(" ", plain).split("\n") for part in _at_dashes(line)]
+    is_dialogue = markup.has_tags and len({name.strip() for name in _VOICE.findall(written)}) > 1
+    plain = plain_text(_VOICE.sub("\n\x02\\1\x03", written) if is_dialogue else written, markup)
+    said, left_out = _without_additions(without_manners(plain, speakers or ()), keep)
+    lines = spoken_lines(said)
     has_dashes = _is_dialogue(lines)
     parts: list[tuple[str, list[str]]] = [("", [])]
     for line in lines:
-        speaker, rest = _speaker_of(line, has_dashes=has_dashes)
+        speaker, rest = _speaker_of(line, speakers, has_dashes=has_dashes)
         if speaker is not None and not (speaker and speaker == parts[-1][0]):
             parts.append((speaker, []))
         parts[-1][1].append(rest)
     spoken = [CuePart(speaker, " ".join(" ".join(words).split())) for speaker, words in parts]
     spoken = [part for part in spoken if any(character.isalnum() for character in part.text)]
     shown = " ".join(re.sub(r"\x02[^\x02\x03]*\x03", "", plain).split())
-    return SpokenText(" ".join(part.text for part in spoken), shown, tuple(spoken))
+    return SpokenText(" ".join(part.text for part in spoken), shown, tuple(spoken), left_out)
+
+
+def _without_additions(text: str, keep: Collection[str]) -> tuple[str, tuple[tuple[str, str], ...]]:
+    """A text without noises and lyrics, and these with their kinds; kinds that are kept lose only their marks."""
+    found: list[tuple[str, str]] = []
+    for kind, passage, marks in ((ANNOTATIONS, _ANNOTATION, _BRACKETS), (LYRICS, _LYRICS, _NOTES)):
+        if kind in keep:
+            text = passage.sub(lambda match, marks=marks: marks.sub(" ", match[0]), text)  # type: ignore[misc]
+            continue
+        found += [(kind, match[0]) for match in passage.finditer(text) if any(map(str.isalnum, match[0]))]
+        text = passage.sub(" ", text)
+    return text, tuple(found)
+
+
+def spoken_lines(text: str) -> list[str]:
+    """Lines of a text without tags, divided also where another person begins within one."""
+    return [part for line in text.split("\n") for part in _at_dashes(line)]
 
 
 def _at_dashes(line: str) -> list[str]:
@@ -101,26 +123,15 @@ def _is_dialogue(lines: Sequence[str]) -> bool:
     return sum(dashed) > 1 or any(follows)
 
 
-def _speaker_of(line: str, *, has_dashes: bool) -> tuple[str | None, str]:
+def _speaker_of(line: str, speakers: Collection[str] | None, *, has_dashes: bool) -> tuple[str | None, str]:
     """Speaker who begins at a line, empty if unnamed and None if the line continues, and the words of the line."""
     voice = _VOICE_MARK.match(line)
     if voice:
         return " ".join(voice[1].split()), _DASH.sub("", line[voice.end() :])
-    match = _LABEL.match(line)
-    if match:
-        label = " ".join(match["label"].split())
-        # "JOHN:" is a speaker, "Remember:" begins a sentence
-        if label == label.upper() and label != label.lower():
-            return label, line[match.end() :]
+    label = split_label(line, speakers)
+    if label is not None:
+        return label
     dash = _DASH.match(line)
     if dash:
         return ("" if has_dashes else None), line[dash.end() :]
     return None, line
-
-
-def _plain(written: str) -> str:
-    """Text without tags, overrides, entities and invisible characters."""
-    text = _RUBY_TEXT.sub("", _BREAK_TAG.sub("\n", written))
-    text = _OVERRIDE.sub("", _TAG.sub("", text))
-    text = _ENTITY.sub(lambda match: html.unescape(match[0]), text)
-    return _INVISIBLE.sub("", text.replace("\\N", "\n").replace("\\h", " ").replace("\u00a0", " "))

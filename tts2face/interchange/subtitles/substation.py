@@ -5,6 +5,8 @@ from collections.abc import Mapping, Sequence
 
 from tts2face.interchange.subtitles.clock import parse_clock
 from tts2face.interchange.subtitles.cues import SubtitleWarning, WrittenCue
+from tts2face.interchange.subtitles.markup import SUBSTATION_MARKUP, plain_text, without_drawings
+from tts2face.interchange.subtitles.unspoken import EFFECTS, SIGNS, kind_of_style
 
 ASS_FIELDS: tuple[str, ...] = (
     "layer",
@@ -19,8 +21,14 @@ ASS_FIELDS: tuple[str, ...] = (
     "text",
 )
 SSA_FIELDS: tuple[str, ...] = ("marked", *ASS_FIELDS[1:])
+PACKET_FIELDS: tuple[str, ...] = ("readorder", "layer", *ASS_FIELDS[3:])
 _SECTION = re.compile(r"\s*\[([^\]]+)\]\s*$")
-_DRAWING = re.compile(r"\\p[1-9]")  # a text in drawing mode holds coordinates, no words
+_DRAWING = re.compile(r"\\p[1-9]")  # coordinates, no words
+_PLACED = re.compile(r"\\(?:pos|move)\s*\(")
+# Text that is turned, bent or cut to fit the picture, or moves: writing in the picture, not dialogue.
+_TYPESET = re.compile(r"\\(?:fr[xyz]?-?[1-9]|fa[xy]-?[\d.]|i?clip\s*\(|org\s*\(|move\s*\(|t\s*\()")
+_EFFECT = re.compile(r"\s*(?:fx|karaoke|template|code)\b", re.IGNORECASE)  # karaoke as Aegisub computes it
+_MOVING = re.compile(r"\s*(?:banner|scroll up|scroll down)\s*;", re.IGNORECASE)
 _LINE_BREAK = re.compile(r"\\[Nn]")
 
 
@@ -74,6 +82,29 @@ def _dialogue(written: str, fields: Sequence[str], number: int, warnings: list[S
         warnings.append(
             SubtitleWarning(number, f"the end {found['end'].strip()[:20]!r} cannot be read; it is estimated")
         )
-    text = "" if _DRAWING.search(found["text"]) else _LINE_BREAK.sub("\n", found["text"]).replace("\\h", " ")
-    style = found.get("style", "").strip().lstrip("*")
-    return WrittenCue(start, end, text, number, speaker=found.get("name", "").strip(), style=style)
+    return _cue(found, start, end, number)
+
+
+def packet_cue(written: str, begin_s: float, end_s: float | None, number: int) -> WrittenCue | None:
+    """Cue of a packet of a film: a dialogue line without its times, after its number and layer; None if it is none."""
+    values = written.split(",", len(PACKET_FIELDS) - 1)
+    if len(values) < len(PACKET_FIELDS):
+        return None
+    return _cue(dict(zip(PACKET_FIELDS, values, strict=True)), begin_s, end_s, number)
+
+
+def _cue(found: Mapping[str, str], start: float, end: float | None, number: int) -> WrittenCue:
+    style, speaker = found.get("style", "").strip().lstrip("*"), found.get("name", "").strip()
+    text = _LINE_BREAK.sub("\n", without_drawings(found["text"]))
+    kind = _kind(found["text"], text, style, found.get("effect", ""))
+    return WrittenCue(start, end, text, number, speaker=speaker, style=style, markup=SUBSTATION_MARKUP, kind=kind)
+
+
+def _kind(line: str, text: str, style: str, effect: str) -> str:
+    """Kind of a line that nobody says, also without its drawings (`text`); empty for dialogue."""
+    if _EFFECT.match(effect):
+        return EFFECTS
+    if _MOVING.match(effect) or (_PLACED.search(line) and _TYPESET.search(line)):
+        return SIGNS
+    is_drawing = text != line and not any(map(str.isalnum, plain_text(text, SUBSTATION_MARKUP)))
+    return EFFECTS if is_drawing and _DRAWING.search(line) else kind_of_style(style)

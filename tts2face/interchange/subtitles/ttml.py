@@ -7,17 +7,30 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from types import MappingProxyType
 from xml.parsers import expat
 
 from lexicon.errors import DataError
 from tts2face.interchange.subtitles.cues import SubtitleWarning, WrittenCue
+from tts2face.interchange.subtitles.markup import PLAIN_MARKUP
+from tts2face.interchange.subtitles.timing import is_likely, is_possible
+from tts2face.interchange.subtitles.unspoken import ANNOTATIONS, LYRICS, SIGNS
 
 MAX_DEPTH = 64  # nested elements; real files have about six
 MAX_CUES = 200_000
-_OFFSET = re.compile(r"(-?\d{1,12}(?:\.\d{1,9})?)\s*(h|ms|m|s|f|t)")
+_OFFSET = re.compile(r"(-?\d{1,12}(?:\.\d{1,9})?)\s*(h|ms|m|s|f|t|)")
 _CLOCK = re.compile(r"(?:(\d{1,6}):)?(\d{1,2}):(\d{1,2})(?:[.,](\d{1,9})|:(\d{1,4})(?:\.\d{1,4})?)?")
 _TIMED = frozenset({"body", "div", "p", "span"})
 Attributes = Mapping[str, str]
+# Roles of TTML 2, 14.1.2, that are nobody's speech; other roles say how somebody speaks.
+_KINDS = MappingProxyType({
+    "kinesic": ANNOTATIONS, "music": ANNOTATIONS, "quality": ANNOTATIONS, "sound": ANNOTATIONS, "lyrics": LYRICS,
+    "reproduction": SIGNS, "source": SIGNS, "suppressed": SIGNS, "title": SIGNS, "transcription": SIGNS,
+})  # fmt: skip
+_SPOKEN_ROLES = frozenset(["caption", "description", "dialog", "expletive", "narration", "thought"])
+# Units of times without one, and of ticks whose rate is not stated; the first of each is that of the specification.
+_BARE_UNITS_S = (1.0, 0.001)
+_TICK_RATES = (10_000_000, 1000, 90_000, 48_000)
 
 
 @dataclass(slots=True)
@@ -32,6 +45,8 @@ class _Element:
     style: str
     language: str | None
     next_s: float = 0.0
+    kind: str = ""
+    is_damaged: bool = False
     keeps_space: bool = False
 
 
@@ -44,14 +59,39 @@ class _Paragraph:
 
 
 def read_ttml(text: str) -> tuple[list[WrittenCue], list[SubtitleWarning]]:
-    """Cues of a TTML document."""
-    return _TtmlReader().read(text)
+    """Cues of a TTML document.
+
+    Where neither the document nor the specification gives its times a unit in which they can be meant, they have the
+    one in which they can.
+
+    Raises
+    ------
+    DataError
+        It is no XML, or its times cannot be meant in any unit.
+    """
+    stated = _TtmlReader()
+    found = stated.read(text)
+    if not (stated.has_ticks_alone or stated.has_bare_times) or is_possible(found[0]):
+        return found
+    others: list[tuple[float, int | None, str]] = []
+    others += [(unit, None, f"{unit:g} s") for unit in _BARE_UNITS_S[1:]] if stated.has_bare_times else []
+    others += [(1.0, rate, f"1/{rate:,} s") for rate in _TICK_RATES] if stated.has_ticks_alone else []
+    for bare_s, rate, shown in others:
+        cues, warnings = _TtmlReader(bare_s, rate).read(text)
+        if is_likely(cues):
+            message = f"the times have no unit (ttp:tickRate is missing); they are read in units of {shown}"
+            return cues, [*warnings, SubtitleWarning(cues[0].line, message)]
+    raise DataError(
+        f"line {found[0][0].line}: the times have no unit in which they can be meant; state it as ttp:tickRate"
+    )
 
 
 class _TtmlReader:
     """Handlers of the elements of one document."""
 
-    def __init__(self) -> None:
+    def __init__(self, bare_s: float = 1.0, tick_rate: int | None = None) -> None:
+        self.has_ticks_alone = self.has_bare_times = False  # times whose unit is not stated
+        self._bare_s, self._other_tick_rate, self._is_rate_stated = bare_s, tick_rate, False
         self._elements: list[_Element] = []
         self._paragraphs: list[_Paragraph] = []
         self._agents: dict[str, str] = {}
@@ -113,14 +153,17 @@ class _TtmlReader:
 
     def _open(self, name: str, own: Attributes, parent: _Element) -> _Element:
         start = parent.next_s if parent.is_sequence else parent.begin_s
-        given, end = start, parent.end_s
+        given, end, is_damaged = start, parent.end_s, parent.is_damaged
         if name in _TIMED:
             offset = self._seconds(own.get("begin"))
+            is_damaged = parent.is_damaged or ("begin" in own and offset is None)
             given = start + (offset or 0.0)
             length, until = self._seconds(own.get("dur")), self._seconds(own.get("end"))
             ends = [end, None if length is None else given + length, None if until is None else start + until]
             end = min((instant for instant in ends if instant is not None), default=None)
-        speaker = own.get("agent") or own.get("role") or parent.speaker
+        role = own.get("role", "")
+        role_speaker = "" if role.split() and set(role.split()) <= _SPOKEN_ROLES | _KINDS.keys() else role
+        speaker = own.get("agent") or role_speaker or parent.speaker
         return _Element(
             name,
             given,
@@ -130,6 +173,8 @@ class _TtmlReader:
             own.get("style") or parent.style,
             own.get("lang") or parent.language,
             given,
+            next((_KINDS[word] for word in role.split() if word in _KINDS), parent.kind),
+            is_damaged,
             own.get("space", "preserve" if parent.keeps_space else "") == "preserve",
         )
 
@@ -148,14 +193,26 @@ class _TtmlReader:
     def _close_cue(self, element: _Element) -> None:
         paragraph = self._paragraphs.pop()
         text = "\n".join(line.strip() for line in "".join(paragraph.text).split("\n")).strip()
-        if not text:
+        if element.is_damaged:
+            self._warn("the start of this cue cannot be read; it is left out", paragraph.line)
+        if not text or element.is_damaged:
             return
         if len(self._cues) >= MAX_CUES:
             raise DataError(f"the file has more than {MAX_CUES} cues; split it")
         speaker = self._agents.get(element.speaker.split()[0], element.speaker) if element.speaker else ""
         style = element.style.split()[0] if element.style else ""
         self._cues.append(
-            WrittenCue(element.begin_s, element.end_s, text, paragraph.line, speaker, style, element.language)
+            WrittenCue(
+                element.begin_s,
+                element.end_s,
+                text,
+                paragraph.line,
+                speaker,
+                style,
+                element.language,
+                PLAIN_MARKUP,
+                element.kind,
+            )
         )
 
     def _characters(self, text: str) -> None:
@@ -174,7 +231,7 @@ class _TtmlReader:
             self._frame_rate *= Fraction(int(match[1]), int(match[2]))
         self._tick_rate = self._frame_rate if numbers["frameRate"] else Fraction(1)
         if numbers["tickRate"].isdecimal() and int(numbers["tickRate"]) > 0:
-            self._tick_rate = Fraction(int(numbers["tickRate"]))
+            self._tick_rate, self._is_rate_stated = Fraction(int(numbers["tickRate"])), True
 
     def _seconds(self, written: str | None) -> float | None:
         """Seconds of a time expression (TTML 2, 12.3.1); None if there is none or it cannot be read."""
@@ -183,7 +240,10 @@ class _TtmlReader:
         offset, clock = _OFFSET.fullmatch(written.strip()), _CLOCK.fullmatch(written.strip())
         if offset:
             units = {"h": 3600.0, "m": 60.0, "s": 1.0, "ms": 0.001}
-            units |= {"f": float(1 / self._frame_rate), "t": float(1 / self._tick_rate)}
+            tick_rate = self._tick_rate if self._other_tick_rate is None else Fraction(self._other_tick_rate)
+            units |= {"f": float(1 / self._frame_rate), "t": float(1 / tick_rate), "": self._bare_s}
+            self.has_ticks_alone |= offset[2] == "t" and not self._is_rate_stated
+            self.has_bare_times |= not offset[2] and float(offset[1]) != 0.0
             return float(offset[1]) * units[offset[2]]
         if clock:
             hours, minutes, seconds, fraction, frames = clock.groups()

@@ -11,6 +11,7 @@ from lexicon.errors import DataError, InputError
 from lexicon.sentence_length import n_letters
 from tts2face.interchange.exports.table import batch_format
 from tts2face.interchange.subtitles.cues import Cue
+from tts2face.interchange.subtitles.film_track import film_seconds
 from tts2face.interchange.subtitles.reader import read_subtitles
 from tts2face.request import IDLE_LIMITS_S, ONLY_SPOKEN, SOURCE_OPTIONS, Request
 from tts2face.serving.batch.cast import Cast
@@ -74,6 +75,7 @@ class FilePlan:
     path: Path
     name: str
     warnings: list[PlanWarning] = field(default_factory=list)
+    notes: list[PlanWarning] = field(default_factory=list)
     recordings: Recordings = field(default_factory=Recordings)
     n_cues: int = 0
     n_silent: int = 0
@@ -140,12 +142,20 @@ class FilePlan:
 
     def _read(self) -> tuple[Window, ...]:
         """Windows of the spoken lines."""
-        read = read_subtitles(self.path, self.base.options.encoding)
-        for warning in read.warnings:
-            self._warn(warning.line, warning.message)
         if self.base.options.audio is not None:
             names = (self.name, self.path.stem, *([""] if self.base.n_files == 1 else []))
             self.recordings = find_recordings(self.base.options.audio, self.path, names)
+        track = self.recordings.track
+        reading = self.base.options.reading(
+            non_defaults(self.base.request).get("language"), None if track is None else film_seconds(track)
+        )
+        read = read_subtitles(self.path, self.base.options.encoding, reading)
+        for warning in read.warnings:
+            self._warn(warning.line, warning.message)
+        self.notes += [PlanWarning(str(self.path), note.line, note.message) for note in read.notes]
+        for cue in read.cues:
+            if not cue.text:  # a role that leaves it out, too, is used
+                self.speakers.note_role(replace(cue, text=cue.shown))
         cues = [self._divide(cue) for cue in read.cues if cue.text]
         self.n_cues, self._is_in_capitals = len(read.cues), is_in_capitals(cue.text for cue in cues)
         cues = sorted(map(self._moved, cues), key=lambda cue: cue.begin_s)

@@ -113,6 +113,7 @@ def write_manifest(folder: Path, plan: Plan, entries: Mapping[str, Mapping[str, 
         "warnings": [
             {"file": warning.file, "line": warning.line, "message": warning.message} for warning in plan.warnings
         ],
+        "notes": [{"file": note.file, "line": note.line, "message": note.message} for note in plan.notes],
         "segments": sorted(plan.segments),
     }
     write_atomically(folder / JSON_NAME, json.dumps(content, ensure_ascii=False, indent=1).encode())

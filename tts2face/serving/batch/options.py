@@ -8,6 +8,7 @@ from lexicon.errors import BackendError, InputError
 from lexicon.marked_text import RATE_LIMITS
 from lexicon.values.fields import check_fields
 from tts2face.interchange.exports.table import batch_format
+from tts2face.interchange.subtitles.reading import Reading
 from tts2face.option import option
 from tts2face.request import option_fields
 
@@ -55,7 +56,23 @@ class BatchOptions:
         "mp4", "Videos: mp4, webm (also transparent), mov (uncompressed sound), or none (only the files of --export)."
     )
     exports: tuple[str, ...] = ()
-    encoding: str | None = option(None, "Encoding of subtitles that are not UTF-8, such as cp1250.")
+    encoding: str | None = option(
+        None, "Encoding of subtitles that are not UTF-8, such as cp1250; by default guessed, by the language if given."
+    )
+    keep: tuple[str, ...] = option(
+        (),
+        "Kinds of what subtitles show and nobody says, to be spoken nevertheless: annotations ([door slams]), lyrics "
+        "(between notes), signs (styles such as Sign, placed text), effects, credits, repeats (rolling captions, "
+        "layers); several times if wanted.",
+    )
+    speakers: bool = option(True, "Names before a colon (ANNA: Hello.) are speakers; else they are words.")
+    subtitle_fps: float | None = option(
+        None, "Frames a second of subtitles whose times are frames (MicroDVD, 00:00:01:12)."
+    )
+    track: str | None = option(
+        None, "Subtitle track of a film (.mp4, .mkv, .mov), by number from 1 or language; or class of a .smi file."
+    )
+    shift: float = option(0.0, "Seconds that are added to all times of the subtitles, negative for earlier.")
 
     def __post_init__(self) -> None:
         """Reject values of other types, unknown names and numbers out of range."""
@@ -63,6 +80,7 @@ class BatchOptions:
         if self.per not in CLIP_UNITS:
             raise InputError(f"--per must be {', '.join(CLIP_UNITS[:-1])} or {CLIP_UNITS[-1]}, not {self.per!r}")
         self._check_formats()
+        self.reading()
         if self.overflow not in OVERFLOW_POLICIES:
             raise InputError(f"--overflow must be extend, cut-pauses or report, not {self.overflow!r}")
         if not 1.0 <= self.max_rate <= RATE_LIMITS[1]:
@@ -75,6 +93,18 @@ class BatchOptions:
             raise InputError(f"--scene-gap must lie between 0 and 3600 s, not {self.scene_gap:g}")
         if self.audio is not None and not self.audio.is_dir():
             raise InputError(f"there is no folder of recordings {self.audio}; check the path")
+
+    def reading(self, language: str | None = None, film_s: float | None = None) -> Reading:
+        """Choices of the reader of subtitles, with what is known besides: language, and seconds of the film."""
+        return Reading(
+            language=language,
+            keep=self.keep,
+            speakers=self.speakers,
+            fps=self.subtitle_fps,
+            track=self.track,
+            shift=self.shift,
+            film_s=film_s,
+        )
 
     def _check_formats(self) -> None:
         if self.format not in MOVIE_FORMATS:

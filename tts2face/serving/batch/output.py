@@ -140,13 +140,14 @@ class PlannedLine:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Outputs of a batch, and warnings; equal segments occur once in `segments`."""
+    """Outputs of a batch, warnings, and notes of what is left out; equal segments occur once in `segments`."""
 
     outputs: tuple[Output, ...]
     warnings: tuple[PlanWarning, ...]
     n_cues: int
     n_silent: int
     lines: tuple[PlannedLine, ...] = ()
+    notes: tuple[PlanWarning, ...] = ()
 
     @property
     def segments(self) -> dict[str, Segment]:

@@ -45,7 +45,7 @@ def plan_batch(  # noqa: PLR0913 - one parameter a kind of settings
         A subtitle file has no cue or cannot be read, or the table of lines cannot be used.
     """
     if not files:
-        raise InputError("there are no subtitles; give .srt, .vtt, .ass, .ssa or .ttml files")
+        raise InputError("there are no subtitles; give files such as .srt, .vtt or .ass, or films with subtitles")
     if picture is not None and picture.is_transparent and options.format in ("mp4", "mov"):
         raise InputError(f".{options.format} has no transparency; choose --format webm, or another background")
     names = output_names(files)
@@ -71,7 +71,8 @@ def plan_batch(  # noqa: PLR0913 - one parameter a kind of settings
         PlanWarning("the cast", 0, text) for text in (*base.cast.unused(used), *_without_role(base.cast, found))
     ]
     n_cues, n_silent = sum(plan.n_cues for plan in planned), sum(plan.n_silent for plan in planned)
-    return Plan(tuple(outputs), tuple(warnings), n_cues, n_silent, found)
+    notes = tuple(note for plan in planned for note in plan.notes)
+    return Plan(tuple(outputs), tuple(warnings), n_cues, n_silent, found, notes)
 
 
 def _without_role(cast: Cast, lines: Sequence[PlannedLine]) -> list[str]:

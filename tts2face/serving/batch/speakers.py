@@ -71,6 +71,12 @@ class Speakers:
                 strangers.append(who)
             self._others[(cue.number, part)] = strangers.index(who)
 
+    def note_role(self, cue: Cue) -> None:
+        """Note that the role of a cue is used."""
+        role = self.cast.role_of(cue, self.names[0])
+        if role is not None:
+            self.used.add(id(role))
+
     def settings(self, cue: Cue, part: int) -> LineSettings:
         """Settings of a line in the table."""
         return self.lines.of(self.names[1], cue.number, part) if self.lines.settings else NO_SETTINGS

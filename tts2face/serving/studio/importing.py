@@ -11,7 +11,8 @@ from lexicon.errors import InputError
 from lexicon.values.json_text import parse_json
 from tts2face.gestures.elements import StyleSpan
 from tts2face.gestures.timeline import Timeline
-from tts2face.interchange.subtitles.reader import SUFFIXES, read_subtitles
+from tts2face.interchange.subtitles.formats import SUFFIXES
+from tts2face.interchange.subtitles.reader import read_subtitles
 from tts2face.request import Request
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey

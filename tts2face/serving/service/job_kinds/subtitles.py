@@ -12,7 +12,10 @@ from starlette.datastructures import UploadFile
 from lexicon.errors import DataError
 from lexicon.values.checks import check_limits
 from lexicon.values.toml_text import parse_toml
-from tts2face.interchange.subtitles.reader import SUFFIXES
+from tts2face.interchange.subtitles.formats import SUFFIXES
+from tts2face.interchange.subtitles.frames import RATE_LIMITS
+from tts2face.interchange.subtitles.reading import MAX_SHIFT_S
+from tts2face.interchange.subtitles.unspoken import KINDS
 from tts2face.picture.options import Picture
 from tts2face.request import Request
 from tts2face.serving.batch.cast import MODEL_NAMES, cast_from_tables
@@ -70,10 +73,31 @@ class SubtitlesRequest(SubtitleFields):
         str | None,
         Field(
             pattern="^[A-Za-z0-9_.:-]{1,40}$",
-            description="Encoding of subtitles that are not UTF-8.",
+            description="Encoding of subtitles that are not UTF-8; by default guessed, by the language if given.",
             examples=["windows-1252"],
         ),
     ] = None
+    keep: Annotated[
+        tuple[Literal["annotations", "lyrics", "signs", "effects", "credits", "repeats"], ...],
+        Field(
+            max_length=len(KINDS),
+            strict=False,
+            description="Kinds of what subtitles show and nobody says, to be spoken nevertheless.",
+            examples=[["signs"]],
+        ),
+    ] = ()
+    speakers: Annotated[bool, Field(description="Names before a colon are speakers; else they are words.")] = True
+    subtitle_fps: Annotated[
+        float | None,
+        Field(ge=RATE_LIMITS[0], le=RATE_LIMITS[1], description="Frames a second of times that are frames."),
+    ] = None
+    track: Annotated[
+        str | None,
+        Field(max_length=40, description="Subtitle track of a film, by number or language; class of a SAMI file."),
+    ] = None
+    shift: Annotated[
+        float, Field(ge=-MAX_SHIFT_S, le=MAX_SHIFT_S, description="Seconds that are added to all times.")
+    ] = 0.0
     cast: Annotated[
         dict[str, Any] | str | None,
         Field(
@@ -180,7 +204,9 @@ SUBTITLES_KIND = JobKind(
     SubtitlesRequest,
     {
         "subtitles": FormPart(
-            "Subtitle files: SubRip, WebVTT, ASS, TTML; one or several.", add_subtitles, is_list=True
+            "Subtitle files (SubRip, WebVTT, ASS, TTML, ...) or films with subtitles; one or several.",
+            add_subtitles,
+            is_list=True,
         ),
         "audio": FormPart(
             "A recording of each subtitle file in place of a voice, in the same order.", add_track, is_list=True

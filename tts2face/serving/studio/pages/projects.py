@@ -7,7 +7,7 @@ from pathlib import Path
 from fastapi import Request as HttpRequest
 from nicegui import events, ui
 
-from tts2face.interchange.subtitles.reader import SUFFIXES
+from tts2face.interchange.subtitles.formats import SUFFIXES
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.studio.importing import SOUND_SUFFIXES, TEXT_SUFFIXES, import_file, import_sample, import_text
 from tts2face.serving.studio.pages.frame import begin_page, confirm, heading, icon_button, page_bar, shown_errors

@@ -1,0 +1,192 @@
+"""Formats beside the four with suites of damaged files, and tracks of films; what is no text is named truly."""
+
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import pytest
+
+from lexicon.errors import DataError, InputError
+from tests.interchange.subtitles.conftest import ReadText, srt
+from tts2face.interchange.subtitles.reader import read_subtitles
+from tts2face.interchange.subtitles.reading import Reading
+
+BOTH = [(1.0, 3.0, "The train was late. Again."), (4.0, 6.0, "We walked home.")]
+SAMI = """<SAMI><HEAD><STYLE TYPE="text/css"><!--
+.ENCC { Name: English; lang: en-US; } .DECC { Name: Deutsch; lang: de-DE; }
+--></STYLE></HEAD><BODY>
+<SYNC Start=1000><P Class=ENCC>The train was late.<br>Again.<P Class=DECC>Der Zug.
+<SYNC Start=3000><P Class=ENCC>&nbsp;<P Class=DECC>&nbsp;
+<SYNC Start=4000><P Class=ENCC>We walked home.
+<SYNC Start=6000><P Class=ENCC>&nbsp;</BODY></SAMI>
+"""
+READ = {
+    "MicroDVD": (".sub", "{25}{75}The train was late.|Again.\n{100}{150}We walked home.\n"),
+    "MicroDVD with its rate": (
+        ".sub",
+        "{1}{1}23.976\n{24}{72}{y:i}The train was late.|Again.\n{96}{144}We walked home.\n",
+    ),
+    "MicroDVD with slashes": (".sub", "{25}{75}/The train was late.|/Again.\n{100}{150}We walked home.\n"),
+    "MicroDVD in another file": (".txt", "{25}{75}The train was late.|Again.\n{100}{150}We walked home.\n"),
+    "MPL2": (".mpl", "[10][30]/The train was late.|Again.\n[40][60]We walked home.\n"),
+    "SBV": (
+        ".sbv",
+        "0:00:01.000,0:00:03.000\nThe train was late.\nAgain.\n\n0:00:04.000,0:00:06.000\nWe walked home.\n",
+    ),
+    "SubViewer": (
+        ".sub",
+        "[INFORMATION]\n[TITLE]x\n[END INFORMATION]\n[SUBTITLE]\n00:00:01.00,00:00:03.00\n"
+        "The train was late.[br]Again.\n\n00:00:04.00,00:00:06.00\nWe walked home.\n",
+    ),
+    "LRC": (
+        ".lrc",
+        "[ti:x]\n[00:01.00]The train was late. Again.\n[00:03.00]\n[00:04.00]We walked home.\n[00:06.00]\n",
+    ),
+    "LRC with an offset": (
+        ".lrc",
+        "[offset:+500]\n[00:01.50]The train was late. Again.\n[00:03.50]\n[00:04.50]We walked home.\n[00:06.50]\n",
+    ),
+    "LRC with times of words": (
+        ".lrc",
+        "[00:01.00]<00:01.00>The <00:01.40>train <00:01.80>was late. Again. <00:03.00>\n"
+        "[00:04.00]<00:04.00>We walked <00:05.00>home. <00:06.00>\n",
+    ),
+    "SAMI": (".smi", SAMI),
+    "SAMI in another file": (".txt", SAMI),
+}
+
+
+@pytest.mark.parametrize(("suffix", "content"), READ.values(), ids=READ)
+def test_every_format_gives_the_same_cues(suffix: str, content: str, read: ReadText) -> None:
+    found = read(content, suffix)
+    assert [(round(cue.begin_s, 1), round(cue.end_s, 1), cue.text) for cue in found.cues] == BOTH
+
+
+def test_the_rate_of_frames_is_the_stated_one_or_said(read: ReadText) -> None:
+    content = "{25}{75}The train was late.\n{100}{150}We walked home.\n"
+    assert "25 a second are taken (--subtitle-fps)" in read(content, ".sub").warnings[0].message
+    found = read(content, ".sub", fps=50.0)
+    assert [cue.begin_s for cue in found.cues] == [0.5, 2.0]
+    assert not found.warnings
+
+
+def test_a_line_of_several_instants_is_repeated(read: ReadText) -> None:
+    found = read("[00:01.00][00:05.00]So it goes\n[00:03.00]and so\n", ".lrc")
+    assert [(cue.begin_s, cue.text) for cue in found.cues] == [(1, "So it goes"), (3, "and so"), (5, "So it goes")]
+
+
+def test_a_class_of_sami_is_chosen_and_said(read: ReadText) -> None:
+    found = read(SAMI, ".smi")
+    assert "--track names another one" in found.warnings[0].message
+    assert [cue.language for cue in found.cues] == ["en-US", "en-US"]
+    assert [cue.text for cue in read(SAMI, ".smi", track="DECC").cues] == ["Der Zug."]
+    assert [cue.text for cue in read(SAMI, ".smi", language="de").cues] == ["Der Zug."]
+    with pytest.raises(InputError, match="there is no class 'FRCC'"):
+        read(SAMI, ".smi", track="FRCC")
+
+
+def write_film(path: Path, content: Path, languages: Sequence[str]) -> Path:
+    """A film without pictures, with a track of subtitles for each language."""
+    with av.open(str(path), "w") as film, av.open(str(content)) as subtitles:
+        source = subtitles.streams.subtitles[0]
+        tracks = [film.add_stream_from_template(source) for _ in languages]
+        for track, language in zip(tracks, languages, strict=True):
+            track.metadata["language"] = language
+        for packet in subtitles.demux(source):
+            for track in tracks if packet.size else ():
+                copied = av.Packet(bytes(packet))
+                copied.pts, copied.dts, copied.duration = packet.pts, packet.dts, packet.duration
+                copied.time_base, copied.stream = packet.time_base, track
+                film.mux(copied)
+    return path
+
+
+HEADER = (
+    b"[Script Info]\r\n\r\n[V4+ Styles]\r\nFormat: Name, Fontname, Fontsize, PrimaryColour, SecondaryColour, "
+    b"OutlineColour, "
+    b"BackColour, Bold, Italic, Underline, StrikeOut, ScaleX, ScaleY, Spacing, Angle, BorderStyle, Outline, Shadow, "
+    b"Alignment, MarginL, MarginR, MarginV, Encoding\r\nStyle: Default,Arial,16,&Hffffff,&Hffffff,&H0,&H0,0,0,0,0,100,"
+    b"100,0,0,1,1,0,2,10,10,10,1\r\n\r\n[Events]\r\nFormat: Layer, Start, End, Style, Name, MarginL, MarginR, MarginV, "
+    b"Effect, Text\r\n"
+)
+
+
+def write_mp4(path: Path) -> Path:
+    """A film with a track of timed text, which needs a header of SubStation Alpha to be opened."""
+    with av.open(str(path), "w") as film:
+        track = film.add_stream("mov_text")
+        track.codec_context.subtitle_header = HEADER
+        track.time_base = track.codec_context.time_base = Fraction(1, 1000)
+        for at, text in ((1000, b"The train was late.\nAgain."), (4000, b"We walked home.")):
+            packet = av.Packet(len(text).to_bytes(2, "big") + text)
+            packet.pts = packet.dts = at
+            packet.duration, packet.time_base, packet.stream = 2000, Fraction(1, 1000), track
+            film.mux(packet)
+    return path
+
+
+@pytest.mark.parametrize("suffix", [".srt", ".ass", ".vtt"])
+def test_the_track_of_a_film_is_read(suffix: str, tmp_path: Path) -> None:
+    content = srt(*((begin, end, text.replace(". ", ".\n")) for begin, end, text in BOTH))
+    if suffix == ".vtt":
+        content = "WEBVTT\n\n" + content.replace(",000", ".000")
+    if suffix == ".ass":
+        content = HEADER.decode() + "".join(
+            f"Dialogue: 0,0:00:0{begin:.2f},0:00:0{end:.2f},Default,Ann,0,0,0,,{text}\r\n" for begin, end, text in BOTH
+        )
+    written = tmp_path / f"a{suffix}"
+    written.write_text(content)
+    found = read_subtitles(write_film(tmp_path / "a.mkv", written, ["eng"]))
+    assert [(cue.begin_s, cue.end_s, cue.text) for cue in found.cues] == BOTH
+    assert [cue.speaker for cue in found.cues] == ["Ann" if suffix == ".ass" else ""] * 2
+    assert not found.warnings
+
+
+def test_the_track_of_an_mp4_is_read(tmp_path: Path) -> None:
+    found = read_subtitles(write_mp4(tmp_path / "a.mp4"))
+    assert [(cue.begin_s, cue.end_s, cue.text) for cue in found.cues] == BOTH
+
+
+def test_a_track_is_chosen_by_number_and_language_and_said(tmp_path: Path) -> None:
+    (tmp_path / "a.srt").write_text(srt(*BOTH))
+    film = write_film(tmp_path / "a.mkv", tmp_path / "a.srt", ["eng", "ger"])
+    shown = "the film has the tracks 1 (eng, srt), 2 (ger, srt); track"
+    for choices, number in (
+        ({}, 1),
+        ({"language": "de"}, 2),
+        ({"track": "2"}, 2),
+        ({"track": "de"}, 2),
+        ({"track": "eng"}, 1),
+    ):
+        found = read_subtitles(film, None, Reading(**choices))  # type: ignore[arg-type]
+        assert found.warnings[0].message == f"{shown} {number} is read, --track names another one"
+    with pytest.raises(InputError, match="there is no track 'fr' of text"):
+        read_subtitles(film, None, Reading(track="fr"))
+
+
+NO_TEXT = {
+    "pictures of a Blu-ray": (".sup", b"PG" + bytes(8) + b"\x16" + bytes(200), "holds pictures of subtitles, no text"),
+    "pictures of a DVD": (".sub", b"\x00\x00\x01\xba" + bytes(200), "holds pictures of subtitles, no text"),
+    "the index of pictures": (".idx", b"# VobSub index file, v7\n", "is the index of pictures of subtitles"),
+    "an archive": (".srt", b"PK\x03\x04" + bytes(200), "is a ZIP archive"),
+    "a broadcaster's file": (".stl", b"850STL25.01" + b"0" * 1200, "is EBU STL, which is not read"),
+    "a damaged film": (".mp4", b"\x00\x00\x00\x18ftypisom" + bytes(200), "cannot be read as a film"),
+    "other text": (".srt", b"Nothing here.\n", r"contains no subtitles of a format that is read \(SubRip, WebVTT"),
+}
+
+
+@pytest.mark.parametrize(("suffix", "content", "reason"), NO_TEXT.values(), ids=NO_TEXT)
+def test_what_holds_no_subtitles_of_text_is_named(suffix: str, content: bytes, reason: str, read: ReadText) -> None:
+    with pytest.raises(DataError, match=reason):
+        read(content, suffix)
+
+
+def test_a_film_without_a_track_is_named(tmp_path: Path) -> None:
+    with av.open(str(tmp_path / "a.mkv"), "w") as film:
+        track = film.add_stream("pcm_s16le", rate=8000)
+        frame = av.AudioFrame(format="s16", layout="mono", samples=800)
+        frame.rate, frame.pts = 8000, 0
+        film.mux(track.encode(frame))
+    with pytest.raises(DataError, match="is a film without a track of subtitles"):
+        read_subtitles(tmp_path / "a.mkv")

@@ -1,0 +1,74 @@
+"""The formats of subtitle files: their names and endings, how their content tells them, and their readers."""
+
+import re
+from types import MappingProxyType
+
+from tts2face.interchange.subtitles.blocks import read_subrip, read_webvtt
+from tts2face.interchange.subtitles.clock import HAS_ARROW, without_frames
+from tts2face.interchange.subtitles.cues import SubtitleWarning, WrittenCue
+from tts2face.interchange.subtitles.frames import MICRODVD, MPL2, read_microdvd, read_mpl2
+from tts2face.interchange.subtitles.lyrics import LINE, read_lyrics
+from tts2face.interchange.subtitles.pairs import PAIR, read_pairs
+from tts2face.interchange.subtitles.reading import Reading
+from tts2face.interchange.subtitles.sami import read_sami
+from tts2face.interchange.subtitles.substation import read_substation
+from tts2face.interchange.subtitles.ttml import read_ttml
+
+SUBRIP, WEBVTT, SUBSTATION, TTML = "SubRip", "WebVTT", "SubStation Alpha", "TTML"
+MICRODVD_NAME, MPL2_NAME, PAIRS, LRC, SAMI = "MicroDVD", "MPL2", "SubViewer", "LRC", "SAMI"
+SUFFIXES = MappingProxyType({
+    ".srt": SUBRIP, ".vtt": WEBVTT, ".ass": SUBSTATION, ".ssa": SUBSTATION, ".ttml": TTML, ".dfxp": TTML, ".itt": TTML,
+    ".xml": TTML, ".sbv": PAIRS, ".sub": MICRODVD_NAME, ".mpl": MPL2_NAME, ".lrc": LRC, ".smi": SAMI, ".sami": SAMI,
+})  # fmt: skip
+NAMES = (SUBRIP, WEBVTT, SUBSTATION, TTML, MICRODVD_NAME, MPL2_NAME, "SBV", PAIRS, LRC, SAMI)
+FILM_SUFFIXES = (".mp4", ".m4v", ".mov", ".mkv", ".mks", ".webm")  # in which a track of subtitles may lie
+HEAD_LINES = 40  # within which a format shows itself
+_XML = re.compile(r"\s*<(?:\?xml|!DOCTYPE|!--|(?:\w+:)?tt[\s>])")
+_SAMI = re.compile(r"<SAMI\b|<SYNC\b", re.IGNORECASE)
+_SECTION = re.compile(r"^\s*\[(?:Script Info|V4\+? Styles|Events)\]", re.IGNORECASE | re.MULTILINE)
+_BY_LINES = ((PAIRS, PAIR), (MICRODVD_NAME, MICRODVD), (MPL2_NAME, MPL2), (LRC, LINE))
+
+
+def subtitle_format(text: str, suffix: str) -> str:
+    """Format of the text of a subtitle file: by its content where that is unmistakable, else by its suffix."""
+    head = text.lstrip("\ufeff \t\n")
+    if head.startswith("WEBVTT"):
+        return WEBVTT
+    if _SAMI.match(head) or (_SAMI.search(head[:4000]) and not HAS_ARROW.search(head[:4000])):
+        return SAMI
+    if _XML.match(text) or _SECTION.search(text):
+        return TTML if _XML.match(text) else SUBSTATION
+    named = SUFFIXES.get(suffix.lower(), SUBRIP)
+    has_arrow = HAS_ARROW.search(text) is not None
+    if has_arrow or named in {SUBSTATION, TTML}:
+        return SUBRIP if has_arrow and named != WEBVTT else named
+    lines = text.split("\n", HEAD_LINES)[:HEAD_LINES]
+    return next((name for name, line in _BY_LINES if any(line.match(written) for written in lines)), named)
+
+
+def read_format(text: str, suffix: str, reading: Reading) -> tuple[list[WrittenCue], list[SubtitleWarning]]:
+    """Cues of the text of a subtitle file as they are written, and its defects.
+
+    Raises
+    ------
+    InputError
+        There is no such track.
+    DataError
+        Nothing of it can be read, or its times have no unit in which they can be meant.
+    """
+    kind = subtitle_format(text, suffix)
+    if kind == TTML:
+        return read_ttml(text)
+    if kind == SAMI:
+        return read_sami(text, reading.language, reading.track)
+    lines = text.split("\n")
+    if kind in {SUBRIP, WEBVTT}:
+        lines, rate = without_frames(lines, reading.fps)
+        cues, warnings = read_webvtt(lines) if kind == WEBVTT else read_subrip(lines)
+        if rate is not None and reading.fps is None and cues:
+            message = f"the times end in frames, which are taken for {rate:g} a second (--subtitle-fps)"
+            warnings.append(SubtitleWarning(cues[0].line, message))
+        return cues, warnings
+    if kind == MICRODVD_NAME:
+        return read_microdvd(lines, reading.fps)
+    return {SUBSTATION: read_substation, PAIRS: read_pairs, MPL2_NAME: read_mpl2, LRC: read_lyrics}[kind](lines)

@@ -1,0 +1,184 @@
+"""Names of speakers before a colon: which of the words that stand there are names, by form, case and repetition."""
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+from lexicon.dictionary import word_set
+
+# A label at the start of a line, after a dash or >>, and its manner: `- Anna (off):`, `MAN #2:`, `[JOHN]:`.
+_LABEL = re.compile(
+    r"^(?P<lead>[^\S\n]*(?:[-–—‐][^\S\n]*|>>[^\S\n]*|•[^\S\n]*)?)(?P<label>[^\W\d_][^:：\n?!,;()\[\]]{0,40}?)[^\S\n]*"
+    r"(?P<manner>[(\[][^()\[\]\n:]{1,40}[)\]][^\S\n]*)?(?::(?=\s|$)|：)",
+    re.MULTILINE,
+)
+_BRACKETED = re.compile(
+    r"^(?P<lead>[^\S\n]*(?:[-–—‐][^\S\n]*|>>[^\S\n]*)?)[\[(](?P<label>[^\W\d_][^()\[\]\n:]{0,40})[\])][^\S\n]*:(?=\s|$)",
+    re.MULTILINE,
+)
+_NUMBERED = re.compile(r"\s*(?:#\s*|No\.\s*)?\d{1,3}$")
+_INITIALS = re.compile(r"(?:[^\W\d_]\.)+")
+_LOWER_WORD = re.compile(r"(?<![^\W\d_])[^\W\d_A-Z][^\W\d_]+")
+MAX_NAME_WORDS = 5
+MIN_SHARE = 0.4  # of the cues of a file that begin with a label: then also names that stand once are speakers
+MIN_CUES = 3
+_TITLES = word_set(
+    "mr mrs ms miss dr prof sir lady lord madam mme mlle m herr frau fr hr señor señora sr sra don doña signor signora "
+    "sgt lt capt col gen maj cpl pvt det insp officer detective captain sergeant lieutenant colonel general major "
+    "president senator judge doctor professor father sister brother mother king queen prince princess aunt uncle rev "
+    "st jr"
+)
+_PARTICLES = word_set("of the a an de la le du des da di del della van von der den zu y e und et and en on in at with")
+# People without a name, of whom subtitles speak.
+_ROLES = word_set(
+    "man woman boy girl child kid baby narrator announcer speaker host reporter interviewer interviewee moderator "
+    "teacher student pupil waiter waitress driver guard nurse soldier clerk crowd audience all both everyone everybody "
+    "men women boys girls children kids people voice operator computer radio tv anchor presenter customer caller "
+    "mann frau junge mädchen erzähler sprecher sprecherin alle beide homme femme garçon fille narrateur tous "
+    "hombre mujer niño niña narrador todos uomo donna tutti mom mum dad mommy daddy grandma grandpa"
+)
+# Words before a colon that introduce what follows; nobody has these names.
+_NO_SPEAKERS = word_set(
+    "note notes nb ok okay warning caution danger attention important ps pps remember reminder tip tips hint fact "
+    "facts listen look see wait stop well so yes no but and or because also plus then next now today tomorrow "
+    "yesterday tonight later first second third fourth fifth last finally lastly firstly secondly thirdly question "
+    "questions answer answers example examples result results summary conclusion reason reasons problem problems "
+    "solution solutions step steps chapter part parts scene episode act title subtitle location date time place price "
+    "phone tel fax email mail address website web url source sources credits director producer starring music sound "
+    "lyrics translation translator subtitles captions sync correction corrections disclaimer spoiler update breaking "
+    "news alert error info information details ingredients requirements rule rules lesson section "
+    "appendix figure table page version status total score name names age sex language please thanks sorry imagine "
+    "think consider suppose guess message quote quotes verdict motto caption headline exit entrance open closed "
+    "welcome introducing previously meanwhile therefore however otherwise namely meaning means conversely todo done "
+    "pros cons goal goals task tasks day week month year level round case exhibit item point points option options "
+    "pin password username id ref re cc bcc fwd subject from to via as at by for is was are were it this that these "
+    "those here there what who why how when where which i you he she we they me him her us them q "
+    "said says say asked told faq ad ads fun hinweis achtung warnung merke frage antwort beispiel wichtig ergebnis "
+    "bemerkung notiz "
+    "remarque avertissement réponse exemple nota aviso atención advertencia pregunta respuesta ejemplo "
+    "importante recuerda recuerden attenzione avviso domanda risposta esempio uwaga pytanie odpowiedź pozor pozn"
+)
+_BEFORE_NAMES = word_set("dear hi hello hey hallo liebe lieber cher chère chers querido querida caro cara to from re")
+_NEVER_IN_NAMES = word_set(
+    "i you he she we they it is are was were am be been said says say asked this that these those here there what who "
+    "why how when where which not if but because my your our their his do does did have has had will would can could"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class FoundLabel:
+    """A label as it is written, its key, and whether a manner follows it: `Anna (off):`."""
+
+    name: str
+    key: str
+    has_manner: bool
+    has_dash: bool
+
+
+def labels_of(text: str) -> list[FoundLabel]:
+    """What stands before a colon at the start of the lines of a text without tags."""
+    return [
+        FoundLabel(name, label_key(name), match["manner"] is not None, bool(match["lead"].strip()))
+        for match in _LABEL.finditer(_BRACKETED.sub(r"\g<lead>\g<label> (as written):", text))
+        if (name := " ".join(match["label"].split()))
+    ]
+
+
+def label_key(label: str) -> str:
+    """Equal for labels of one speaker."""
+    return " ".join(label.split()).casefold()
+
+
+def without_manners(text: str, speakers: Collection[str]) -> str:
+    """A text whose labels of speakers stand without brackets: `ANNA (off):` is `ANNA:`."""
+    text = _BRACKETED.sub(
+        lambda match: f"{match['lead']}{match['label']}:" if label_key(match["label"]) in speakers else match[0], text
+    )
+    return _LABEL.sub(
+        lambda match: (
+            f"{match['lead']}{match['label']}:"
+            if match["manner"] and label_key(match["label"]) in speakers
+            else match[0]
+        ),
+        text,
+    )
+
+
+def split_label(line: str, speakers: Collection[str] | None) -> tuple[str, str] | None:
+    """Speaker before the colon at the start of a line and the words after it, or None.
+
+    Parameters
+    ----------
+    speakers
+        Keys of the labels that are speakers; None: what has the form of a name in capitals.
+    """
+    match = _LABEL.match(line)
+    if match is None or match["manner"]:
+        return None
+    label = " ".join(match["label"].split())
+    is_speaker = _is_certain(label) if speakers is None else label_key(label) in speakers
+    return (label, line[match.end() :]) if is_speaker else None
+
+
+def find_speakers(texts: Sequence[str]) -> Mapping[str, str]:
+    """Speakers of a file by their keys, as they are written first.
+
+    Capitals, titles (Dr. Smith), people without names (Man #2) and a manner in brackets (Anna (off)) tell a speaker;
+    another name is one after a dash, if it stands twice, or if most cues begin with a label.
+
+    Parameters
+    ----------
+    texts
+        Text of each cue without tags, its lines divided by line feeds.
+    """
+    found = [labels_of(text) for text in texts]
+    names: dict[str, str] = {}
+    counts: dict[str, int] = {}
+    for labels in found:
+        for key in {label.key for label in labels}:
+            counts[key] = counts.get(key, 0) + 1
+    n_named = sum(any(_is_name(label.name) for label in labels) for labels in found)
+    is_script = n_named >= MIN_CUES and n_named >= MIN_SHARE * len(texts)
+    small = frozenset(_LOWER_WORD.findall("\n".join(texts))) if counts else frozenset[str]()
+    for labels in found:
+        is_dialogue = sum(label.has_dash for label in labels) > 0
+        for label in labels:
+            is_likely = counts[label.key] > 1 or is_script or (is_dialogue and label.has_dash)
+            is_ordinary = label.name.lower() in small
+            if (
+                _is_certain(label.name)
+                or (label.has_manner and _is_name(label.name))
+                or (is_likely and not is_ordinary and _is_name(label.name))
+            ):
+                names.setdefault(label.key, label.name)
+    return names
+
+
+def _is_certain(label: str) -> bool:
+    """Whether a label is a speaker wherever it stands: a name in capitals, with a title, or of a person without one."""
+    if not _is_name(label):
+        return False
+    words = _words(_NUMBERED.sub("", label))
+    return label == label.upper() or words[0] in _TITLES or words[-1] in _ROLES
+
+
+def _is_name(label: str) -> bool:
+    """Whether a label has the form of a name: few words, each with a capital, none that introduces a sentence."""
+    base = _NUMBERED.sub("", label).strip()
+    written, words = base.split(), _words(base)
+    if not words or len(words) > MAX_NAME_WORDS or words[0] in _BEFORE_NAMES or _NEVER_IN_NAMES & set(words):
+        return False
+    if "".join(words) in _NO_SPEAKERS or words[-1] in _NO_SPEAKERS or len(written) != len(words):
+        return False
+    if any(character.isdigit() for character in base):
+        return False
+    for number, (word, key) in enumerate(zip(written, words, strict=True)):
+        if "." in word and not (key in _TITLES or _INITIALS.fullmatch(word)):
+            return False
+        if not word[0].isupper() and (number == 0 or key not in _PARTICLES) and word[0].lower() != word[0].upper():
+            return False
+    return True
+
+
+def _words(label: str) -> list[str]:
+    return [word.casefold().replace(".", "").replace("’", "'") for word in label.split() if word.strip(".")]

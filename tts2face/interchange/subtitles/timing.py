@@ -1,0 +1,178 @@
+"""Times of cues: what cannot be meant is read right where that is certain, else left out or refused; missing ends."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from statistics import median
+
+from lexicon.errors import DataError
+from tts2face.interchange.subtitles.cues import SubtitleWarning, WrittenCue
+from tts2face.interchange.subtitles.markup import plain_text
+
+CHARACTERS_PER_S = 15.0  # of speech; for the end of a cue whose own end is missing
+MIN_ESTIMATED_S = 1.0
+MAX_S = 1e6  # 11 days; larger times are damaged
+HOUR_S, DAY_S = 3600.0, 86_400.0
+SAME_INSTANT_S = 1e-6
+FILM_MARGIN_S = 0.5  # by which a file of subtitles may be longer than its film
+# Characters that a reader of subtitles sees in a second; broadcasters allow 12 to 20, a single word may stand for long.
+POSSIBLE_SPEEDS, LIKELY_SPEEDS = (0.7, 150.0), (3.0, 45.0)
+
+
+def placed(
+    written: Sequence[WrittenCue], warnings: list[SubtitleWarning], *, shift: float = 0.0, film_s: float | None = None
+) -> list[WrittenCue]:
+    """Cues in order of time, without those that lie before or after the film.
+
+    Raises
+    ------
+    DataError
+        All times are equal, or most cues lie after the end of the film.
+    """
+    cues = _in_columns(_over_midnight(written, warnings), warnings)
+    _check_different(cues)
+    cues = [replace(cue, begin_s=cue.begin_s + shift, end_s=_plus(cue.end_s, shift)) for cue in cues] if shift else cues
+    cues = _within_film(cues, film_s, warnings)
+    kept: list[WrittenCue] = []
+    latest = 0.0
+    for cue in cues:
+        if cue.begin_s > MAX_S:
+            warnings.append(SubtitleWarning(cue.line, f"the start {cue.begin_s:.0f} s is damaged; the cue is left out"))
+            continue
+        if cue.begin_s < 0.0 and cue.end_s is not None and cue.end_s <= 0.0:
+            warnings.append(SubtitleWarning(cue.line, "the cue lies before the start of the film; it is left out"))
+            continue
+        if cue.begin_s < 0.0:
+            warnings.append(SubtitleWarning(cue.line, "the start is negative; the cue begins at 0 s"))
+            cue = replace(cue, begin_s=0.0)  # noqa: PLW2901 - the corrected cue
+        if cue.begin_s < latest:
+            warnings.append(SubtitleWarning(cue.line, "this cue begins before the one above it; cues are sorted"))
+        latest = max(latest, cue.begin_s)
+        kept.append(cue)
+    kept.sort(key=lambda cue: cue.begin_s)
+    if kept and kept[0].begin_s >= HOUR_S and film_s is None:
+        warnings.append(
+            SubtitleWarning(
+                kept[0].line,
+                f"the first cue begins after {kept[0].begin_s / HOUR_S:.1f} hours; if that is the time code of a tape, "
+                f"--shift -{kept[0].begin_s // HOUR_S * HOUR_S:.0f} sets it to the film",
+            )
+        )
+    return kept
+
+
+def _plus(instant: float | None, shift: float) -> float | None:
+    return None if instant is None else instant + shift
+
+
+def _over_midnight(cues: Sequence[WrittenCue], warnings: list[SubtitleWarning]) -> list[WrittenCue]:
+    """Cues in the order of the file, whose times go on after 24 hours where a clock begins anew at midnight."""
+    unwrapped: list[WrittenCue] = []
+    offset, before = 0.0, 0.0
+    for cue in cues:
+        if before - (cue.begin_s + offset) > DAY_S / 2 and before < MAX_S:
+            offset += DAY_S
+            warnings.append(SubtitleWarning(cue.line, "the clock begins anew at midnight here; the times go on"))
+        begin, end = cue.begin_s + offset, _plus(cue.end_s, offset)
+        if end is not None and begin - end > DAY_S / 2 and begin < MAX_S:
+            end += DAY_S
+        unwrapped.append(replace(cue, begin_s=begin, end_s=end))
+        before = max(begin, before) if begin < MAX_S else before
+    return unwrapped
+
+
+def _in_columns(cues: Sequence[WrittenCue], warnings: list[SubtitleWarning]) -> list[WrittenCue]:
+    """Cues with starts and ends exchanged, where all of a file end before they begin."""
+    timed = [cue for cue in cues if cue.end_s is not None and cue.begin_s <= MAX_S]
+    is_reversed = len(timed) > 1 and all(cue.end_s is not None and cue.end_s < cue.begin_s for cue in timed)
+    if not is_reversed:
+        return list(cues)
+    warnings.append(SubtitleWarning(timed[0].line, "all cues end before they begin; starts and ends are exchanged"))
+    return [cue if cue.end_s is None else replace(cue, begin_s=cue.end_s, end_s=cue.begin_s) for cue in cues]
+
+
+def _check_different(cues: Sequence[WrittenCue]) -> None:
+    """Refuse times that are all equal: they are missing, whatever the file says."""
+    worded = [cue for cue in cues if cue.text.strip()]
+    begins = {cue.begin_s for cue in worded}
+    has_lengths = any(cue.end_s is not None and cue.end_s > cue.begin_s for cue in worded)
+    if len(begins) == 1 and (len(worded) > 2 or (len(worded) > 1 and not has_lengths)):
+        raise DataError(
+            f"line {worded[0].line}: all {len(worded)} cues begin at {worded[0].begin_s:g} s, so that the file has no "
+            "times; export it with them"
+        )
+
+
+def _within_film(cues: Sequence[WrittenCue], film_s: float | None, warnings: list[SubtitleWarning]) -> list[WrittenCue]:
+    """Cues that begin before the end of the film; hours of a tape's time code are taken off."""
+    if film_s is None or not cues:
+        return list(cues)
+    outside = [cue for cue in cues if cue.begin_s > film_s + FILM_MARGIN_S]
+    if not outside:
+        return list(cues)
+    first = min(cue.begin_s for cue in cues)
+    hours = first // HOUR_S * HOUR_S
+    moved = [replace(cue, begin_s=cue.begin_s - hours, end_s=_plus(cue.end_s, -hours)) for cue in cues]
+    if hours and all(cue.begin_s <= film_s + FILM_MARGIN_S for cue in moved):
+        warnings.append(
+            SubtitleWarning(
+                cues[0].line,
+                f"the times begin at {hours / HOUR_S:.0f} h, which is taken off: the film has {film_s:.1f} s",
+            )
+        )
+        return moved
+    if 2 * len(outside) > len(cues):
+        raise DataError(
+            f"line {outside[0].line}: {len(outside)} of {len(cues)} cues begin after the end of the film, which has "
+            f"{film_s:.1f} s; choose the subtitles of this film, or move them with --shift"
+        )
+    number = f"{len(outside)} cues begin" if len(outside) > 1 else "this cue begins"
+    left = "they are" if len(outside) > 1 else "it is"
+    warnings.append(
+        SubtitleWarning(
+            outside[0].line, f"{number} after the end of the film, which has {film_s:.1f} s; {left} left out"
+        )
+    )
+    return [cue for cue in cues if cue.begin_s <= film_s + FILM_MARGIN_S]
+
+
+def estimated_end(number: int, cues: Sequence[WrittenCue], text: str) -> float:
+    """End of a cue by the length of its text, which overrules no time of the file.
+
+    It lies at most at the start of the next cue, and at the end of cues that begin at the same instant: words of no
+    length share the time up to the next instant that is written.
+    """
+    begin = cues[number].begin_s
+    end = begin + max(MIN_ESTIMATED_S, len(text) / CHARACTERS_PER_S)
+    first, after = number, number + 1
+    while first > 0 and cues[first - 1].begin_s > begin - SAME_INSTANT_S:
+        first -= 1
+    while after < len(cues) and cues[after].begin_s <= begin + SAME_INSTANT_S:
+        after += 1
+    if after < len(cues):
+        end = min(end, cues[after].begin_s)
+    for cue in cues[first:after]:
+        if cue.end_s is not None and cue.end_s > begin + SAME_INSTANT_S:
+            end = min(end, cue.end_s)
+    return end
+
+
+def median_speed(cues: Sequence[WrittenCue]) -> float | None:
+    """Characters a second that a reader of the cues sees; None without a cue that has words and a length."""
+    speeds = [
+        len(" ".join(plain_text(cue.text, cue.markup).split())) / (cue.end_s - cue.begin_s)
+        for cue in cues
+        if cue.end_s is not None and cue.end_s > cue.begin_s and cue.text.strip()
+    ]
+    return median(speeds) if speeds else None
+
+
+def is_possible(cues: Sequence[WrittenCue]) -> bool:
+    """Whether cues can be read in their time, and do not stand for minutes; also where that cannot be known."""
+    speed = median_speed(cues)
+    return speed is None or POSSIBLE_SPEEDS[0] <= speed <= POSSIBLE_SPEEDS[1]
+
+
+def is_likely(cues: Sequence[WrittenCue]) -> bool:
+    """Whether cues stand about as long as those of films."""
+    speed = median_speed(cues)
+    return speed is not None and LIKELY_SPEEDS[0] <= speed <= LIKELY_SPEEDS[1]
