@@ -114,7 +114,7 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     if dry_run:
         return print_plan(plan, out, (store, write_lines), quiet=quiet)
     for note in () if quiet else plan.notes:
-        write_message(f"tts2face: {place_of(note)}: {note.message}")
+        write_message(f"tts2face: note: {place_of(note)}: {note.message}")
     from tts2face.serving.batch.report import measure_plan, write_table
     from tts2face.serving.batch.run import SEGMENT_FOLDER
     from tts2face.serving.batch.store import open_store

@@ -33,7 +33,7 @@ def print_plan(plan: "Plan", out: Path, files: tuple[str | None, Path | None], *
         length = max((cue.end_s for cue in output.cues), default=output.begin_s) - output.begin_s
         print(f"{output.name}  {output.begin_s:.2f} s  {length:.2f} s  {len(output.cues)} cues")  # noqa: T201 - the result
     for note in plan.notes:
-        print(f"{place_of(note)}: {note.message}")  # noqa: T201 - the result
+        print(f"note: {place_of(note)}: {note.message}")  # noqa: T201 - the result
     _print_speakers(plan)
     _print_rates(plan, results)
     print(  # noqa: T201 - the result

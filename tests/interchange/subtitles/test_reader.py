@@ -348,6 +348,6 @@ def test_what_pysubs2_writes_is_read_as_pysubs2_reads_it(suffix: str, tmp_path: 
 def test_reading_time_is_linear(unit: str, tmp_path: Path) -> None:
     path = tmp_path / "a.srt"
     path.write_text(f"1\n{A}\n{unit * (200_000 // len(unit))}\n", encoding="utf-8")
-    began = time.perf_counter()
+    began = time.process_time()
     read_subtitles(path)
-    assert time.perf_counter() - began < 2.0  # s; a quadratic scan takes minutes
+    assert time.process_time() - began < 4.0  # s of this process; a quadratic scan takes minutes

@@ -73,6 +73,8 @@ class Cue:
         Whether the end is estimated from the length of the text, as the file has none after the start.
     parts
         Words of each speaker in a cue of several; else empty.
+    kind
+        Why the whole cue is not spoken, as ``signs``; else empty.
     """
 
     number: int
@@ -86,6 +88,7 @@ class Cue:
     language: str | None = None
     has_estimated_end: bool = False
     parts: tuple[CuePart, ...] = ()
+    kind: str = ""
 
     @property
     def duration_s(self) -> float:

@@ -76,6 +76,7 @@ _NEUTRAL = frozenset("–—‘’‚“”„†•…‹›«»€™©®°§�
 MIN_SCORE = 0.6
 MIN_NAMED_SCORE = 0.3  # of the encoding of a language that is known: its words may have names of others
 FALLBACK = "cp1252"
+MIN_BYTES = 4  # of which a guess is more than chance
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +103,9 @@ def encoding_of_language(language: str | None) -> str | None:
 
 def guess_encoding(content: bytes, language: str | None = None) -> Decoded | None:
     """Text by the encoding of its language, else by the one in which its letters make words; None if it is no text."""
+    if len(content) < MIN_BYTES:
+        text = _decoded(content, FALLBACK)
+        return None if text is None else Decoded(text, FALLBACK, is_guess=True)
     named = encoding_of_language(language)
     text = None if named is None else _decoded(content, named)
     if named is not None and text is not None and _score(text, named) >= MIN_NAMED_SCORE:

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from lexicon.dictionary import word_set
 
 # A label at the start of a line, after a dash or >>, and its manner: `- Anna (off):`, `MAN #2:`, `[JOHN]:`.
+_LEAD = r"[^\S\n]*(?:(?:[-–—‐]|>>|•)[^\S\n]*)?(?:[(\[][^()\[\]\n:]{1,60}[)\]][^\S\n]+){0,2}"  # also after a noise
 _LABEL = re.compile(
-    r"^(?P<lead>[^\S\n]*(?:[-–—‐][^\S\n]*|>>[^\S\n]*|•[^\S\n]*)?)(?P<label>[^\W\d_][^:：\n?!,;()\[\]]{0,40}?)[^\S\n]*"
+    r"^(?P<lead>" + _LEAD + r")(?P<label>[^\W\d_][^:：\n?!,;()\[\]]{0,40}?)[^\S\n]*"
     r"(?P<manner>[(\[][^()\[\]\n:]{1,40}[)\]][^\S\n]*)?(?::(?=\s|$)|：)",
     re.MULTILINE,
 )
 _BRACKETED = re.compile(
-    r"^(?P<lead>[^\S\n]*(?:[-–—‐][^\S\n]*|>>[^\S\n]*)?)[\[(](?P<label>[^\W\d_][^()\[\]\n:]{0,40})[\])][^\S\n]*:(?=\s|$)",
+    r"^(?P<lead>" + _LEAD + r")[\[(](?P<label>[^\W\d_][^()\[\]\n:]{0,40})[\])][^\S\n]*:(?=\s|$)",
     re.MULTILINE,
 )
 _NUMBERED = re.compile(r"\s*(?:#\s*|No\.\s*)?\d{1,3}$")
@@ -77,8 +78,10 @@ class FoundLabel:
 
 def labels_of(text: str) -> list[FoundLabel]:
     """What stands before a colon at the start of the lines of a text without tags."""
+    if ":" not in text and "：" not in text:
+        return []
     return [
-        FoundLabel(name, label_key(name), match["manner"] is not None, bool(match["lead"].strip()))
+        FoundLabel(name, label_key(name), match["manner"] is not None, match["lead"].strip()[:1] in {*"-–—‐•", ">"})
         for match in _LABEL.finditer(_BRACKETED.sub(r"\g<lead>\g<label> (as written):", text))
         if (name := " ".join(match["label"].split()))
     ]

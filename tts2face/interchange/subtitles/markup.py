@@ -7,11 +7,12 @@ from dataclasses import dataclass
 # Tags of SubRip and WebVTT, and of HTML as converters leave it; anything else between < and > is text.
 _NAMES = r"b|i|u|s|c|v|em|strong|strike|small|big|center|ruby|rt|rp|rb|br|font|span|p|div|lang"
 _TAG = re.compile(
-    rf"</?(?:{_NAMES})(?:\.[^\s<>]*)?\s?/?>"
-    r"|<(?:font|span|p|div)(?:\.[^\s<>]*)?\s[^<>\n=]*=[^<>\n]*>"  # with attributes
-    r"|<(?:v|lang)(?:\.[^\s<>]*)?\s[^<>\n]*>"  # with the name of a speaker or language
-    r"|<\d[\d:.,]*:\d[\d:.,]*>"  # an instant within a cue
-    rf"|</?(?:{_NAMES})(?:$|(?=\n))",  # not closed at the end of a line
+    r"<(?=[/A-Za-z\d])(?:"
+    rf"/?(?:{_NAMES})(?:\.[^\s<>]*)?\s?/?>"
+    r"|(?:font|span|p|div)(?:\.[^\s<>]*)?\s[^<>\n=]*=[^<>\n]*>"  # with attributes
+    r"|(?:v|lang)(?:\.[^\s<>]*)?\s[^<>\n]*>"  # with the name of a speaker or language
+    r"|\d[\d:.,]*:\d[\d:.,]*>"  # an instant within a cue
+    rf"|/?(?:{_NAMES})(?:$|(?=\n)))",  # not closed at the end of a line
     re.IGNORECASE,
 )
 _BREAK_TAG = re.compile(r"<br\s?/?\s?>", re.IGNORECASE)

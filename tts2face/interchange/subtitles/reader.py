@@ -135,7 +135,8 @@ def _timed(
     """Cues with their ends, words and speakers."""
     said = [not cue.kind or cue.kind in reading.keep for cue in written]
     plain = [plain_text(cue.text, cue.markup) for cue, is_said in zip(written, said, strict=True) if is_said]
-    labels = find_speakers(["\n".join(spoken_lines(text)) for text in plain])
+    # Only a text with a colon is divided, as most have none.
+    labels = find_speakers(["\n".join(spoken_lines(text)) if ":" in text or "：" in text else text for text in plain])
     speakers: Collection[str] = labels.keys() if reading.speakers else ()
     cues: list[Cue] = []
     left_out: list[tuple[str, int, str]] = []
@@ -146,7 +147,8 @@ def _timed(
         else:
             left_out.append((cue.kind, cue.line, text.shown))
             text = SpokenText("", text.shown, ())
-        cues.append(_cue(number, written, text, warnings))
+        made = _cue(number, written, text, warnings)
+        cues.append(made if is_said else replace(made, kind=cue.kind))
     notes += notes_of(left_out)
     notes += _note_of_speakers(cues, labels if reading.speakers else {})
     return tuple(cues)
@@ -197,5 +199,5 @@ def _note_of_speakers(cues: Sequence[Cue], labels: Mapping[str, str]) -> list[Su
     ordered = sorted(counts.items(), key=lambda count: -count[1])
     shown = ", ".join(f"{name} ({n})" for name, n in ordered[:MAX_NAMED])
     more = f" and {len(counts) - MAX_NAMED} more" if len(counts) > MAX_NAMED else ""
-    message = f"names before a colon are speakers, here with their cues: {shown}{more}; --no-speakers makes them words"
+    message = f"speakers by names before a colon: {shown}{more}; --no-speakers makes the names words"
     return [SubtitleWarning(first, message)]

@@ -153,11 +153,10 @@ class FilePlan:
         for warning in read.warnings:
             self._warn(warning.line, warning.message)
         self.notes += [PlanWarning(str(self.path), note.line, note.message) for note in read.notes]
-        for cue in read.cues:
-            if not cue.text:  # a role that leaves it out, too, is used
-                self.speakers.note_role(replace(cue, text=cue.shown))
         cues = [self._divide(cue) for cue in read.cues if cue.text]
         self.n_cues, self._is_in_capitals = len(read.cues), is_in_capitals(cue.text for cue in cues)
+        # What nobody says is spoken only where a role or the table of lines asks for it.
+        cues += [replace(cue, text=cue.shown) for cue in read.cues if cue.kind and any(map(str.isalnum, cue.shown))]
         cues = sorted(map(self._moved, cues), key=lambda cue: cue.begin_s)
         fps = exact_rate(self.base.request.fps)
         self._lines = [line for cue in cues for line in cue_lines(cue)]

@@ -9,7 +9,7 @@ from lexicon.errors import InputError
 from lexicon.languages import language_code
 from tts2face.interchange.subtitles.cues import Cue
 from tts2face.request import DRAWN_FACE, Request
-from tts2face.serving.batch.cast import MODEL_NAMES, REQUEST_NAMES, Cast, Role
+from tts2face.serving.batch.cast import MODEL_NAMES, REQUEST_NAMES, SILENT, Cast, Role
 from tts2face.serving.batch.lines import NO_SETTINGS, Lines, LineSettings
 from tts2face.session.named_models import Models
 from tts2face.sound.voice_pool import SHIPPED_VOICES, default_voice, find_voice, has_voice, is_installed, speaks
@@ -71,20 +71,19 @@ class Speakers:
                 strangers.append(who)
             self._others[(cue.number, part)] = strangers.index(who)
 
-    def note_role(self, cue: Cue) -> None:
-        """Note that the role of a cue is used."""
-        role = self.cast.role_of(cue, self.names[0])
-        if role is not None:
-            self.used.add(id(role))
-
     def settings(self, cue: Cue, part: int) -> LineSettings:
         """Settings of a line in the table."""
         return self.lines.of(self.names[1], cue.number, part) if self.lines.settings else NO_SETTINGS
 
     def is_spoken(self, cue: Cue, part: int) -> bool:
-        """Whether a line is spoken, by the table or its role."""
+        """Whether a line is spoken, by the table or its role; else all are but those that nobody says."""
         chosen = self.settings(cue, part).is_spoken
-        return not self.cast.is_silent(cue, self.names[0]) if chosen is None else chosen
+        if chosen is not None:
+            return chosen
+        role = self.cast.role_of(cue, self.names[0])
+        if cue.kind and (role is None or SILENT not in role.settings):
+            return False
+        return not self.cast.is_silent(cue, self.names[0])
 
     def casting(self, cue: Cue, part: int) -> Casting:
         """Models and request of a line, without its words."""
