@@ -17,7 +17,7 @@ _BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )  # in this order: the mark of UTF-32-LE begins with that of UTF-16-LE
 # UTF-16 without a mark: the high byte of digits, line ends and arrows, which every subtitle file contains, is 0.
-_ZERO_SHARE = 0.2
+_ZERO_SHARE = 0.2  # of the bytes of one parity
 
 
 _DECLARED = re.compile(rb"\s*<\?xml[^>]*\bencoding\s*=\s*[\"']([A-Za-z0-9._-]{1,40})[\"']")
@@ -115,6 +115,7 @@ def _decode_other(content: bytes, named: str | None, language: str | None) -> De
 
 def _guess_wide(content: bytes) -> str | None:
     """UTF-16 without a byte order mark, by the places of its zero bytes; None for other text."""
+    # UTF-16 has pairs of bytes
     if len(content) % 2:
         return None
     half = max(len(content) // 2, 1)

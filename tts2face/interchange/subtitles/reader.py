@@ -30,7 +30,7 @@ from tts2face.interchange.subtitles.timing import MAX_S, estimated_end, placed
 from tts2face.interchange.subtitles.unspoken import LYRICS, REPEATS, SIGNS, notes_of, with_credits
 
 MAX_NAMED = 12  # speakers in a note
-OVERLAP_S = 1e-6
+OVERLAP_S = 1e-6  # an end that is the next start differs by rounding at most
 
 
 @dataclass(slots=True)
