@@ -88,6 +88,7 @@ class BlobStore:
             name = divided(sha256)
             self._copies.keep(draft, name)
         if self._store is not self._copies:
+            # of the copy, whose content was hashed: the file itself may change meanwhile
             self._store.add(name, self._copies.path(name))
             self._limit(sha256)
         return sha256
@@ -104,6 +105,7 @@ class BlobStore:
         """
         if self._store is self._copies:
             return self._local(sha256)
+        # a copy that is missing or damaged is fetched again
         with contextlib.suppress(BackendError):
             path = self._local(sha256)
             self._copies.touch(divided(sha256))
@@ -133,6 +135,7 @@ class BlobStore:
         """Hashes of all files, with the times at which they were stored, in seconds since 1970."""
         for entry in self._store.entries():
             sha256 = entry.name.rpartition("/")[2]
+            # a bucket may hold files of others
             if HASH.fullmatch(sha256):
                 yield sha256, entry.stored_s
 

@@ -49,6 +49,7 @@ class JobDatabase:
             arguments: dict[str, Any] = {"timeout": 30.0}
         else:
             arguments = {"connect_timeout": connect_s} | ({"options": options} if options else {})
+            # SQLAlchemy takes psycopg2 without a driver's name, which is not installed
             url = url.replace("postgresql://", "postgresql+psycopg://", 1)
         self._engine = sqlalchemy.create_engine(
             url, pool_pre_ping=True, connect_args=arguments, pool_size=1, max_overflow=n_connections - 1,
@@ -67,6 +68,7 @@ class JobDatabase:
             with self._engine.begin() as connection:
                 transaction = Transaction(connection, self._sql)
                 if is_change:
+                    # first: what it reads must not be older than the change before it
                     transaction.run(_LOCK[self.kind])
                 yield transaction
         except self._away as away:
@@ -127,6 +129,7 @@ def repeat_creation(create: Callable[[], None]) -> None:
             create()
             return
         except (sqlalchemy.exc.DBAPIError, BackendError):
+            # IF NOT EXISTS of two processes at once fails in one of them
             if attempt == N_CREATE_TRIES - 1:
                 raise
             time.sleep(CREATE_PAUSE_S)

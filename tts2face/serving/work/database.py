@@ -29,6 +29,7 @@ def database_url(where: str | Path) -> str:
     """
     text = str(where)
     if text.startswith(POSTGRES_SCHEMES):
+        # SQLAlchemy refuses the short scheme, which providers still print
         return text.replace("postgres://", "postgresql://", 1).replace("postgresql+psycopg://", "postgresql://", 1)
     path = text.removeprefix("sqlite:///")
     if "://" in path:
@@ -56,6 +57,7 @@ def prepare_database(url: str) -> None:
     try:
         if url.startswith("sqlite"):
             with closing(sqlite3.connect(url.removeprefix("sqlite:///"), timeout=30.0)) as connection:
+                # readers then do not wait for writers, and the file keeps the setting
                 connection.execute("PRAGMA journal_mode=WAL")
         DBOS.migrate(url)
         with Workers(url) as workers:
@@ -78,6 +80,7 @@ def quiet_dbos(level: int = logging.ERROR) -> None:
 
 def shown_url(url: str) -> str:
     """A URL without its password."""
+    # the last one: a password may contain others
     before, at, after = url.rpartition("@")
     if not at or "://" not in before:
         return url

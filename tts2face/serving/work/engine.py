@@ -63,6 +63,7 @@ class DatabaseEngine:
                 for address, reason in awaited.ended():
                     result = wait_for_store(partial(store.result, address), self.on_message)
                     yield Rendered(address, result, "" if result is not None else reason)
+                # the last one ends the loop at once
                 if awaited.waiting:
                     time.sleep(POLL_S)
 
@@ -95,6 +96,7 @@ class _Awaited:
         reasons = {}
         for name, job in found.items():
             if job is None:
+                # `tts2face jobs prune` removes jobs that others still await
                 reasons[name] = "its job was removed from the database; run again"
             elif job.status not in ACTIVE:
                 reasons[name] = failure_reason(job)

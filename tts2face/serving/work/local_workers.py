@@ -98,11 +98,13 @@ class _Supervisor:
             worker = self._workers.get(number)
             if worker is not None:
                 lived_s = time.monotonic() - worker.began
+                # one that has just ended waits, so that a lasting fault does not start processes all the time
                 if not worker.reason or lived_s < RESTART_S:
                     n_alive += not worker.reason and (lived_s >= QUICK_END_S or not self._n_quick)
                     continue
                 self._note_end(number, worker, lived_s)
             is_bound = self._wanted.n_workers > 1 and len(self._cores) > 0
+            # more workers than cores share them
             core = self._cores[number % len(self._cores)] if is_bound else None
             self._workers[number] = LocalWorker(self._wanted, core)
         return n_alive

@@ -68,6 +68,7 @@ def list_jobs(database: str, states: Sequence[str] = (), limit: int | None = Non
     url = _prepared(database)
     statuses = [status for status, state in STATES.items() if not states or state in states]
     with open_client(url) as client, Workers(url) as workers:
+        # the dead as well: a job shows where it was rendered
         places = workers.alive(within_s=1e9)
         found = client.list_workflows(name=WORKFLOW, status=statuses, limit=limit)
         return tuple(_job(job, places) for job in found)
@@ -88,6 +89,7 @@ def cancel_jobs(database: str, names: Sequence[str] = ()) -> int:
         chosen = [_find(client, name) for name in names] if names else _of_states(client, ACTIVE, load_input=False)
         active = [job.workflow_id for job in chosen if job.status in ACTIVE]
         for at in range(0, len(active), JOBS_PER_QUERY):
+            # in parts: a database limits the parameters of a statement
             client.cancel_workflows(active[at : at + JOBS_PER_QUERY], cancel_children=True)
         return len(active)
 
@@ -124,6 +126,7 @@ def prune_jobs(database: str, older_than_s: float = 0.0, *, dry_run: bool = Fals
                 status=sorted(frozenset(STATES) - ACTIVE),
                 completed_before=before,
                 limit=JOBS_PER_QUERY,
+                # what was removed has left the list
                 offset=removed if dry_run else 0,
                 load_input=False,
                 load_output=False,
@@ -158,6 +161,7 @@ def _find(client: Any, name: str) -> Any:
     addresses = {job.workflow_id.partition(".")[0] for job in found}
     if len(addresses) != 1:
         raise InputError(f"{len(addresses)} jobs begin with {name!r}; give more of the name that `jobs list` prints")
+    # the newest of the jobs of one segment, as they are numbered by `enqueue`
     return max(found, key=lambda job: int(job.workflow_id.partition(".")[2] or 0))
 
 

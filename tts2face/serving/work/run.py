@@ -129,6 +129,7 @@ class JobRunner:
                 products = find_runner(job.kind)(task)
                 ending = Ending(DONE, self._put(products.files), products.error)
                 paths = {product.name: product.path for product in products.files}
+            # `run` tries these again; they are no fault of the job
             except (DatabaseAwayError, StoreAwayError):
                 raise
             except Tts2faceError as wrong:
@@ -172,6 +173,7 @@ class JobRunner:
                 if not store.has(file.sha256):
                     store.put(paths[file.name])
 
+        # it was cancelled or deleted meanwhile: nobody would fetch its results
         if not changes.end(job.id, ending, put_missing):
             changes.remove_unused({file.sha256 for file in ending.outputs}, store.delete)
         changes.forget_inputs(job.id, store.delete)
@@ -209,6 +211,7 @@ class JobWatch:
 
     def report(self, content: dict[str, Any]) -> None:
         """Add an event; of progress only some."""
+        # the end of a bar is always shown
         is_last = content.get("done") == content.get("of")
         if "done" in content and not is_last and time.monotonic() - self._reported_at < REPORT_S:
             return
@@ -227,7 +230,9 @@ class _JobEngine:
     def render(self, segments: Mapping[str, Segment], store: Store) -> Iterator[Rendered]:
         """Yield each segment as soon as it is stored or has failed."""
         self.watch.check()
+        # before they are queued, so that the job's cancellation finds them
         self.watch.changes.note_segments(self.watch.job_id, segments)
+        # short jobs first: a clip must not wait for a film that came before it
         priority = min(SMALLEST_PRIORITY + len(segments) // SEGMENTS_PER_STEP, LARGEST_PRIORITY)
         yield from self.make(priority, on_wait=self.watch.check).render(segments, store)
 
