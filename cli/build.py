@@ -49,7 +49,6 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
     from corpus_tools.decomposition.capture_files import MarkerOptions
     from corpus_tools.decomposition.marker_sets import DEFAULT_MARKER_TABLE
     from corpus_tools.decomposition.stills import find_stills, parse_stills
-    from corpus_tools.run_options import ignore_stage
     from tts2face.models.palette_file import load_palette
 
     named_stills = parse_stills(still or [])
@@ -73,7 +72,7 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
             estimator=estimator,
             epsilon=epsilon,
             run_options=tool.run_options(),
-            stages=stages or ignore_stage,
+            stages=stages,
         )
     for refusal in result.refused:
         write_message(f"rejected {refusal.name}: {refusal.reason}")

@@ -126,7 +126,6 @@ def build(  # noqa: PLR0913 - one parameter a flag
     if report is not None:
         check_file_name(report, "a report", (".html", ".htm"))
     from corpus_tools.build_talker import build_talker
-    from corpus_tools.run_options import ignore_stage
 
     consent_fields = _request_consent(name or recordings.resolve().name, consent) if appearance else None
     with stage_bar() as stages:
@@ -140,7 +139,7 @@ def build(  # noqa: PLR0913 - one parameter a flag
             report=report,
             base=base,
             is_strict=strict,
-            stages=stages or ignore_stage,
+            stages=stages,
         )
     for warning in result.warnings:
         write_message(f"warning about {warning.name}: {warning.message}")
@@ -255,14 +254,11 @@ def audio_maps(
     check_suffix(out, "talker")
     refuse_overwriting({"--out": out}, {"the recordings": recordings, "--talker": talker, "--model": tool.model})
     from corpus_tools.build_talker import add_audio_maps
-    from corpus_tools.run_options import ignore_stage
     from tts2face.models.talker_file import load_talker
 
     with stage_bar() as stages:
         run_options = tool.run_options()
-        result = add_audio_maps(
-            recordings, load_talker(talker), out, run_options=run_options, stages=stages or ignore_stage
-        )
+        result = add_audio_maps(recordings, load_talker(talker), out, run_options=run_options, stages=stages)
     audio_maps = ", ".join(f"{name} (features: {audio_map.feature})" for name, audio_map in result.audio_maps.items())
     write_message(f"wrote {out}: audio maps {audio_maps}")
 
@@ -289,10 +285,9 @@ def pool(
     check_suffix(out, "talker")
     refuse_overwriting({"--out": out}, {"TRACKS": tracks})
     from corpus_tools.pool_talker import pool_talker
-    from corpus_tools.run_options import ignore_stage
 
     with stage_bar() as stages:
-        found = pool_talker(talker, tracks, out, source=source, stages=stages or ignore_stage)
+        found = pool_talker(talker, tracks, out, source=source, stages=stages)
     write_message(f"wrote {out}: networks pooled with {found.n_tracks} tracks, {found.minutes:.1f} minutes of speech")
 
 

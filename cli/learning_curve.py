@@ -19,7 +19,6 @@ def run_learning_curve(
     """Measure a learning curve on the recordings; print its tables, and write them or a picture to `out`."""
     folder = split_flags.curve_recordings(comparison)
     from corpus_tools.measures.splits import split_randomly
-    from corpus_tools.run_options import ignore_stage
     from corpus_tools.studies.evaluation.curve_page import REPORT
     from corpus_tools.studies.evaluation.curve_tables import curve_tables
     from corpus_tools.studies.evaluation.learning_curve import DEFAULT_AMOUNTS_S, measure_learning_curve
@@ -41,7 +40,7 @@ def run_learning_curve(
     indexed = None if name == NO_BASE else Base.of(load_talker(name))
     with stage_bar() as stages:
         talker = None if indexed is None else indexed.talker
-        observations = read_material(folder, talker, run_options=tool.run_options(), stages=stages or ignore_stage)
+        observations = read_material(folder, talker, run_options=tool.run_options(), stages=stages)
     train, test = split_randomly(observations, hold_out=split_flags.hold_out, seed=split_flags.seed)
     with progress_bar("learning from parts of the material") as on_progress:
         curve = measure_learning_curve(

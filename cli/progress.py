@@ -8,10 +8,10 @@ from cli.process import COMPILATION, Progress, write_message
 
 
 @contextmanager
-def progress_bar(description: str, quiet: bool = False) -> Iterator[Progress | None]:
-    """Progress bar updated by ``on_progress(done, of)``; None if quiet or if standard error is no terminal."""
+def progress_bar(description: str, quiet: bool = False) -> Iterator[Progress]:
+    """Progress bar updated by ``on_progress(done, of)``; nothing is shown if quiet or without a terminal."""
     with stage_bar(quiet) as stages:
-        yield stages(description) if stages else None
+        yield stages(description)
 
 
 @contextmanager
@@ -34,11 +34,11 @@ def compilation_messages(quiet: bool = False) -> Iterator[None]:
 
 
 @contextmanager
-def stage_bar(quiet: bool = False) -> Iterator[Callable[[str], Progress] | None]:
-    """Progress bar that restarts with each named stage; None if quiet or if standard error is no terminal."""
+def stage_bar(quiet: bool = False) -> Iterator[Callable[[str], Progress]]:
+    """Progress bar that restarts with each named stage; nothing is shown if quiet or without a terminal."""
     with compilation_messages(quiet):
         if quiet or not sys.stderr.isatty():
-            yield None
+            yield lambda _: lambda _done, _of: None
             return
         with _bar() as begin_stage:
             yield begin_stage

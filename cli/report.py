@@ -117,7 +117,6 @@ def retarget(
 ) -> None:
     """Compare what the face tracker reads in recordings and in a face that mimics them, phone by phone."""
     refuse_overwriting({"--out": out}, {"the recordings": recordings, "--face": face, "--model": tool.model})
-    from corpus_tools.run_options import ignore_stage
     from corpus_tools.studies.retargeting.write import write_retargeting
     from tts2face.models.face_names import default_face
 
@@ -128,7 +127,7 @@ def retarget(
             face=face or default_face(identity, None),
             identity=identity,
             run_options=tool.run_options(),
-            stages=stages or ignore_stage,
+            stages=stages,
         )
     write_message(
         f"wrote {out}: {study.n_recordings} recordings, {study.n_missed} of {study.differences.size} scores differ by "

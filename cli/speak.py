@@ -158,7 +158,7 @@ def _write_files(
     """Write the clip and the exports, or only the exports."""
     request, picture = request_and_picture
 
-    def write(on_progress: "Progress | None") -> "WrittenClip":
+    def write(on_progress: "Progress") -> "WrittenClip":
         if options.out is None:
             return session.export(request, options.exports, on_progress=on_progress, on_piece=on_piece)
         return session.write(
@@ -190,7 +190,7 @@ def _write_speech(prepared: "PreparedRequest", picture: Picture, options: SpeakO
     return True
 
 
-def _report_writing(write: "Callable[[Progress | None], WrittenClip]", options: SpeakOptions) -> None:
+def _report_writing(write: "Callable[[Progress], WrittenClip]", options: SpeakOptions) -> None:
     """Write with a progress bar and print a summary."""
     resume_collection()
     began = time.perf_counter()
@@ -203,8 +203,7 @@ def _report_writing(write: "Callable[[Progress | None], WrittenClip]", options: 
             if not has_begun:
                 return_large_blocks()
                 has_begun = True
-            if on_progress is not None:
-                on_progress(done, of)
+            on_progress(done, of)
 
         written = write(report)
     _warn_mismatches(written.mismatches)

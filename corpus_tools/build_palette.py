@@ -27,7 +27,7 @@ from corpus_tools.decomposition.recordings import read_recordings
 from corpus_tools.decomposition.stills import NEUTRAL, PictureReader, Still, build_marker_reader
 from corpus_tools.recordings.observe import Refusal
 from corpus_tools.recordings.provenance import PROVENANCE, PROVENANCE_FIELDS, read_provenance
-from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
+from corpus_tools.run_options import RunOptions
 from corpus_tools.training.pose_correction import fit_pose_correction
 from lexicon.errors import DataError, InputError
 from lexicon.values.fields import check_fields
@@ -41,7 +41,7 @@ from tts2face.models.landmarks import eye_aperture, inner_lip_gaps
 from tts2face.models.palette import Palette
 from tts2face.models.palette_file import write_palette
 from tts2face.models.talker import NOT_STATED
-from tts2face.types import Progress
+from tts2face.types import Progress, StageCallback, ignore_progress, ignore_stage
 
 ESTIMATORS = ("least-squares", "samples")
 SAMPLES_SEED = 2008
@@ -154,15 +154,17 @@ def build_style(  # noqa: PLR0913 - run options change no motion
 
 
 def decompose_recordings(
-    captured: Sequence[FaceRecording], basis: ExpressionBasis, estimator: Estimator, on_progress: Progress | None = None
+    captured: Sequence[FaceRecording],
+    basis: ExpressionBasis,
+    estimator: Estimator,
+    on_progress: Progress = ignore_progress,
 ) -> list[Decomposition]:
     """Decompositions of recordings of one person, after correction of pose-dependent errors."""
     leak = fit_pose_correction(captured)
     parts = []
     for number, recording in enumerate(captured, start=1):
         parts.append(decompose(leak.apply(recording), basis, estimator))
-        if on_progress:
-            on_progress(number, len(captured))
+        on_progress(number, len(captured))
     return parts
 
 

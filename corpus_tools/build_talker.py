@@ -13,7 +13,7 @@ from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import QualityWarning, Refusal, check_any_kept, observe
 from corpus_tools.recordings.provenance import PROVENANCE, PROVENANCE_FIELDS, read_provenance
 from corpus_tools.recordings.video import CachedTracker
-from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
+from corpus_tools.run_options import RunOptions
 from corpus_tools.studies.plots import load_matplotlib
 from corpus_tools.studies.recordings_page import recordings_page
 from corpus_tools.training.adapt_talker import Base, carried_audio_maps
@@ -36,7 +36,7 @@ from lexicon.errors import DataError, InputError
 from tts2face.models.talker import NOT_STATED, Talker
 from tts2face.models.talker_file import load_talker, write_talker
 from tts2face.storage.files import write_atomically
-from tts2face.types import Progress
+from tts2face.types import Progress, StageCallback, ignore_progress, ignore_stage
 from tts2face.video.blendshapes import BlendshapeReader
 from tts2face.video.networks import find_bundle
 
@@ -175,7 +175,11 @@ def _learn_from_recordings(
 
 
 def add_appearance(
-    talker: Talker, observations: Sequence[Observation], *, run_options: RunOptions, on_progress: Progress | None = None
+    talker: Talker,
+    observations: Sequence[Observation],
+    *,
+    run_options: RunOptions,
+    on_progress: Progress = ignore_progress,
 ) -> Talker:
     """The talker with texture models, a plate, and the appearance parameters of every utterance.
 

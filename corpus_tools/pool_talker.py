@@ -3,12 +3,12 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from corpus_tools.run_options import StageCallback, ignore_stage
 from corpus_tools.training.phone_network import MIN_FRAMES, add_phone_network
 from corpus_tools.training.pooling.lip_tracks import read_lip_tracks
 from corpus_tools.training.pooling.speech import align_lip_tracks
 from lexicon.errors import InputError
 from tts2face.models.talker_file import load_talker, write_talker
+from tts2face.types import StageCallback, ignore_stage
 
 STAGES = ("aligning lip tracks", "learning phone networks")
 

@@ -1,16 +1,12 @@
 """Options of long computations that do not affect results: cache folder, processes, model files."""
 
 import os
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from lexicon.errors import BackendError, InputError
 from lexicon.values.fields import check_fields
 from tts2face.storage.user_folders import user_cache
-from tts2face.types import Progress
-
-StageCallback = Callable[[str], Progress]  # name of a stage -> its progress callback
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +52,3 @@ class RunOptions:
         if jobs < 1:
             raise InputError(f"jobs must be 1 or more, not {jobs}")
         return jobs
-
-
-def ignore_stage(_: str) -> Progress:
-    """Stage callback that ignores progress."""
-    return lambda done, of: None

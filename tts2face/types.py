@@ -22,6 +22,7 @@ MAX_RATE_HZ = 1e6  # of samples or frames; the fastest converters of sound have 
 SOUND_RATE = 48_000  # Hz, of clips and films; the usual rate of players and editors, required by Opus
 HEAD_CHANNELS = ("pitch", "yaw", "roll", "x", "y", "z")  # radians (nod down, turn to own left, tilt) and mm
 Progress = Callable[[int, int], None]  # number of finished steps, number of all steps
+StageCallback = Callable[[str], Progress]  # name of a stage -> its progress callback
 YieldTurn = Callable[[], None]  # called between the steps of a computation, so that another one can run
 NTSC_NOMINAL_RATES = (24, 30, 48, 60, 120)  # nominal rates whose broadcast form is 1000/1001 of them (SMPTE 12M)
 
@@ -50,6 +51,15 @@ def _checked_read_only(values: ArrayLike, what: str, ndim: int) -> NDArray[np.fl
 
 def keep_on() -> None:
     """Yield to nothing: `YieldTurn` of a computation that runs alone."""
+
+
+def ignore_progress(_done: int, _of: int) -> None:
+    """Report to nobody: `Progress` of a computation that nobody watches."""
+
+
+def ignore_stage(_name: str) -> Progress:
+    """`StageCallback` of a computation that nobody watches."""
+    return ignore_progress
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,7 @@ from corpus_tools.appearance.videos import AppearanceRecording
 from lexicon.errors import InputError
 from tts2face.models.appearance import Appearance, Plate, TextureModel
 from tts2face.models.landmarks import FACE_OVAL, MOUTH_REGION, N_MESH_LANDMARKS, lip_opening
-from tts2face.types import Progress
+from tts2face.types import Progress, ignore_progress
 
 N_REFERENCE_SHAPES = 4000  # frames from which the reference shape is made
 OPEN_LIP_QUANTILE = 0.9  # the reference is the mean of the frames with lip gaps above this quantile
@@ -56,7 +56,7 @@ class LearnedAppearance:
 def learn_appearance(
     recordings: Sequence[AppearanceRecording],
     *,
-    on_progress: Progress | None = None,
+    on_progress: Progress = ignore_progress,
 ) -> LearnedAppearance:
     """Texture models of the face and of the inner mouth, the plate, and the appearance parameters of every frame.
 
@@ -76,8 +76,7 @@ def learn_appearance(
     for number, recording in enumerate(recordings):
         found.append(lights.of(recording))
         _add_textures(recording, frames, found[-1], grown)
-        if on_progress:
-            on_progress(number + 1, steps)
+        on_progress(number + 1, steps)
     models = (
         _build_texture_model(frames[0], grown[0], N_MODES, "the face"),
         _build_texture_model(frames[1], grown[1], N_MOUTH_MODES, "the inside of the mouth"),
@@ -85,8 +84,7 @@ def learn_appearance(
     parameters = []
     for number, (recording, light) in enumerate(zip(recordings, found, strict=True)):
         parameters.append(appearance_parameters(recording, frames, light, models))
-        if on_progress:
-            on_progress(len(recordings) + number + 1, steps)
+        on_progress(len(recordings) + number + 1, steps)
     plate = _build_plate(recordings, stretch, parameters, models[0].n_modes)
     appearance = Appearance(models[0], models[1], np.array(MOUTH_LANDMARKS, np.int32), moving, plate)
     return LearnedAppearance(

@@ -65,7 +65,7 @@ def read_sound_span(video: Path, start: float, seconds: float) -> Waveform:
 
 
 def read_recordings(
-    recordings: Path, face: Face, markers: MarkerOptions, run_options: RunOptions, on_progress: Progress | None
+    recordings: Path, face: Face, markers: MarkerOptions, run_options: RunOptions, on_progress: Progress
 ) -> tuple[list[FaceRecording], list[Refusal]]:
     """Recordings and refusals, each sorted by name.
 
@@ -87,8 +87,7 @@ def read_recordings(
             refused.append(outcome)
         else:
             captured.append(outcome)
-        if on_progress:
-            on_progress(number, len(files))
+        on_progress(number, len(files))
     return sorted(captured, key=lambda recording: recording.name), sorted(refused, key=lambda recording: recording.name)
 
 

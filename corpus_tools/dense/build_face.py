@@ -35,7 +35,7 @@ from tts2face.numeric.arrays import FloatArray
 from tts2face.picture.occlusion import bake_occlusion
 from tts2face.processes.threads import available_cores
 from tts2face.storage.shipped import find_file
-from tts2face.types import Progress
+from tts2face.types import Progress, ignore_progress
 from tts2face.video.networks import find_bundle
 
 AROUND_GLOSS = 30.0  # texels, Gaussian, about 5 mm, whose colours lie under gloss
@@ -61,7 +61,7 @@ def build_face(
     consent: Mapping[str, str],
     n_modes: int = 0,
     run_options: RunOptions | None = None,
-    on_progress: Progress | None = None,
+    on_progress: Progress = ignore_progress,
 ) -> BuiltFace:
     """Adapt the default head to the talker in videos, and write it as a face.
 
@@ -94,8 +94,7 @@ def build_face(
     videos = find_videos(recordings)
     stated = read_provenance(recordings / PROVENANCE, must_exist=False)
     eyes = CachedTracker(run_options.folder(), find_bundle(run_options.model))
-    report = on_progress or (lambda done, of: None)
-    landmarks = track_videos(videos, eyes, lambda done, of: report(done, 2 * of))
+    landmarks = track_videos(videos, eyes, lambda done, of: on_progress(done, 2 * of))
     head = read_face(find_file(SOURCE_FACE, "face"))
     fitted = fit_person(head, resting_landmarks(landmarks))
     model = None
@@ -103,7 +102,7 @@ def build_face(
         mode = mode_fitter(fitted.shaped, fitted.used)
         model = dense_model(fitted.shaped, mode, landmarks, fitted.person, n_modes)
     face, look = paint_person(
-        fitted, landmarks, lambda done, of: report(len(videos) + done * len(videos) // of, 2 * len(videos))
+        fitted, landmarks, lambda done, of: on_progress(len(videos) + done * len(videos) // of, 2 * len(videos))
     )
     words = ["tts2face", "corpus", "face", recordings.name, "--out", out.name]
     metadata = {

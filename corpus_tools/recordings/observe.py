@@ -16,7 +16,7 @@ from corpus_tools.recordings.sync import corrected_timings, estimate_sync_by_vid
 from corpus_tools.recordings.video import CachedTracker
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, InputError
-from tts2face.types import Progress
+from tts2face.types import Progress, ignore_progress
 from tts2face.video.networks import find_bundle
 
 STEPS_PER_VIDEO = 100  # of progress for each video
@@ -73,7 +73,7 @@ def observe(
     *,
     is_strict: bool = False,
     run_options: RunOptions | None = None,
-    on_progress: Progress | None = None,
+    on_progress: Progress = ignore_progress,
 ) -> Observations:
     """Observations of a folder at one frame rate with sound and picture synchronised, and reasons for refusals.
 
@@ -104,7 +104,7 @@ def observe(
     agreed = estimate_sync_by_video(kept)
     timing = corrected_timings(kept, agreed)
     again = [replace(task, timing=timing[task.video]) for task in tasks if task.video in timing]
-    for task, outcomes in _observe_tasks(again, cache, model, min(processes, len(again)), None):
+    for task, outcomes in _observe_tasks(again, cache, model, min(processes, len(again)), ignore_progress):
         found[task.video] = outcomes
     for video, agreement in agreed.items():
         if agreement.problem:
@@ -165,19 +165,18 @@ def group_by_video(recordings: Sequence[Recording]) -> list[VideoTask]:
 
 
 def _observe_tasks(
-    tasks: Sequence[VideoTask], cache: Path, model: Path, jobs: int, on_progress: Progress | None
+    tasks: Sequence[VideoTask], cache: Path, model: Path, jobs: int, on_progress: Progress
 ) -> Iterator[tuple[VideoTask, RecordingOutcomes]]:
     """Tasks with their outcomes in order of completion."""
-    report = on_progress or (lambda done, of: None)
     of = STEPS_PER_VIDEO * len(tasks)
     if jobs <= 1:
         worker = _VideoReader(cache, model)
         for number, task in enumerate(tasks):
-            yield task, worker.outcomes(task, _task_share_callback(report, number, of))
+            yield task, worker.outcomes(task, _task_share_callback(on_progress, number, of))
         return
     for number, done in enumerate(map_unordered(tasks, _observe_task, _start_worker, (cache, model), jobs), start=1):
         yield done
-        report(STEPS_PER_VIDEO * number, of)
+        on_progress(STEPS_PER_VIDEO * number, of)
 
 
 def _task_share_callback(on_progress: Progress, number: int, of: int) -> ShareCallback:

@@ -21,7 +21,7 @@ from tts2face.models.talker import Talker
 from tts2face.numeric.arrays import FloatArray
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
-from tts2face.types import Progress, Trajectory
+from tts2face.types import Progress, Trajectory, ignore_progress
 from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.tracking import FaceTracker
 
@@ -44,7 +44,7 @@ GAINS, GAIN_SPREAD = (0.0, 1.4), 0.4  # of a pose, and of each shape in it (stan
 
 
 def calibrate_face(
-    face: Face, talker: Talker, *, model: Path | None = None, on_progress: Progress | None = None
+    face: Face, talker: Talker, *, model: Path | None = None, on_progress: Progress = ignore_progress
 ) -> Face:
     """The face with a score map.
 
@@ -57,7 +57,6 @@ def calibrate_face(
     """
     names = _speech_shapes(face)
     tracker, reader = FaceTracker(model), BlendshapeReader(model)
-    report = on_progress or (lambda done, of: None)
     rng = np.random.default_rng(0)
     columns = [face.shape_names.index(name) for name in names]
     mirror = [names.index(mirrored_name(name)) if mirrored_name(name) in names else at for at, name in enumerate(names)]
@@ -76,7 +75,7 @@ def calibrate_face(
         known_scores = np.concatenate([read, *[drawn_read] * DRAWN_COPIES])
         fitted = fit_score_map(names, np.concatenate([known, known[:, mirror]]), np.tile(known_scores, (2, 1)))
         found = symmetrise_score_map(correct_score_map(fitted, drawn, drawn_read), mirror)
-        report(1 + number, len(N_DRAWN))
+        on_progress(1 + number, len(N_DRAWN))
     return replace(face, scores=found)
 
 

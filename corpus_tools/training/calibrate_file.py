@@ -11,11 +11,11 @@ from tts2face.models.score_map import SCORES, ScoreMap
 from tts2face.models.talker_file import load_talker
 from tts2face.storage.shipped import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
-from tts2face.types import Progress
+from tts2face.types import Progress, ignore_progress
 
 
 def calibrate_face_file(
-    face: str, out: Path, *, source: str = "grid_s1", model: Path | None = None, on_progress: Progress | None = None
+    face: str, out: Path, *, source: str = "grid_s1", model: Path | None = None, on_progress: Progress = ignore_progress
 ) -> None:
     """Write a face file with its score map, which replaces one that it has; pictures show the face's own haircut.
 

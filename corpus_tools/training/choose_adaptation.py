@@ -23,7 +23,7 @@ from corpus_tools.training.train_talker import learn_talker
 from tts2face.lips.motion_measures import DTW_BAND_S, correlation, range_ratio, speech_frames, warping_cost
 from tts2face.models.talker import ShapeModel, Talker
 from tts2face.numeric.arrays import FloatArray
-from tts2face.types import Progress
+from tts2face.types import Progress, ignore_progress
 
 MAX_FOLDS = 5
 # Wanted deviation of opening and width over the real ones, about that of the shipped talker for other people, and the
@@ -92,7 +92,7 @@ class ChosenAdaptation:
 
 
 def choose_adaptation(
-    base: Base, observations: Sequence[Observation], *, on_progress: Progress | None = None
+    base: Base, observations: Sequence[Observation], *, on_progress: Progress = ignore_progress
 ) -> ChosenAdaptation:
     """`USUAL`, unless another adaptation has surely less warping cost on held-out sentences of the person.
 
@@ -112,8 +112,7 @@ def choose_adaptation(
     scores = {}
     for done, (name, learner) in enumerate(learners.items(), start=1):
         scores[name] = cross_validate(learner, observations)
-        if on_progress:
-            on_progress(done, len(learners))
+        on_progress(done, len(learners))
     best = min(ADAPTATIONS, key=lambda adaptation: scores[_name(adaptation)].cost)
     if not scores[_name(best)].is_surely_better(scores[_name(USUAL)]):
         best = USUAL

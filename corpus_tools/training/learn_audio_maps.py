@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.run_options import StageCallback, ignore_stage
 from corpus_tools.training.linear_audio_map import (
     TrainingUtterance,
     learn_linear_map,
@@ -17,7 +16,7 @@ from tts2face.models.audio_map import AudioMap
 from tts2face.models.talker import ShapeModel, Talker
 from tts2face.sound.features import FEATURE_RATE, speech_features
 from tts2face.sound.pauses import speech_level
-from tts2face.types import Progress, Waveform
+from tts2face.types import Progress, StageCallback, Waveform, ignore_progress, ignore_stage
 from tts2face.video.media import read_sound
 
 # Chosen by inner cross-validation on the training utterances of GRID s1 (docs/accuracy.md, "Speech-driven").
@@ -29,15 +28,14 @@ UtteranceFeatures = Mapping[str, NDArray[np.float32]]  # features of each uttera
 
 
 def sound_features(
-    observations: Sequence[Observation], kinds: Sequence[str], *, on_progress: Progress | None = None
+    observations: Sequence[Observation], kinds: Sequence[str], *, on_progress: Progress = ignore_progress
 ) -> dict[str, UtteranceFeatures]:
     """For each kind of feature, the (T, D) features of every utterance on the frames of its landmarks."""
     found: dict[str, dict[str, NDArray[np.float32]]] = {kind: {} for kind in kinds}
     for done, (observation, sound) in enumerate(_read_sounds(observations)):
         for kind in kinds:
             found[kind][observation.name] = utterance_features(observation, sound, kind)
-        if on_progress:
-            on_progress(done + 1, len(observations))
+        on_progress(done + 1, len(observations))
     return dict(found)
 
 

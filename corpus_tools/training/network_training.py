@@ -5,7 +5,6 @@ and on one thread, so that the same data and seed give the same bytes on any num
 all weights but the biases of the first layer; each output counts only for the speakers for whom it is known.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,7 +52,6 @@ def train_network(
     *,
     options: TrainingOptions,
     seed: int,
-    on_epoch: Callable[[], None] | None = None,
 ) -> Weights:
     """Weights of a network trained on the samples.
 
@@ -75,8 +73,6 @@ def train_network(
         rate = LEARNING_RATE * (1.0 if elapsed < DECAY_FROM else (1 - elapsed) / (1 - DECAY_FROM) + FINAL_RATE)
         rule = (np.float32(rate), np.float32(options.weight_decay), n_steps)
         n_steps = _train_epoch(order, data, (table, importance), weights, moments, rule)
-        if on_epoch:
-            on_epoch()
     return weights
 
 

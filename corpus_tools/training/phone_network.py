@@ -23,7 +23,7 @@ from tts2face.lips.motion_measures import speech_frames
 from tts2face.models.phone_network import PhoneNetwork, window_features
 from tts2face.models.talker import Talker
 from tts2face.numeric.arrays import Float32Array
-from tts2face.types import Progress
+from tts2face.types import Progress, ignore_progress
 
 SILENCE_MARGIN_S = 0.2  # of silence around speech in the training data
 TRAINING = TrainingOptions(hidden=(96, 96), n_epochs=10, weight_decay=1e-4)
@@ -36,7 +36,7 @@ MIN_FRAMES = 3000  # two minutes; networks from less are no better than exemplar
 
 
 def add_phone_network(
-    talker: Talker, pooled: Sequence[PooledSpeech] = (), *, on_progress: Progress | None = None
+    talker: Talker, pooled: Sequence[PooledSpeech] = (), *, on_progress: Progress = ignore_progress
 ) -> Talker:
     """The talker with networks trained on its utterances and on pooled speech; unchanged if it has too few frames."""
     if sum(len(utterance.shape) for utterance in talker.utterances) < MIN_FRAMES:
@@ -57,8 +57,7 @@ def add_phone_network(
         if pooled:
             weights = follow_features(weights, own[2], n_speech)
         networks.append(expand_to_phones(weights, table, n_speech, spread))
-        if on_progress:
-            on_progress(seed + 1, len(tables))
+        on_progress(seed + 1, len(tables))
     layers, biases = (tuple(map(np.stack, zip(*some, strict=True))) for some in zip(*networks, strict=True))
     return replace(talker, network=PhoneNetwork(inventory, layers, biases))
 

@@ -16,7 +16,7 @@ from lexicon.phones import ARPABET
 from lexicon.sequence import SILENCE
 from tts2face.models.talker import NOT_STATED, Talker
 from tts2face.models.talker_file import load_talker
-from tts2face.types import Progress
+from tts2face.types import Progress, ignore_progress
 
 MIN_OWN_MINUTES = 10.0  # from here on a talker needs only the networks of a base
 NO_BASE = "none"
@@ -57,7 +57,7 @@ def learn_short_talker(
     base: str,
     *,
     metadata: Mapping[str, Any],
-    on_progress: Progress | None = None,
+    on_progress: Progress = ignore_progress,
 ) -> ShortTalker:
     """The talker of the observed recordings, completed by a base talker.
 

@@ -19,7 +19,7 @@ from tts2face.picture.png_folder import PngFolderWriter, is_png_folder
 from tts2face.storage.files import translate_disk_errors
 from tts2face.storage.output_paths import MOVIE_SUFFIXES, check_name
 from tts2face.storage.temporary import Temporary
-from tts2face.types import Clip, Progress, exact_rate
+from tts2face.types import Clip, Progress, exact_rate, ignore_progress
 
 FILE_SUFFIXES = MP4, WEBM, MOV, GIF = MOVIE_SUFFIXES
 FOLDER = ""
@@ -73,7 +73,7 @@ class ClipWriter:
         if self._kind in OPAQUE and renderer.picture.is_transparent:
             raise InputError(f"{self.path} cannot be transparent; give .webm, .gif or a folder, or another background")
         self._renderer = renderer
-        self._on_progress = on_progress
+        self._on_progress = on_progress or ignore_progress
         self._frames = ClipFrames(renderer)
         self._encoder: EncoderThread | None = None
         self._temporary: Temporary | None = None
@@ -107,7 +107,7 @@ class ClipWriter:
             for pixels, samples in self._frames.add(clip):
                 encoder = self._encoder or self._open_encoder(clip)
                 encoder.put(pixels, samples)
-                if self._on_progress and pixels is not None:
+                if pixels is not None:
                     self._on_progress(self._frames.n_frames, self._frames.n_added)
 
     def add_sound(self, samples: NDArray[np.float32]) -> None:

@@ -21,7 +21,7 @@ from tts2face.session.speech import MarkTime
 from tts2face.session.speech_stream import Piece, SpeechModels, spoken_pieces
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.storage.output_paths import AnyPath, refuse_overwriting
-from tts2face.types import Clip, Progress
+from tts2face.types import Clip, Progress, ignore_progress
 
 if TYPE_CHECKING:
     from tts2face.picture.film import ClipWriter
@@ -69,7 +69,7 @@ class OutputFiles:
 
     @contextmanager
     def open(
-        self, face: "AnimatedFace | None", renderer: "FrameRenderer | None", on_frames: Progress | None
+        self, face: "AnimatedFace | None", renderer: "FrameRenderer | None", on_frames: Progress
     ) -> Iterator["OpenOutputs"]:
         """Writer of consecutive clips to all files; errors as `ClipWriter` and `ExportWriter`.
 
@@ -170,15 +170,14 @@ class WrittenClip:
 class RequestSteps:
     """Converts the number of drawn frames into steps of a request."""
 
-    def __init__(self, n_steps: int, on_progress: Progress | None) -> None:
+    def __init__(self, n_steps: int, on_progress: Progress) -> None:
         self._n_steps, self._on_progress = n_steps, on_progress
         self._steps_heard = self._steps_before = self._piece_steps = self._frames_before = self._n_frames = 0
 
     def report_heard(self, done: int, of: int) -> None:
         """Report how much of a recording has been heard, before its first piece."""
         self._steps_heard = HEARING_STEPS * done // of
-        if self._on_progress:
-            self._on_progress(self._steps_heard, self._n_steps)
+        self._on_progress(self._steps_heard, self._n_steps)
 
     def begin(self, piece: Piece) -> None:
         """Start the next piece."""
@@ -188,15 +187,13 @@ class RequestSteps:
 
     def report_frames(self, n_drawn: int, n_submitted: int) -> None:
         """Report the frames drawn, out of those passed to the writer so far."""
-        if self._on_progress:
-            share = (n_drawn - self._frames_before) / max(n_submitted - self._frames_before, 1)
-            steps = max(self._steps_heard, int(self._steps_before + self._piece_steps * share))
-            self._on_progress(min(self._n_steps, steps), self._n_steps)
+        share = (n_drawn - self._frames_before) / max(n_submitted - self._frames_before, 1)
+        steps = max(self._steps_heard, int(self._steps_before + self._piece_steps * share))
+        self._on_progress(min(self._n_steps, steps), self._n_steps)
 
     def finish(self) -> None:
         """Report that all steps are done."""
-        if self._on_progress:
-            self._on_progress(self._n_steps, self._n_steps)
+        self._on_progress(self._n_steps, self._n_steps)
 
 
 def ahead(pieces: Iterable[Piece]) -> Prefetch[Piece]:
@@ -246,7 +243,7 @@ def is_speech_only(prepared: PreparedRequest, outputs: OutputFiles) -> bool:
 
 
 def write_speech(
-    prepared: PreparedRequest, outputs: OutputFiles, voices: VoicePool, on_progress: Progress | None
+    prepared: PreparedRequest, outputs: OutputFiles, voices: VoicePool, on_progress: Progress
 ) -> WrittenClip:
     """Write outputs for which `is_speech_only` holds: the same files as those of a session.
 
@@ -259,5 +256,5 @@ def write_speech(
     has_phones = any(not file.format.is_sound for file in outputs.exports)
     has_names = any(isinstance(mark, NameMark) for mark in prepared.text.marks)
     pieces = spoken_pieces(prepared, models, has_phones=has_phones or has_names)
-    with outputs.open(None, None, None) as files, ahead(pieces) as spoken:
+    with outputs.open(None, None, ignore_progress) as files, ahead(pieces) as spoken:
         return write_pieces(spoken, files, outputs, RequestSteps(prepared.n_steps, on_progress), None)

@@ -16,7 +16,7 @@ from tts2face.session.animated_face import AnimatedFace, FaceMotion
 from tts2face.session.outputs import OutputFiles, WrittenClip
 from tts2face.session.recording import clip_bounds
 from tts2face.session.shared_models import SessionModels
-from tts2face.types import SOUND_RATE, Clip, Progress, Speech, Waveform, exact_rate
+from tts2face.types import SOUND_RATE, Clip, Speech, StageCallback, Waveform, exact_rate, ignore_progress
 from tts2face.video.blendshapes import BlendshapeReader
 from tts2face.video.livelink import read_livelink
 from tts2face.video.media import read_media_info, read_sound
@@ -110,7 +110,7 @@ def perform(
         fps = performance.fps or min(motion.face.fps, CAPTURE_FPS)
         return PerformedTake(face, resample_take(motion, fps), sound)
     tracker, reader = StreamingTracker(performance.model), BlendshapeReader(performance.model)
-    tracked = read_take(take, tracker, reader, on_progress=on_progress)
+    tracked = read_take(take, tracker, reader, on_progress=on_progress or ignore_progress)
     if performance.append_missing:
         face = face.with_motion_of(tracked)
     motion = retarget_take(tracked, face, gain=performance.gain)
@@ -161,20 +161,19 @@ def write_take(
     performance: Performance,
     models: SessionModels,
     to: tuple[OutputFiles, Picture],
-    stages: Callable[[str], Progress] | None,
+    stages: StageCallback,
 ) -> WrittenClip:
     """Transfer a performance to the face of a session and write it; as `Session.write_performance`."""
     outputs, picture = to
     face = models.speech_face
     outputs.check_face(face)  # before the video is tracked, as are the drawing options
     renderer = None if outputs.out is None else models.renderer(picture, has_gestures=False)
-    take = perform(performance, face, on_progress=stages("tracking") if stages else None)
+    take = perform(performance, face, on_progress=stages("tracking"))
     if renderer is not None and take.face is not face:  # motion was appended to the face
         renderer = take.face.renderer(picture)
     n_frames = len(take.motion.face)
-    draw = stages("writing" if renderer is None else "drawing") if stages else None
-    on_frames = (lambda done, _: draw(done, n_frames)) if draw else None
-    with outputs.open(take.face, renderer, on_frames) as files:
+    draw = stages("writing" if renderer is None else "drawing")
+    with outputs.open(take.face, renderer, lambda done, _: draw(done, n_frames)) as files:
         for clip in take_clips(take.motion, take.sound):
             files.add(clip)
     is_silent = not len(take.sound.samples)

@@ -24,7 +24,7 @@ TRANSCRIPT_BYTES = 10_000  # of a transcript besides its phones
 
 
 def hear(
-    prepared: PreparedRequest, source: Recorded, talker: Talker, memory: ResultMemory, on_heard: Progress | None
+    prepared: PreparedRequest, source: Recorded, talker: Talker, memory: ResultMemory, on_heard: Progress
 ) -> TimedTranscript:
     """Phones and words of a recording with their times; a single silence if lips follow its sound.
 

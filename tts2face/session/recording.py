@@ -35,6 +35,7 @@ from tts2face.types import (
     Waveform,
     first_sample,
     frame_count,
+    ignore_progress,
 )
 from tts2face.video.media import sound_blocks
 
@@ -89,14 +90,14 @@ def align_transcript(
     language: str,
     path: Path,
     dictionary: Mapping[str, tuple[IpaPhone, ...]],
-    on_progress: Progress | None = None,
+    on_progress: Progress = ignore_progress,
 ) -> TimedTranscript:
     """Align a text with a recording of it; `dictionary` holds the user's pronunciations by `word_key`."""
     words = pronounce_transcript(text, language, Dictionary(dictionary) if dictionary else None)
     return TimedTranscript(*align_recording(_sound_of(path), words, on_progress))
 
 
-def recognise_transcript(path: Path, on_progress: Progress | None = None) -> TimedTranscript:
+def recognise_transcript(path: Path, on_progress: Progress = ignore_progress) -> TimedTranscript:
     """Phones that are heard in a recording; its words are not known."""
     return TimedTranscript(recognise_phones(_sound_of(path), on_progress), ())
 

@@ -31,7 +31,7 @@ from tts2face.session.speech_stream import Piece, SpeechSpan, measure_speech, ti
 from tts2face.sound.features import FEATURE_RATE
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.storage.memory import ResultMemory
-from tts2face.types import Chunk, Clip, Progress, concatenate_clips
+from tts2face.types import Chunk, Clip, Progress, StageCallback, concatenate_clips, ignore_progress, ignore_stage
 
 if TYPE_CHECKING:
     from tts2face.session.performance import Performance
@@ -264,7 +264,7 @@ class Session:
         picture, options = split_picture(picture, options)
         prepared = prepare_request(text, options)
         outputs = plan_outputs(out, exports, input_paths(prepared.request, picture))
-        return self._write(prepared, outputs, picture, on_progress, on_piece)
+        return self._write(prepared, outputs, picture, on_progress or ignore_progress, on_piece)
 
     def export(
         self,
@@ -292,7 +292,7 @@ class Session:
         prepared = prepare_request(text, options)
         exports = [paths] if isinstance(paths, str | Path) else paths
         outputs = plan_outputs(None, exports, input_paths(prepared.request, Picture()))
-        return self._write(prepared, outputs, Picture(), on_progress, on_piece)
+        return self._write(prepared, outputs, Picture(), on_progress or ignore_progress, on_piece)
 
     def write_performance(
         self,
@@ -301,7 +301,7 @@ class Session:
         *,
         picture: Picture | None = None,
         exports: Sequence[str | Path] = (),
-        stages: Callable[[str], Progress] | None = None,
+        stages: StageCallback | None = None,
     ) -> WrittenClip:
         """Transfer a recorded performance to the session's face and write the clip to a file.
 
@@ -324,7 +324,7 @@ class Session:
         outputs = plan_outputs(out, exports, inputs | {"background": picture.background})
         from tts2face.session.performance import write_take
 
-        return write_take(performance, self._models, (outputs, picture), stages)
+        return write_take(performance, self._models, (outputs, picture), stages or ignore_stage)
 
     def renderer(self, picture: Picture, *, has_gestures: bool = True) -> FrameRenderer:
         """Renderer of the session's face for drawing options; the last few renderers are cached."""
@@ -351,7 +351,7 @@ class Session:
         prepared: PreparedRequest,
         outputs: OutputFiles,
         picture: Picture,
-        on_progress: Progress | None,
+        on_progress: Progress,
         on_piece: Callable[[Piece], None] | None,
     ) -> WrittenClip:
         has_gestures = prepared.request.has_gestures

@@ -33,7 +33,7 @@ from tts2face.session.steps import pieces
 from tts2face.sound.voice import Voice
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.storage.memory import NO_MEMORY, ResultMemory
-from tts2face.types import Progress
+from tts2face.types import Progress, ignore_progress
 
 MAX_RENDERERS = 2  # renderers in memory, one for each picture; about 30 MB each
 
@@ -181,7 +181,7 @@ class SessionModels:
         speech = SpeechModels(load_voice, self.voices.yield_turn, self._memory, deliveries)
         return SynthesisModels(self.talker, exemplars, face, speech)
 
-    def pieces(self, prepared: PreparedRequest, on_heard: Progress | None = None) -> Iterator[Piece]:
+    def pieces(self, prepared: PreparedRequest, on_heard: Progress = ignore_progress) -> Iterator[Piece]:
         """Synthesise the clip of a request piece by piece; `on_heard` is called while a recording is heard."""
         return pieces(prepared, self.for_request(prepared), self.gesture_layer(prepared), on_heard)
 

@@ -12,7 +12,7 @@ from tts2face.session.lip_steps import Lips, RecordedLips, SynthesisModels
 from tts2face.session.prepared import PreparedRequest
 from tts2face.session.recorded_speech import hear, recorded_pieces
 from tts2face.session.speech_stream import Piece, spoken_ahead, spoken_pieces
-from tts2face.types import Progress
+from tts2face.types import Progress, ignore_progress
 
 Step = Callable[[Piece], Piece]
 
@@ -21,7 +21,7 @@ def pieces(
     prepared: PreparedRequest,
     models: SynthesisModels,
     gestures: GestureLayer | None,
-    on_heard: Progress | None = None,
+    on_heard: Progress = ignore_progress,
 ) -> Iterator[Piece]:
     """Synthesise the clip of a request piece by piece.
 
@@ -45,7 +45,7 @@ def pieces_from(
     models: SynthesisModels,
     gestures: GestureLayer | None,
     first_frame: int = 0,
-    on_heard: Progress | None = None,
+    on_heard: Progress = ignore_progress,
 ) -> Iterator[Piece]:
     """Pieces of a recording, or of a text or of idle animation that begins at a frame of a longer clip."""
     source = prepared.request.source

@@ -14,7 +14,7 @@ from tts2face.sound.alignment import Aligner, TextMismatch, join_alignments, unw
 from tts2face.sound.pauses import cut_at_pauses, cut_sound
 from tts2face.sound.word_assignment import assign_words
 from tts2face.sound.word_lattice import PronouncedWords, Pronunciations
-from tts2face.types import Progress, Waveform
+from tts2face.types import Progress, Waveform, ignore_progress
 
 MAX_ALIGNED_S = 60.0  # time of the search grows with the square of the length
 MAX_STRETCH_S = 20.0  # longest part into which longer recordings are divided
@@ -67,7 +67,7 @@ def _pronunciations(word: Word, language: str, own: Dictionary | None) -> Pronun
 
 
 def align_recording(
-    sound: Waveform, words: PronouncedWords, on_progress: Progress | None = None
+    sound: Waveform, words: PronouncedWords, on_progress: Progress = ignore_progress
 ) -> tuple[PhoneSequence, tuple[WordSpan, ...], tuple[TextMismatch, ...]]:
     """Align words with a sound of any length.
 
@@ -98,12 +98,12 @@ def align_recording(
         found.check()
         return found.phones, found.words, found.mismatches
     parts = [cut_sound(sound, span) for span in cut_at_pauses(sound, MAX_STRETCH_S)]
-    tell, n_parts = on_progress or (lambda _done, _of: None), len(parts)
+    n_parts = len(parts)
     heard = []
     for at, part in enumerate(parts, start=1):
         heard.append(aligner.hear(part))
         # each part is heard first and aligned later: two steps of progress
-        tell(at, 2 * n_parts)
+        on_progress(at, 2 * n_parts)
     recognised = [[phone for word in sentence.words() for phone in word] for sentence in heard]
     if not any(recognised):
         raise DataError("the recording contains no speech; give another recording")
@@ -114,13 +114,13 @@ def align_recording(
         aligned.append(
             aligner.align(heard[at], said, may_lack=True) if said else unwritten_part(part, len(recognised[at]))
         )
-        tell(n_parts + at + 1, 2 * n_parts)
+        on_progress(n_parts + at + 1, 2 * n_parts)
     joined = join_alignments(aligned)
     joined.check()
     return joined.phones, joined.words, joined.mismatches
 
 
-def recognise_phones(sound: Waveform, on_progress: Progress | None = None) -> PhoneSequence:
+def recognise_phones(sound: Waveform, on_progress: Progress = ignore_progress) -> PhoneSequence:
     """Phones that are heard in a sound of any length, from 0 s to its end; `on_progress` is called after each part.
 
     Raises
@@ -136,6 +136,5 @@ def recognise_phones(sound: Waveform, on_progress: Progress | None = None) -> Ph
             found.append(aligner.align(part, None))
         except DataError:  # nobody speaks
             found.append(unwritten_part(part, 0))
-        if on_progress:
-            on_progress(len(found), len(spans))
+        on_progress(len(found), len(spans))
     return join_alignments(found).phones

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from tts2face.numeric.arrays import interpolate_linear
-from tts2face.types import HEAD_CHANNELS, Progress, Trajectory
+from tts2face.types import HEAD_CHANNELS, Progress, Trajectory, ignore_progress
 from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.media import read_frames, read_media_info
 from tts2face.video.pose import head_angles, remove_pose
@@ -51,7 +51,7 @@ def read_take(
     reader: BlendshapeReader,
     *,
     seconds: float | None = None,
-    on_progress: Progress | None = None,
+    on_progress: Progress = ignore_progress,
 ) -> Take:
     """Track the performer in a video.
 
@@ -80,8 +80,7 @@ def read_take(
         n_crowded += frame.n_faces is not None and frame.n_faces > 1
         if n_crowded > MAX_COUNTS_WITH_TWO_FACES:
             raise DataError(f"{video} shows two faces at {frame.time:.1f} s; crop it so that it shows one person")
-        if on_progress:
-            on_progress(min(len(tracked), n_frames), n_frames)
+        on_progress(min(len(tracked), n_frames), n_frames)
     times, pixels = np.array([frame.time for frame in tracked]), np.array([frame.points for frame in tracked])
     seen = np.isfinite(pixels[:, 0, 0])
     if not seen.any():

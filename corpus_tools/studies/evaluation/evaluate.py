@@ -1,7 +1,7 @@
 """Held-out evaluation: motion synthesised for held-out utterances is compared with the recorded face."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -24,7 +24,7 @@ from corpus_tools.training.train_talker import learn_talker
 from tts2face.lips.options import SynthesisOptions
 from tts2face.models.talker import ShapeModel, Talker
 from tts2face.sound.voice import Voice
-from tts2face.types import Progress
+from tts2face.types import Progress, ignore_progress
 
 EVALUATION_METADATA = {
     "name": "evaluation", "language": "", "sources": "", "licence": "", "attribution": "", "command": "", "created": "",
@@ -80,7 +80,7 @@ def evaluate(
     tracks: Mapping[str, ExternalTrack] | None = None,
     voice: Voice | None = None,
     lips: Sequence[LipTrack] = (),
-    on_progress: Progress | None = None,
+    on_progress: Progress = ignore_progress,
 ) -> tuple[Evaluation, tuple[SplitResult, ...]]:
     """Scores of every method on held-out utterances with their true phone edges.
 
@@ -134,7 +134,7 @@ def evaluate_split(  # noqa: PLR0913 - those of `evaluate`, for one split
     tracks: Mapping[str, ExternalTrack] | None = None,
     voice: Voice | None = None,
     lips: Sequence[LipTrack] = (),
-    on_progress: Progress | None = None,
+    on_progress: Progress = ignore_progress,
 ) -> SplitResult:
     """Learn a talker from `train` and synthesise the motion of `test` by every method."""
     leak = fit_pose_correction(train)
@@ -149,8 +149,7 @@ def evaluate_split(  # noqa: PLR0913 - those of `evaluate`, for one split
         synthesised[name], synthesis_s[name] = _synthesise(method, real)
         if voiced:
             own[name] = _synthesise_own_durations(method, real, voiced, talker.model)
-        if on_progress:
-            on_progress(number + 1, len(methods))
+        on_progress(number + 1, len(methods))
     if tracks is not None:
         synthesised[TRACKS_METHOD], synthesis_s[TRACKS_METHOD] = map_tracks(tracks, talker, real), 0.0
     synthesised[CEILING_METHOD], synthesis_s[CEILING_METHOD] = tuple(reference.parameters for reference in real), 0.0
@@ -162,7 +161,7 @@ def evaluate_across_talkers(
     others: Sequence[Observation],
     *,
     lips: Sequence[LipTrack] = (),
-    on_progress: Progress | None = None,
+    on_progress: Progress = ignore_progress,
 ) -> tuple[Evaluation, tuple[SplitResult, ...]]:
     """Scores of every method, learnt from one person, on utterances of another with the latter's phone edges.
 
@@ -184,8 +183,7 @@ def evaluate_across_talkers(
     methods = build_methods(talker)
     for number, (name, method) in enumerate(methods.items()):
         synthesised[name], synthesis_s[name] = _synthesise(method, real)
-        if on_progress:
-            on_progress(number + 1, len(methods))
+        on_progress(number + 1, len(methods))
     limits = Thresholds.of(real)
     scores = tuple(
         compute_scores(
@@ -270,7 +268,5 @@ def _score_folds(parts: Sequence[Split], runs: Sequence[SplitResult], limits: Th
     )
 
 
-def _split_progress(on_progress: Progress | None, number: int, of: int) -> Callable[[int, int], None] | None:
-    if on_progress is None:
-        return None
+def _split_progress(on_progress: Progress, number: int, of: int) -> Progress:
     return lambda done, n_methods: on_progress(number * n_methods + done, of * n_methods)

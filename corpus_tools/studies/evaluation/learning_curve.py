@@ -27,7 +27,7 @@ from corpus_tools.training.short_talker import needs_base
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import InputError
 from tts2face.lips.exemplar import DEFAULT_OPTIONS
-from tts2face.types import Progress
+from tts2face.types import Progress, ignore_progress
 
 DEFAULT_AMOUNTS_S = (10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 640.0, 1280.0, 2400.0)
 N_CHOICES = 3  # random choices of the material for each amount
@@ -55,7 +55,7 @@ def measure_learning_curve(
     *,
     amounts_s: Sequence[float] = DEFAULT_AMOUNTS_S,
     seed: int = 0,
-    on_progress: Progress | None = None,
+    on_progress: Progress = ignore_progress,
 ) -> LearningCurve:
     """Figures of talkers learnt from growing parts of the training utterances, on the held-out ones.
 
@@ -89,8 +89,7 @@ def measure_learning_curve(
             for name, curves in {**_method_curves(task, part), **dict(constant)}.items():
                 figures.setdefault(name, []).append(pair_curves(task.tests, curves).figures(weights))
             done += 1
-            if on_progress:
-                on_progress(done, sum(map(len, choices)))
+            on_progress(done, sum(map(len, choices)))
         seconds = float(np.mean([_duration_s(part) for part in chosen]))
         points.append(CurvePoint.of(seconds, len(points), figures))
     test_seconds = sum(len(each_test.observation.landmarks) / each_test.observation.fps for each_test in task.tests)

@@ -6,13 +6,14 @@ import numpy as np
 
 from corpus_tools.recordings.observation import TRACK_SUFFIX, Observation
 from corpus_tools.recordings.observe import check_any_kept, observe
-from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
+from corpus_tools.run_options import RunOptions
 from corpus_tools.studies.evaluation.lip_observations import lip_observations
 from corpus_tools.studies.evaluation.person_tracks import read_person
 from corpus_tools.training.pooling.lip_tracks import read_lip_tracks
 from corpus_tools.training.pooling.speech import align_lip_tracks
 from lexicon.errors import DataError, InputError
 from tts2face.models.talker import Talker
+from tts2face.types import StageCallback, ignore_stage
 
 LIP_POINTS = "points"  # array that lip tracks hold and tracks of people do not
 

@@ -36,7 +36,7 @@ from tts2face.gestures.stream import GestureFields
 from tts2face.lips.motion_measures import pearson
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
 from tts2face.numeric.arrays import FloatArray
-from tts2face.types import Progress
+from tts2face.types import Progress, ignore_progress
 
 NEAR, HALF = 1.5, 0.5  # maximum distance of a field, relative to the distance between halves and to that of noise
 CORRELATION_WITHIN = 0.1
@@ -178,21 +178,19 @@ class GestureStudy:
 
 
 def study_gestures(
-    name: str, palette: Palette, options: StudyOptions, on_progress: Progress | None = None
+    name: str, palette: Palette, options: StudyOptions, on_progress: Progress = ignore_progress
 ) -> GestureStudy:
     """Measure every style of a palette."""
     gaze = None if options.people is None else study_gaze(options.people, seed=options.seed)
     studies: list[StyleStudy] = []
     prepared: dict[str, _PreparedStyle] = {}
     for done, style in enumerate(names := (*palette.styles, *palette.derivations)):
-        if on_progress:
-            on_progress(done, len(names))
+        on_progress(done, len(names))
         source = palette.derivations[style].source if style in palette.derivations else style
         if source not in prepared:
             prepared[source] = _prepare_style(palette, source, options)
         studies.append(_study_style(palette, style, prepared[source], options))
-    if on_progress:
-        on_progress(len(names), len(names))
+    on_progress(len(names), len(names))
     return GestureStudy(name, options, tuple(studies), measure_body(options.seed), gaze)
 
 

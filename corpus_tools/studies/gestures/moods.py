@@ -17,7 +17,7 @@ from tts2face.models.palette import Palette
 from tts2face.numeric.arrays import FloatArray
 from tts2face.picture.options import Picture
 from tts2face.session.session import Session
-from tts2face.types import Progress
+from tts2face.types import Progress, ignore_progress
 from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.tracking import FaceTracker
 
@@ -153,7 +153,7 @@ def study_moods(
     session: Session,
     options: MoodOptions,
     moods: Sequence[str] | None = None,
-    on_progress: Progress | None = None,
+    on_progress: Progress = ignore_progress,
 ) -> MoodStudy:
     """Render clips of the moods of a session's palette, read them with the tracker, and tell them apart.
 
@@ -168,11 +168,9 @@ def study_moods(
     reader = _ClipReader(session, options)
     clips: dict[str, tuple[MoodClip, ...]] = {}
     for number, mood in enumerate(names):
-        if on_progress:
-            on_progress(number, len(names))
+        on_progress(number, len(names))
         clips[mood] = tuple(reader.read(mood, seed) for seed in range(options.seeds))
-    if on_progress:
-        on_progress(len(names), len(names))
+    on_progress(len(names), len(names))
     return MoodStudy(options, clips, *_confusions(clips, options.seeds // 2))
 
 

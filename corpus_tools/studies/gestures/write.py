@@ -19,7 +19,7 @@ from corpus_tools.studies.gestures.page import gestures_page, panels_plot, summa
 from corpus_tools.studies.plots import Plot
 from corpus_tools.studies.report import Report, Rows, as_csv, as_html, as_json, as_png
 from tts2face.models.palette_file import load_palette
-from tts2face.types import Progress
+from tts2face.types import Progress, ignore_progress
 
 KINDS = ("real", "field", "noise", "ju2008")  # the last one of measured styles only
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -157,7 +157,7 @@ def _round_number(value: float) -> float | None:
 
 
 def write_gestures(
-    palette: str, out: Path, options: StudyOptions, *, on_progress: Progress | None = None
+    palette: str, out: Path, options: StudyOptions, *, on_progress: Progress = ignore_progress
 ) -> GestureStudy:
     """Study a palette (by name or path), write the file, and return the study.
 

@@ -11,7 +11,7 @@ import numpy as np
 from corpus_tools.studies.gestures.moods import MoodOptions, MoodStudy, study_moods
 from corpus_tools.studies.report import Report, Rows, as_csv, as_json
 from tts2face.session.session import Session
-from tts2face.types import Progress
+from tts2face.types import Progress, ignore_progress
 
 # Columns of the tables: scores of the tracker, both sides averaged.
 SHOWN_SCORES: Mapping[str, tuple[str, ...]] = MappingProxyType(
@@ -27,7 +27,9 @@ SHOWN_SCORES: Mapping[str, tuple[str, ...]] = MappingProxyType(
 SHEET_CLIPS = 2  # of each mood on the contact sheet
 
 
-def write_moods(session: Session, out: Path, options: MoodOptions, *, on_progress: Progress | None = None) -> MoodStudy:
+def write_moods(
+    session: Session, out: Path, options: MoodOptions, *, on_progress: Progress = ignore_progress
+) -> MoodStudy:
     """Study the moods of a session's palette, write the file, and return the study.
 
     ``.json`` has all figures, ``.csv`` a line for each mood, ``.png`` is a contact sheet.

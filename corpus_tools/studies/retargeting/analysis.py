@@ -8,7 +8,7 @@ import numpy as np
 
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import check_any_kept, observe
-from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
+from corpus_tools.run_options import RunOptions
 from corpus_tools.training.score_map import read_scores
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE
@@ -23,7 +23,7 @@ from tts2face.models.score_map import SCORE_SHAPES, mouth_scores
 from tts2face.numeric.arrays import FloatArray
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
-from tts2face.types import Progress, Trajectory
+from tts2face.types import Progress, StageCallback, Trajectory, ignore_stage
 from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.media import TimedFrame
 from tts2face.video.networks import find_bundle

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
+from corpus_tools.run_options import RunOptions
 from corpus_tools.studies.report import Report, Rows, as_csv, as_html, as_json, as_png
 from corpus_tools.studies.retargeting.analysis import SCORES, TOLERANCE, RetargetingStudy, study_retargeting
 from corpus_tools.studies.retargeting.page import retargeting_page, study_plot
 from corpus_tools.studies.similarity.tables import phone_label
 from tts2face.models.face_loading import load_face
+from tts2face.types import StageCallback, ignore_stage
 
 
 def write_retargeting(

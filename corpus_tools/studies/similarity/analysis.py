@@ -31,7 +31,7 @@ from lexicon.phones import look_up_phone
 from lexicon.values.fields import check_fields
 from tts2face.lips.similarity import PhoneSimilarity
 from tts2face.models.talker import Talker
-from tts2face.types import Progress
+from tts2face.types import Progress, ignore_progress
 
 USUAL_CLASSES = (4, 6, 8, 10, 12)
 STREAMS = MappingProxyType(
@@ -138,7 +138,7 @@ def analyse(
     subject: NamedTalker,
     options: SimilarityOptions,
     other: NamedTalker | None = None,
-    on_progress: Progress | None = None,
+    on_progress: Progress = ignore_progress,
 ) -> Analysis:
     """Analyse a talker's similarity table, and compare it with another's.
 
@@ -194,7 +194,7 @@ def _class_numbers(options: SimilarityOptions, n_phones: int) -> tuple[int, ...]
 
 
 def _split_halves(
-    tokens: SpokenTokens, options: SimilarityOptions, on_progress: Progress | None
+    tokens: SpokenTokens, options: SimilarityOptions, on_progress: Progress
 ) -> tuple[Reliability | None, Reliability | None, Reliability | None]:
     """Reliability by utterances, by words, and by utterances over the phones compared by words."""
     n, done = options.halves, 0
@@ -202,8 +202,7 @@ def _split_halves(
     def step() -> None:
         nonlocal done
         done += 1
-        if on_progress is not None:
-            on_progress(done, 3 * n)
+        on_progress(done, 3 * n)
 
     by_utterances = split_half(tokens, tokens.utterance, n, _stream(options, "utterances"), on_half=step)
     by_words = split_half(tokens, tokens.word, n, _stream(options, "words"), on_half=step)

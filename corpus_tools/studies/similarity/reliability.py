@@ -16,6 +16,7 @@ from corpus_tools.studies.similarity.tables import (
 )
 from lexicon.errors import InputError
 from tts2face.lips.motion_measures import pearson
+from tts2face.types import keep_on
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +67,7 @@ def split_half(
     stream: np.random.Generator,
     *,
     among: Collection[str] | None = None,
-    on_half: Callable[[], None] | None = None,
+    on_half: Callable[[], None] = keep_on,
 ) -> Reliability | None:
     """Agreement of tables from random halves of the `units` (N,): utterances or words of the tokens.
 
@@ -84,8 +85,7 @@ def split_half(
         chosen = stream.permutation(numbers)[: len(numbers) // 2]
         first = np.isin(units, chosen)
         tables = similarity_table(tokens, first), similarity_table(tokens, ~first & (units >= 0))
-        if on_half is not None:
-            on_half()
+        on_half()
         enough = is_included & (np.minimum(tables[0].counts, tables[1].counts) >= LEAST_TOKENS)
         # a half drew too few tokens; the others decide
         if enough.sum() < LEAST_PHONES:

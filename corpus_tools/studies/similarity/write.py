@@ -23,7 +23,7 @@ from corpus_tools.studies.similarity.tables import (
 )
 from lexicon.phones import look_up_phone
 from tts2face.models.talker_file import load_talker
-from tts2face.types import Progress
+from tts2face.types import Progress, ignore_progress
 
 
 def table_csv(table: SimilarityTable, labels: str) -> str:
@@ -158,7 +158,7 @@ def write_similarity(
     *,
     other: str | None = None,
     labels: str = "both",
-    on_progress: Progress | None = None,
+    on_progress: Progress = ignore_progress,
 ) -> Analysis:
     """Analyse a talker (by name or path), write the file, and return the analysis.
 

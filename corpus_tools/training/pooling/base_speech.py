@@ -17,7 +17,7 @@ from tts2face.lips.targets import build_targets, target_phones
 from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import Talker
 from tts2face.numeric.arrays import FloatArray
-from tts2face.types import Progress, frame_count
+from tts2face.types import Progress, frame_count, ignore_progress
 
 N_PHRASES = 500  # about half an hour of speech: as much as the lip tracks of decision 124
 WORDS_IN_PHRASE = 7
@@ -35,7 +35,7 @@ EDGE_SILENCE_S = 0.3
 FPS = 25.0
 
 
-def base_speech(base: Talker, *, on_progress: Progress | None = None) -> tuple[PooledSpeech, ...]:
+def base_speech(base: Talker, *, on_progress: Progress = ignore_progress) -> tuple[PooledSpeech, ...]:
     """Lip features of `N_PHRASES` phrases by the networks of a base talker, z-scored over all of them.
 
     Raises
@@ -52,8 +52,7 @@ def base_speech(base: Talker, *, on_progress: Progress | None = None) -> tuple[P
         first, last = phones.edges[1] - SILENCE_KEPT_S, phones.edges[-2] + SILENCE_KEPT_S
         used.append((times >= first) & (times <= last))
         seen.append(_network_features(base, base.network, phones, times))
-        if on_progress:
-            on_progress(done, len(phrases))
+        on_progress(done, len(phrases))
     speech = np.concatenate([values[here] for values, here in zip(seen, used, strict=True)])
     mean, spread = speech.mean(axis=0), np.maximum(speech.std(axis=0), 1e-9)
     return tuple(

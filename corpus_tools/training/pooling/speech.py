@@ -1,6 +1,6 @@
 """Lip tracks of another speaker, aligned by models that start from a talker's recordings, as evidence for networks."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from lexicon.phones import ARPABET
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.lips.motion_measures import speech_frames
 from tts2face.models.talker import Talker
+from tts2face.types import Progress, ignore_progress
 
 N_ROUNDS = 4  # alignments: the first by the talker's model, the others by models of both speakers
 SILENCE_KEPT_S = 0.2  # of silence around speech in the evidence
@@ -31,7 +32,7 @@ class PooledSpeech:
 
 
 def align_lip_tracks(
-    tracks: Sequence[LipTrack], talker: Talker, on_round: Callable[[int, int], None] | None = None
+    tracks: Sequence[LipTrack], talker: Talker, on_round: Progress = ignore_progress
 ) -> tuple[PooledSpeech, ...]:
     """Phones of the tracks in time, and their lip features z-scored over speech.
 
@@ -56,8 +57,7 @@ def align_lip_tracks(
             speaker = min(number, 1)
             expected[at], _ = align_phones(seen[at], names, optional, expected[at], model, speaker=speaker)
             aligned.append(LipSpeech(seen[at], spoken_sequence(names, expected[at])))
-        if on_round:
-            on_round(number + 1, N_ROUNDS)
+        on_round(number + 1, N_ROUNDS)
     return tuple(_pooled(track, item.phones) for track, item in zip(tracks, aligned, strict=True))
 
 

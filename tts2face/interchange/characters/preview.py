@@ -24,7 +24,7 @@ from tts2face.picture.camera import camera_matrices
 from tts2face.picture.options import STUDIO, Picture
 from tts2face.picture.provenance import png_labels
 from tts2face.picture.renderer import mesh_renderer
-from tts2face.types import Progress
+from tts2face.types import Progress, ignore_progress
 
 # Lines through landmarks and their sRGB colours: lids, inner lips, outer lips, outline.
 LINES = (
@@ -62,7 +62,7 @@ def draw_preview(face: Face) -> Pixels:
     return np.concatenate([_draw_landmarks(face, weights, camera) for weights, camera in views], axis=1)
 
 
-def draw_contact_sheet(face: Face, on_progress: Progress | None = None) -> Pixels:
+def draw_contact_sheet(face: Face, on_progress: Progress = ignore_progress) -> Pixels:
     """Picture (H, W, 3) of the face at rest and with each of its shapes at its highest weight, with names."""
     from PIL import Image, ImageDraw
 
@@ -81,8 +81,7 @@ def draw_contact_sheet(face: Face, on_progress: Progress | None = None) -> Pixel
         sheet.paste(Image.fromarray(renderer.draw(weights)), corner)
         label = name.encode("latin-1", "replace").decode("latin-1")[:32]
         pen.text((corner[0] + 4, corner[1] + CELL_PX + 2), label, fill=INK)
-        if on_progress:
-            on_progress(number + 1, len(poses))
+        on_progress(number + 1, len(poses))
     return np.array(sheet)
 
 
