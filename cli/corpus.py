@@ -66,7 +66,6 @@ def check(
     yes: Yes = False,
 ) -> None:
     """Check recordings for `corpus build`, one by one: light, sharpness, sound, words, and what to do better."""
-    del yes  # read where the model is missing
     if text is not None and recordings.is_dir():
         raise InputError("--text belongs to one video, not to a folder; write transcripts beside the videos")
     from corpus_tools.recordings.observe import RecordingChecker, recordings_to_check
@@ -190,7 +189,6 @@ def face(  # noqa: PLR0913 - one parameter a flag
     yes: Yes = False,
 ) -> None:
     """Build a head with the shape, skin, hair and eyes of the person in videos, for `--face`."""
-    del yes  # read where the model is missing
     check_suffix(out, "face")
     refuse_overwriting({"--out": out}, {"the recordings": recordings, "--model": model})
     from corpus_tools.dense.build_face import build_face

@@ -53,7 +53,6 @@ def import_character(  # noqa: PLR0913 - one parameter a flag
     quiet: Annotated[bool, switch("Print no report.")] = False,
 ) -> None:
     """Make a .face file of a character; print the mapping of its shapes, and what replaces missing ones."""
-    del yes
     _check_outputs(
         {"--out": out, "--preview": preview, "--write-landmarks": write_landmarks, "--write-mapping": write_mapping},
         {"the character": character, "--mapping": mapping, "--landmarks": landmarks, "--model": model},
@@ -93,7 +92,6 @@ def picture(  # noqa: PLR0913 - one parameter a flag
     quiet: Annotated[bool, switch("Print no warnings and no summary.")] = False,
 ) -> None:
     """Make a .face file of a picture of a person, who speaks in it."""
-    del yes  # read where the model is missing
     from tts2face.photo.photograph import split_number
 
     _check_outputs(
@@ -135,7 +133,6 @@ def photo(  # noqa: PLR0913 - one parameter a flag
     quiet: Annotated[bool, switch("Print no warnings and no summary.")] = False,
 ) -> None:
     """Make a .face file of the person in pictures: a head that turns, with shape, skin, eyes, hair and clothes."""
-    del yes
     from tts2face.photo.photograph import split_number
 
     inputs = {f"the photo {photo}": split_number(photo)[0] for photo in photos}
@@ -166,7 +163,6 @@ def calibrate(
     yes: Yes = False,
 ) -> None:
     """Measure what the face tracker reads in a face's mouth, so that it opens as the person's (some minutes)."""
-    del yes  # read where the model is missing
     check_file_name(out, "a face", (".face",))
     refuse_overwriting({"--out": out}, {"--talker": talker, "--model": model})
     from corpus_tools.training.calibrate_file import calibrate_face_file

@@ -149,7 +149,6 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     **options: Any,
 ) -> None:
     """Synthesise a talking face from text."""
-    del yes  # read where the model is missing
     if text is not None and text_option is not None:
         raise InputError("the text is given twice, as an argument and as --text; remove one of them")
     options["gestures"] = _gesture_method(options.get("gestures"), noise=noise, none=no_gestures)

@@ -54,7 +54,6 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     quiet: Annotated[bool, switch("Print no progress bar and no summary.")] = False,
 ) -> None:
     """Transfer recorded motion of lips, eyes, brows and head to a face; the sound is copied."""
-    del yes  # read where the model is missing
     began = time.perf_counter()
     from tts2face.picture.options import Picture
     from tts2face.session.named_models import Models

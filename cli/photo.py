@@ -34,6 +34,7 @@ Smile = Annotated[
     str | None, Parameter(help="Second picture of the person in the photo, with a smile whose teeth the clips show.")
 ]
 YES, AGREED = "--yes", ("y", "yes")
+# A command that takes it need not read it: `sets_up_model` finds it among the arguments.
 Yes = Annotated[bool, switch("Download the face landmark model without asking, if it is not installed.")]
 
 

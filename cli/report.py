@@ -90,7 +90,6 @@ def moods(  # noqa: PLR0913 - one parameter a flag
     yes: Yes = False,
 ) -> None:
     """Render the derived styles of a palette and tell them apart by the face tracker's scores."""
-    del yes  # read where the model is missing
     refuse_overwriting({"--out": out}, {"the palette": palette, "--face": face})
     from corpus_tools.studies.gestures.moods import MoodOptions
     from corpus_tools.studies.gestures.write_moods import write_moods

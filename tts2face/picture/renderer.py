@@ -58,7 +58,6 @@ class MeshRenderer:
         InputError
             The clip's channels are not the first shapes of the face.
         """
-        del first  # a mesh has no background video
         values = self._weights(clip)
         chosen = range(len(values)) if numbers is None else numbers
         poses = ((values[number], clip.head.values[number]) for number in chosen)

@@ -199,7 +199,6 @@ class MeshFace:
 
     def with_motion_of(self, take: "Take") -> "AnimatedFace":
         """Raise InputError: the shapes of a mesh are fixed."""
-        del take
         raise InputError("missing motion can be appended to a talker's own face only; choose --face self")
 
     def landmarks(self, motion: Trajectory) -> NDArray[np.float32]:
@@ -284,7 +283,6 @@ class OwnAppearanceFace:
 
     def motion_of_capture(self, capture: "FaceCapture", *, gain: float = 1.0) -> Trajectory:
         """Raise InputError: a capture has no landmarks to clone."""
-        del capture, gain
         raise InputError(
             "a Live Link Face capture has no landmarks, which a talker's own face needs; choose --face head, ada "
             "or a .face file"

@@ -46,7 +46,6 @@ class _Missing:
         self._thread = get_ident()
 
     def find_spec(self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None) -> None:
-        del path, target
         if name in REFUSED and get_ident() == self._thread:
             raise ImportError(f"{name} is not needed")
 

@@ -121,7 +121,6 @@ class FolderStore:
 
     def lend(self, name: str, copy: Path) -> Path:
         """Path of a file, which must not be changed; FileNotFoundError if there is none."""
-        del copy
         if not self.has(name):
             raise FileNotFoundError(self.path(name))
         return self.path(name)

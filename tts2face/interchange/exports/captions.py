@@ -189,7 +189,6 @@ class WordVttWriter(_CaptionWriter):
 
     def cues(self, words: Sequence[Label], text: str) -> list[list[Label]]:
         """Each spoken word as a cue."""
-        del text
         return [[word] for word in words]
 
 
@@ -210,5 +209,4 @@ class WordSrtWriter(SentenceSrtWriter):
 
     def cues(self, words: Sequence[Label], text: str) -> list[list[Label]]:
         """Each spoken word as a cue."""
-        del text
         return [[word] for word in words]
