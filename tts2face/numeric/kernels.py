@@ -36,6 +36,10 @@ Result = TypeVar("Result")
 LOG = logging.getLogger(__name__)
 CACHE_VARIABLE = "NUMBA_CACHE_DIR"  # set by the user
 N_VERSIONS = 4  # of the compiled kernels of a module that are kept
+# Numbers of kernels: a plain 1.0 makes a number of 64 bits of whatever it is multiplied with.
+ZERO = np.float32(0)
+HALF = np.float32(0.5)
+UNIT = np.float32(1)
 SUFFIX = ".kernel"  # of a file with the code of one kernel for one kind of arguments
 ENTRY = "entry"  # the function of an object that is called
 LAYOUT = 0x503  # flags of an array that matter: C and Fortran order, aligned, writable
@@ -175,7 +179,7 @@ def _flatten(values: Sequence[Any], flat: list[Any], seen: list[Any]) -> None:
         elif isinstance(value, tuple):  # or a NamedTuple
             seen.append(-1 - len(value))
             _flatten(value, flat, seen)
-        elif isinstance(value, np.ndarray):
+        elif isinstance(value, np.ndarray | np.float32):
             _flatten((np.asarray(value),), flat, seen)
         elif isinstance(value, np.number | np.bool):
             flat.append(value.item())
@@ -267,7 +271,7 @@ def _stamp(path: str, names: dict[str, Any]) -> str:
             if isinstance(value, Kernel):
                 other = value.py_func.__code__.co_filename
                 found.update(_stamp(other, value.py_func.__globals__).encode() if other != path else b"")
-            elif isinstance(value, np.ndarray):
+            elif isinstance(value, np.ndarray | np.float32):
                 found.update(name.encode() + value.tobytes())
             elif isinstance(value, type) and issubclass(value, tuple):
                 found.update(f"{name}={getattr(value, '_fields', ())!r};".encode())  # of a NamedTuple

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tts2face.models.face import Face
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
-from tts2face.numeric.kernels import kernel
+from tts2face.numeric.kernels import ZERO, kernel
 from tts2face.picture.kernels.lamps import LAMP_RADIUS_RAD
 from tts2face.picture.occlusion import OPEN_JAW_WEIGHT, occlusion_of, occlusion_poses, pose_normals, sphere_directions
 from tts2face.picture.surface import Surface
@@ -106,11 +106,10 @@ def _pose_exposure(
 def sum_directions(hidden: Any, directions: Any, normals: Any, weights: Any, exposure: Any) -> None:
     """Write the share of the light of the sky (V, 1) and of lamps (V, L) that comes from directions not `hidden`."""
     n_lamps = weights.shape[1]
-    zero = np.float32(0)
     for v in range(len(hidden)):
-        whole, seen = zero, zero
+        whole, seen = ZERO, ZERO
         for k in range(n_lamps):
-            exposure[v, 1 + k] = zero
+            exposure[v, 1 + k] = ZERO
         for d in range(len(directions)):
             facing = (
                 directions[d, 0] * normals[v, 0] + directions[d, 1] * normals[v, 1] + directions[d, 2] * normals[v, 2]

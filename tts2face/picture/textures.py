@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tts2face.models.face import Texture
 from tts2face.numeric.arrays import Array
-from tts2face.numeric.kernels import kernel
+from tts2face.numeric.kernels import HALF, UNIT, ZERO, kernel
 
 N_LEVELS = 8  # a texture of 2048 pixels down to 16
 SHARP_TEXELS = np.float32(2.2)  # texels under a pixel up to which the finer level is read
@@ -29,16 +29,14 @@ def read_texel(
 ) -> tuple[float, float, float, float]:
     """Bilinear colour in linear light, and coverage in [0, 1], at (u, v) of a level (first texel, width, height)."""
     start, width, height = place
-    zero, half = np.float32(0), np.float32(0.5)
-    x = min(max(u * np.float32(width) - half, zero), np.float32(width - 1))
-    y = min(max(v * np.float32(height) - half, zero), np.float32(height - 1))
+    x = min(max(u * np.float32(width) - HALF, ZERO), np.float32(width - 1))
+    y = min(max(v * np.float32(height) - HALF, ZERO), np.float32(height - 1))
     left, top = int(x), int(y)
     across, along = x - np.float32(left), y - np.float32(top)
-    unit = np.float32(1)
     right, below = 1 if left + 1 < width else 0, width if top + 1 < height else 0
     p = start + top * width + left
-    w0, w1 = (unit - across) * (unit - along), across * (unit - along)
-    w2, w3 = (unit - across) * along, across * along
+    w0, w1 = (UNIT - across) * (UNIT - along), across * (UNIT - along)
+    w2, w3 = (UNIT - across) * along, across * along
     q, r, s = p + right, p + below, p + below + right
     red = linear[texels[p, 0]] * w0 + linear[texels[q, 0]] * w1 + linear[texels[r, 0]] * w2 + linear[texels[s, 0]] * w3
     green = (

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tts2face.models.baked_light import BakedLight
 from tts2face.models.photo_view import PhotoView
 from tts2face.numeric.arrays import Array
-from tts2face.numeric.kernels import kernel, vectorized_kernel
+from tts2face.numeric.kernels import HALF, UNIT, ZERO, kernel, vectorized_kernel
 from tts2face.picture.baked.surface import COVER_SHIFT, OPAQUE, LitSurface
 from tts2face.picture.baked.visibility import U, V, nearest_triangles, project
 from tts2face.picture.camera import CameraMatrices
@@ -61,13 +61,13 @@ def without_background(surface: LitSurface, texels: Array, width: int) -> LitSur
 @vectorized_kernel
 def find_covers(corners: Array, share: Array, count: int, covers: Array) -> None:
     """Write the cover (N,), 0 to 1, between the four texels (4, N) around fragments at places (2, N) between them."""
-    unit, most = np.float32(1), np.float32(1 / OPAQUE)
+    most = np.float32(1 / OPAQUE)
     for i in range(count):
         x, y = share[0, i], share[1, i]
         a, b = (corners[0, i] >> COVER_SHIFT) & OPAQUE, (corners[1, i] >> COVER_SHIFT) & OPAQUE
         c, d = (corners[2, i] >> COVER_SHIFT) & OPAQUE, (corners[3, i] >> COVER_SHIFT) & OPAQUE
-        above, below = np.float32(a) * (unit - x) + np.float32(b) * x, np.float32(c) * (unit - x) + np.float32(d) * x
-        covers[i] = (above * (unit - y) + below * y) * most
+        above, below = np.float32(a) * (UNIT - x) + np.float32(b) * x, np.float32(c) * (UNIT - x) + np.float32(d) * x
+        covers[i] = (above * (UNIT - y) + below * y) * most
 
 
 @kernel
@@ -86,9 +86,6 @@ def compose_over(
     pixels, samples, n_samples = fragments
     height, width, channels = picture.shape
     part = np.float32(1) / np.float32(n_samples)
-    half = np.float32(0.5)
-    zero = np.float32(0)
-    unit = np.float32(1)
     most, least = np.float32(OPAQUE), np.float32(1e-3)
     pixel = 0
     for row in range(height):
@@ -97,19 +94,19 @@ def compose_over(
             pixel += 1
             if first == end:
                 continue
-            red, green, blue, seen, cover = zero, zero, zero, zero, zero
+            red, green, blue, seen, cover = ZERO, ZERO, ZERO, ZERO, ZERO
             for i in range(first, end):
                 share = np.float32(samples[i]) * part
                 seen += share
                 share *= covers[i]
                 cover += share
-                red += share * min(max(colour[0, i], zero), most)
-                green += share * min(max(colour[1, i], zero), most)
-                blue += share * min(max(colour[2, i], zero), most)
-            rest, scale = unit - seen, unit
+                red += share * min(max(colour[0, i], ZERO), most)
+                green += share * min(max(colour[1, i], ZERO), most)
+                blue += share * min(max(colour[2, i], ZERO), most)
+            rest, scale = UNIT - seen, UNIT
             if channels == 4:
                 rest *= np.float32(picture[row, column, 3]) / most
-                scale = unit / max(cover + rest, least)
+                scale = UNIT / max(cover + rest, least)
             else:
                 behind = seen - cover
                 red += behind * np.float32(wall[row, column, 0])
@@ -118,8 +115,8 @@ def compose_over(
             red = (red + rest * np.float32(picture[row, column, 0])) * scale
             green = (green + rest * np.float32(picture[row, column, 1])) * scale
             blue = (blue + rest * np.float32(picture[row, column, 2])) * scale
-            picture[row, column, 0] = np.uint8(red + half)
-            picture[row, column, 1] = np.uint8(green + half)
-            picture[row, column, 2] = np.uint8(blue + half)
+            picture[row, column, 0] = np.uint8(red + HALF)
+            picture[row, column, 1] = np.uint8(green + HALF)
+            picture[row, column, 2] = np.uint8(blue + HALF)
             if channels == 4:
-                picture[row, column, 3] = np.uint8((cover + rest) * most + half)
+                picture[row, column, 3] = np.uint8((cover + rest) * most + HALF)

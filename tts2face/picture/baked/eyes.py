@@ -10,7 +10,7 @@ import numpy as np
 
 from tts2face.models.view_transform import OFFSET, SPAN
 from tts2face.numeric.arrays import Array
-from tts2face.numeric.kernels import inlined_kernel, kernel, vectorized_kernel
+from tts2face.numeric.kernels import HALF, UNIT, ZERO, inlined_kernel, kernel, vectorized_kernel
 from tts2face.picture.baked.visibility import NEAR, X, Y
 
 EDGE_RAD = 1.1  # angle from the gaze at the edge of the texture
@@ -82,27 +82,24 @@ def place_eyes(
     table, triangles, eye_of = surface
     of_eyes, texture, camera = eyes
     side = np.float32(len(texture))
-    unit = np.float32(1)
-    half = np.float32(0.5)
-    zero = np.float32(0)
     for n in range(rows.shape[1]):
         i = numbers[n]
         t = triangle[i]
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         ax, ay = table[a, X], table[a, Y]
         bx, by, cx, cy = table[b, X] - ax, table[b, Y] - ay, table[c, X] - ax, table[c, Y] - ay
-        inverse = unit / (bx * cy - cx * by)
+        inverse = UNIT / (bx * cy - cx * by)
         x, y = across[i] - ax, down[i] - ay
         s, r = (x * cy - cx * y) * inverse, (bx * y - x * by) * inverse
-        ahead = unit / ((unit - s - r) * table[a, NEAR] + s * table[b, NEAR] + r * table[c, NEAR])
-        right = (across[i] + half - camera[MIDDLE_X]) * ahead / camera[FOCAL]
-        below = (down[i] + half - camera[MIDDLE_Y]) * ahead / camera[FOCAL]
+        ahead = UNIT / ((UNIT - s - r) * table[a, NEAR] + s * table[b, NEAR] + r * table[c, NEAR])
+        right = (across[i] + HALF - camera[MIDDLE_X]) * ahead / camera[FOCAL]
+        below = (down[i] + HALF - camera[MIDDLE_Y]) * ahead / camera[FOCAL]
         e = eye_of[t]
         px = camera[0] + camera[AXES] * right + camera[AXES + 3] * below + camera[AXES + 6] * ahead
         py = camera[1] + camera[AXES + 1] * right + camera[AXES + 4] * below + camera[AXES + 7] * ahead
         pz = camera[2] + camera[AXES + 2] * right + camera[AXES + 5] * below + camera[AXES + 8] * ahead
         nx, ny, nz = px - of_eyes[e, CENTRE], py - of_eyes[e, CENTRE + 1], pz - of_eyes[e, CENTRE + 2]
-        scale = unit / np.sqrt(nx * nx + ny * ny + nz * nz)
+        scale = UNIT / np.sqrt(nx * nx + ny * ny + nz * nz)
         nx, ny, nz = nx * scale, ny * scale, nz * scale
         rows[PLACE, n], rows[PLACE + 1, n], rows[PLACE + 2, n] = px, py, pz
         rows[FACES, n], rows[FACES + 1, n], rows[FACES + 2, n] = nx, ny, nz
@@ -116,35 +113,33 @@ def place_eyes(
         elif off < of_eyes[e, IRIS]:
             off = of_eyes[e, IRIS] - (of_eyes[e, IRIS] - off) * of_eyes[e, OUTER]
         scale = off * _HALF_ANGLE / aside
-        u = min(max((half + scale * dx) * side - half, zero), side - np.float32(1.01))
-        v = min(max((half - scale * dy) * side - half, zero), side - np.float32(1.01))
+        u = min(max((HALF + scale * dx) * side - HALF, ZERO), side - np.float32(1.01))
+        v = min(max((HALF - scale * dy) * side - HALF, ZERO), side - np.float32(1.01))
         left, top = int(u), int(v)
         fx, fy = u - np.float32(left), v - np.float32(top)
         for k in range(3):
-            upper = texture[top, left, k] * (unit - fx) + texture[top, left + 1, k] * fx
-            lower = texture[top + 1, left, k] * (unit - fx) + texture[top + 1, left + 1, k] * fx
-            rows[LIGHT + k, n] = (upper * (unit - fy) + lower * fy) * colour[k, i]
+            upper = texture[top, left, k] * (UNIT - fx) + texture[top, left + 1, k] * fx
+            lower = texture[top + 1, left, k] * (UNIT - fx) + texture[top + 1, left + 1, k] * fx
+            rows[LIGHT + k, n] = (upper * (UNIT - fy) + lower * fy) * colour[k, i]
 
 
 @vectorized_kernel
 def mirror_lamps(camera: Array, lamps: Array, sky: Array, rows: Array) -> None:
     """Add the radiance of lamps (L, 17) and sky (3,) in the mirror direction, by Fresnel's share, to rows (13, M)."""
     n = rows.shape[1]
-    unit = np.float32(1)
-    zero = np.float32(0)
     least = np.float32(-0.0001)
     x, y, z, share = rows[MIRROR], rows[MIRROR + 1], rows[MIRROR + 2], rows[MIRROR + 3]
     for i in range(n):
         a, b, c = rows[0, i] - camera[0], rows[1, i] - camera[1], rows[2, i] - camera[2]
-        scale = unit / np.sqrt(a * a + b * b + c * c)
+        scale = UNIT / np.sqrt(a * a + b * b + c * c)
         a, b, c = a * scale, b * scale, c * scale
         facing = -(a * rows[3, i] + b * rows[4, i] + c * rows[5, i])
         seen = max(facing, np.float32(1e-3))
         twice = np.float32(2) * facing
         x[i], y[i], z[i] = a + twice * rows[3, i], b + twice * rows[4, i], c + twice * rows[5, i]
         g = np.sqrt(np.float32(REFRACTION * REFRACTION - 1) + seen * seen)
-        p, q = (g - seen) / (g + seen), (seen * (g + seen) - unit) / (seen * (g - seen) + unit)
-        share[i] = np.float32(0.5) * p * p * (unit + q * q) if facing > zero else zero
+        p, q = (g - seen) / (g + seen), (seen * (g + seen) - UNIT) / (seen * (g - seen) + UNIT)
+        share[i] = np.float32(0.5) * p * p * (UNIT + q * q) if facing > ZERO else ZERO
         rows[6, i] += share[i] * sky[0]
         rows[7, i] += share[i] * sky[1]
         rows[8, i] += share[i] * sky[2]
@@ -163,9 +158,9 @@ def mirror_lamps(camera: Array, lamps: Array, sky: Array, rows: Array) -> None:
             soft = max(np.float32(SOFT_EDGE) * far, np.float32(1e-6))
             p = (wide + soft - abs(hx * ax + hy * ay + hz * az)) / (np.float32(2) * soft)
             q = (high + soft - abs(hx * ux + hy * uy + hz * uz)) / (np.float32(2) * soft)
-            p, q = min(max(p, zero), unit), min(max(q, zero), unit)
+            p, q = min(max(p, ZERO), UNIT), min(max(q, ZERO), UNIT)
             part = p * p * (np.float32(3) - np.float32(2) * p) * q * q * (np.float32(3) - np.float32(2) * q) * share[i]
-            part = part if (far > zero) & (towards < least) else zero  # it shines to the front
+            part = part if (far > ZERO) & (towards < least) else ZERO  # it shines to the front
             rows[6, i] += part * red
             rows[7, i] += part * green
             rows[8, i] += part * blue
@@ -181,17 +176,16 @@ def _level(light: Any) -> Any:
 @kernel
 def look_up(view: Array, light: Array, numbers: Array, colour: Array) -> None:
     """Write displayed colours of linear light (3, M) by a table (33, 33, 33, 3), between its entries, into (3, N)."""
-    unit = np.float32(1)
     for n in range(light.shape[1]):
         x, y, z = _level(light[0, n]), _level(light[1, n]), _level(light[2, n])
         i, j, k = int(x), int(y), int(z)
         f, g, h = x - np.float32(i), y - np.float32(j), z - np.float32(k)
         for c in range(3):
-            low = (view[i, j, k, c] * (unit - h) + view[i, j, k + 1, c] * h) * (unit - g)
-            low += (view[i, j + 1, k, c] * (unit - h) + view[i, j + 1, k + 1, c] * h) * g
-            high = (view[i + 1, j, k, c] * (unit - h) + view[i + 1, j, k + 1, c] * h) * (unit - g)
-            high += (view[i + 1, j + 1, k, c] * (unit - h) + view[i + 1, j + 1, k + 1, c] * h) * g
-            colour[c, numbers[n]] = low * (unit - f) + high * f
+            low = (view[i, j, k, c] * (UNIT - h) + view[i, j, k + 1, c] * h) * (UNIT - g)
+            low += (view[i, j + 1, k, c] * (UNIT - h) + view[i, j + 1, k + 1, c] * h) * g
+            high = (view[i + 1, j, k, c] * (UNIT - h) + view[i + 1, j, k + 1, c] * h) * (UNIT - g)
+            high += (view[i + 1, j + 1, k, c] * (UNIT - h) + view[i + 1, j + 1, k + 1, c] * h) * g
+            colour[c, numbers[n]] = low * (UNIT - f) + high * f
 
 
 def colour_eyes(

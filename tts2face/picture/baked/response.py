@@ -15,7 +15,7 @@ from tts2face.face.deformation import FaceRig
 from tts2face.models.baked_light import LIMIT_STEP, LIP_RING, N_MOUTH_TERMS, N_TERMS, BakedLight
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import Array, Float32Array
-from tts2face.numeric.kernels import vectorized_kernel
+from tts2face.numeric.kernels import HALF, UNIT, ZERO, vectorized_kernel
 from tts2face.picture.kernels.fragments import face_normals, vertex_normals
 from tts2face.picture.kernels.tables import NORMAL
 from tts2face.picture.surface import triangles_by_vertex
@@ -163,9 +163,6 @@ def write_mouth_terms(points: Array, mouth: Array, table: Array, ring: Array, te
     The curve is flat where the opening is narrow or wide, as that of a display. `ways` (6, M) is scratch space: places,
     and ways to the corner before, of length 1.
     """
-    zero = np.float32(0)
-    unit = np.float32(1)
-    half = np.float32(0.5)
     least = np.float32(1e-07)
     n = len(mouth)
     px, py, pz, bx, by, bz = ways[0], ways[1], ways[2], ways[3], ways[4], ways[5]
@@ -173,14 +170,14 @@ def write_mouth_terms(points: Array, mouth: Array, table: Array, ring: Array, te
     for i in range(n):
         v = mouth[i]
         px[i], py[i], pz[i] = points[v, 0], points[v, 1], points[v, 2]
-        bx[i], by[i], bz[i] = zero, zero, zero
-        right[i], up[i], ahead[i] = zero, zero, zero
+        bx[i], by[i], bz[i] = ZERO, ZERO, ZERO
+        right[i], up[i], ahead[i] = ZERO, ZERO, ZERO
     for k in range(len(ring) + 1):
         corner = ring[k % len(ring)]
         cx, cy, cz = corner[0], corner[1], corner[2]
         for i in range(n):
             x, y, z = cx - px[i], cy - py[i], cz - pz[i]
-            scale = unit / np.sqrt(x * x + y * y + z * z + least)
+            scale = UNIT / np.sqrt(x * x + y * y + z * z + least)
             x, y, z = x * scale, y * scale, z * scale
             a, b, c = bx[i], by[i], bz[i]
             cosine = a * x + b * y + c * z
@@ -188,14 +185,14 @@ def write_mouth_terms(points: Array, mouth: Array, table: Array, ring: Array, te
             near = (np.float32(0.8543985) + (np.float32(0.4965155) + np.float32(0.0145206) * off) * off) / (
                 np.float32(3.4175940) + (np.float32(4.1616724) + off) * off
             )  # angle over its sine and 2 pi, below a right angle
-            share = near if cosine > zero else half / np.sqrt(max(unit - cosine * cosine, least)) - near
+            share = near if cosine > ZERO else HALF / np.sqrt(max(UNIT - cosine * cosine, least)) - near
             right[i] += share * (y * c - z * b)
             up[i] += share * (z * a - x * c)
             ahead[i] += share * (x * b - y * a)
             bx[i], by[i], bz[i] = x, y, z
     for i in range(n):
         factor = right[i] * table[i, NORMAL] + up[i] * table[i, NORMAL + 1] + ahead[i] * table[i, NORMAL + 2]
-        squared = max(factor, zero) * factor
+        squared = max(factor, ZERO) * factor
         terms[1, i], terms[2, i] = factor, squared / (squared + HALF_FACTOR * HALF_FACTOR)
 
 

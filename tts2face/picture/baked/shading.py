@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from tts2face.numeric.arrays import Array
-from tts2face.numeric.kernels import flat_view, kernel, vectorized_kernel
+from tts2face.numeric.kernels import HALF, UNIT, ZERO, flat_view, kernel, vectorized_kernel
 from tts2face.picture.baked.modes import LIGHT_BITS, LIGHT_STEP, LIGHT_ZERO
 from tts2face.picture.baked.visibility import TRIANGLE_BITS, TRIANGLE_MASK, U, X, Y
 
@@ -119,7 +119,6 @@ def lay_planes(
     (F,), and the triangle of each plane: those of the last two that do not agree are of other fragments.
     """
     plane, plane_of, triangle_of = found
-    zero = np.float32(0)
     third = np.float32(1 / 3)
     n = 0
     for i in range(count):
@@ -138,7 +137,7 @@ def lay_planes(
             at, e1, e2 = table[a, U + k], table[b, U + k] - table[a, U + k], table[c, U + k] - table[a, U + k]
             columns, rows = (e1 * cy - e2 * by) * inverse, (e2 * bx - e1 * cx) * inverse
             x, y, steep = ax, ay, abs(columns) + abs(rows)
-            span = max(e1, e2, zero) - min(e1, e2, zero)
+            span = max(e1, e2, ZERO) - min(e1, e2, ZERO)
             if k >= AT_RED and steep > span:
                 columns, rows = columns * (span / steep), rows * (span / steep)
                 at, x, y = at + (e1 + e2) * third, ax + (bx + cx) * third, ay + (by + cy) * third
@@ -158,10 +157,10 @@ def evaluate(plane: Array, across: Array, down: Array, count: int, planes: Array
 @vectorized_kernel
 def find_texels(values: Array, count: int, size: tuple[int, int], texel: Array, share: Array) -> None:
     """Write the upper left texel (N,) of fragments in a texture (width, height), and the place in it (2, N)."""
-    wide, high, half = np.float32(size[0]), np.float32(size[1]), np.float32(0.5)
+    wide, high = np.float32(size[0]), np.float32(size[1])
     for i in range(count):
-        x = min(max(values[AT_U, i] * wide - half, np.float32(0)), wide - np.float32(1.01))
-        y = min(max(values[AT_V, i] * high - half, np.float32(0)), high - np.float32(1.01))
+        x = min(max(values[AT_U, i] * wide - HALF, np.float32(0)), wide - np.float32(1.01))
+        y = min(max(values[AT_V, i] * high - HALF, np.float32(0)), high - np.float32(1.01))
         left, top = np.int32(x), np.int32(y)
         texel[i] = top * np.int32(size[0]) + left
         share[0, i], share[1, i] = x - np.float32(left), y - np.float32(top)
@@ -185,12 +184,12 @@ def add_texels(corners: Array, share: Array, count: int, coding: tuple[int, Any,
     them is not read.
     """
     bits, zero, step = coding
-    mask, unit = (1 << bits) - 1, np.float32(1)
+    mask = (1 << bits) - 1
     for i in range(count):
         x, y = share[0, i], share[1, i]
         w3 = x * y
         w1, w2 = x - w3, y - w3
-        w0 = unit - x - w2
+        w0 = UNIT - x - w2
         a, b, c, d = corners[0, i], corners[1, i], corners[2, i], corners[3, i]
         red = w0 * np.float32(a & mask) + w1 * np.float32(b & mask)
         red += w2 * np.float32(c & mask) + w3 * np.float32(d & mask)
@@ -215,8 +214,6 @@ def compose(pixels: Array, samples: Array, n_samples: int, colour: Array, pictur
     channels = picture.shape[2]
     line = flat_view(picture)
     part = np.float32(1) / np.float32(n_samples)
-    half = np.float32(0.5)
-    zero = np.float32(0)
     most = np.float32(255)
     first = pixels[0]
     unit = np.uint64(1)
@@ -226,20 +223,20 @@ def compose(pixels: Array, samples: Array, n_samples: int, colour: Array, pictur
         end = pixels[pixel + 1]
         if first == end:
             continue
-        red = zero
-        green = zero
-        blue = zero
+        red = ZERO
+        green = ZERO
+        blue = ZERO
         seen = 0
         for i in range(first, end):
             share = np.float32(samples[i]) * part
             seen += samples[i]
-            red += share * min(max(colour[0, i], zero), most)
-            green += share * min(max(colour[1, i], zero), most)
-            blue += share * min(max(colour[2, i], zero), most)
+            red += share * min(max(colour[0, i], ZERO), most)
+            green += share * min(max(colour[1, i], ZERO), most)
+            blue += share * min(max(colour[2, i], ZERO), most)
         first, at = end, np.uint64(pixel * channels)
         if channels == 4:
             cover = np.float32(seen) * part
-            line[at + three] = np.uint8(cover * most + half)
+            line[at + three] = np.uint8(cover * most + HALF)
             scale = np.float32(1) / cover
             red, green, blue = red * scale, green * scale, blue * scale
         elif seen < n_samples:
@@ -247,6 +244,6 @@ def compose(pixels: Array, samples: Array, n_samples: int, colour: Array, pictur
             red += rest * np.float32(line[at])
             green += rest * np.float32(line[at + unit])
             blue += rest * np.float32(line[at + two])
-        line[at] = np.uint8(np.int32(red + half))
-        line[at + unit] = np.uint8(np.int32(green + half))
-        line[at + two] = np.uint8(np.int32(blue + half))
+        line[at] = np.uint8(np.int32(red + HALF))
+        line[at + unit] = np.uint8(np.int32(green + HALF))
+        line[at + two] = np.uint8(np.int32(blue + HALF))

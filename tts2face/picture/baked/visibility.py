@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.numeric.arrays import Array
-from tts2face.numeric.kernels import BLOCK, flat_view, kernel, write_larger
+from tts2face.numeric.kernels import BLOCK, HALF, UNIT, ZERO, flat_view, kernel, write_larger
 
 X, Y, NEAR, U, V, RED, GREEN, BLUE = range(8)  # columns of a table of projected vertices
 N_COLUMNS = 8
@@ -28,16 +28,15 @@ def project(points: Array, source: Array, view: Array, lens: Array, table: Array
     `view` (3, 4) transforms world to camera space; `lens` is (focal length in samples, centre x, centre y, near plane).
     Samples have whole coordinates at their centres.
     """
-    half, unit = np.float32(0.5), np.float32(1)
     for v in range(len(source)):
         p = source[v]
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         right = view[0, 0] * x + view[0, 1] * y + view[0, 2] * z + view[0, 3]
         down = view[1, 0] * x + view[1, 1] * y + view[1, 2] * z + view[1, 3]
         ahead = view[2, 0] * x + view[2, 1] * y + view[2, 2] * z + view[2, 3]
-        near = unit / ahead if ahead >= lens[3] else np.float32(0)
-        table[v, X] = lens[1] + lens[0] * right * near - half
-        table[v, Y] = lens[2] + lens[0] * down * near - half
+        near = UNIT / ahead if ahead >= lens[3] else np.float32(0)
+        table[v, X] = lens[1] + lens[0] * right * near - HALF
+        table[v, Y] = lens[2] + lens[0] * down * near - HALF
         table[v, NEAR] = near
 
 
@@ -60,16 +59,16 @@ def find_bands(table: Array, triangles: Array, rows: tuple[int, int], bands: Arr
     counts : (B,)
         Out.
     """
-    bottom, zero, band_rows = np.float32(rows[0] - 1), np.float32(0), np.uint32(rows[1])
+    bottom, band_rows = np.float32(rows[0] - 1), np.uint32(rows[1])
     for band in range(len(counts)):
         counts[band] = 0
     for t in range(len(triangles)):
         a, b, c = np.uint64(triangles[t, 0]), np.uint64(triangles[t, 1]), np.uint64(triangles[t, 2])
         ax, ay, bx, by, cx, cy = table[a, X], table[a, Y], table[b, X], table[b, Y], table[c, X], table[c, Y]
-        low, high = np.ceil(max(min(ay, by, cy), zero)), np.floor(min(max(ay, by, cy), bottom))
+        low, high = np.ceil(max(min(ay, by, cy), ZERO)), np.floor(min(max(ay, by, cy), bottom))
         shown = ((bx - ax) * (cy - ay) - (cx - ax) * (by - ay) <= -LEAST_AREA) & (low <= high)
         first = np.int64(np.uint32(min(low, bottom)) // band_rows)
-        end = np.int64(np.uint32(max(high, zero)) // band_rows) + 1 if shown else first
+        end = np.int64(np.uint32(max(high, ZERO)) // band_rows) + 1 if shown else first
         bands[t, 0], bands[t, 1] = first, end
         for band in range(first, end):
             counts[band] += 1
@@ -116,7 +115,6 @@ def find_nearest(
     for sample in range(len(line)):
         line[sample] = 0
     top_row, end_row = np.float32(first_row), np.float32(first_row + height - 1)
-    zero = np.float32(0)
     left_end = np.float32(0)
     right_end = np.float32(stride - BLOCK - 1)
     beyond = right_end + np.float32(1)
@@ -143,7 +141,7 @@ def find_nearest(
         swap = by < ay
         ax, bx, ay, by = bx if swap else ax, ax if swap else bx, by if swap else ay, ay if swap else by
         whole, upper, lower = (cx - ax) / (cy - ay), (bx - ax) / (by - ay), (cx - bx) / (cy - by)
-        upper, lower = upper if by > ay else zero, lower if cy > by else zero
+        upper, lower = upper if by > ay else ZERO, lower if cy > by else ZERO
         first, n_rows = (int(low) - first_row) * stride, int(high) + 1 - int(low)
         for block in range(0, n_rows, BLOCK):
             for row in range(BLOCK):

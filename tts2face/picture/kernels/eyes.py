@@ -13,7 +13,7 @@ from tts2face.face.deformation import FaceRig, eye_rotations, head_transform
 from tts2face.models.face import Face
 from tts2face.models.landmarks import LEFT_LIDS, RIGHT_LIDS
 from tts2face.numeric.arrays import Array
-from tts2face.numeric.kernels import kernel
+from tts2face.numeric.kernels import UNIT, ZERO, kernel
 from tts2face.picture.kernels.tables import AT_ALBEDO, AT_DIFFUSE, AT_EXPOSURE, AT_GLOW, AT_NORMAL, N_EXPOSURES
 
 N_LID = 9
@@ -120,7 +120,6 @@ def reflected_lamps(eye: Array, normal: tuple[float, float, float], view: tuple[
 @kernel
 def light_eye(eyes: Array, point: tuple[float, float, float], g: int, table: Array) -> None:
     """Change albedo, light and glow of fragment `g` at a point (3,) of an eyeball in camera space."""
-    unit, zero = np.float32(1), np.float32(0)
     best, nearest = 0, np.float32(1e30)
     for e in range(len(eyes)):
         dx, dy, dz = point[0] - eyes[e, 0], point[1] - eyes[e, 1], point[2] - eyes[e, 2]
@@ -132,34 +131,34 @@ def light_eye(eyes: Array, point: tuple[float, float, float], g: int, table: Arr
     nx, ny, nz = ox / length, oy / length, oz / length
     gx, gy, gz = eye[GAZE], eye[GAZE + 1], eye[GAZE + 2]
     ahead = nx * gx + ny * gy + nz * gz
-    bump = min(max((ahead - eye[IRIS] + np.float32(0.008)) * np.float32(20), zero), unit) * np.float32(0.85)
+    bump = min(max((ahead - eye[IRIS] + np.float32(0.008)) * np.float32(20), ZERO), UNIT) * np.float32(0.85)
     cx, cy, cz = nx + bump * (nx - gx * ahead), ny + bump * (ny - gy * ahead), nz + bump * (nz - gz * ahead)
-    scale = unit / np.sqrt(cx * cx + cy * cy + cz * cz + np.float32(1e-9))
-    far = -unit / np.sqrt(point[0] * point[0] + point[1] * point[1] + point[2] * point[2] + np.float32(1e-9))
+    scale = UNIT / np.sqrt(cx * cx + cy * cy + cz * cz + np.float32(1e-9))
+    far = -UNIT / np.sqrt(point[0] * point[0] + point[1] * point[1] + point[2] * point[2] + np.float32(1e-9))
     view = (point[0] * far, point[1] * far, point[2] * far)
     glow = reflected_lamps(eye, (cx * scale, cy * scale, cz * scale), view)
     ring = (ahead - eye[IRIS] - np.float32(0.006)) * np.float32(80)
-    ring = unit - np.float32(0.6) * np.exp(-ring * ring)
+    ring = UNIT - np.float32(0.6) * np.exp(-ring * ring)
     inside = ahead > eye[IRIS]
     towards = (nx - gx * ahead) * eye[KEY] + (ny - gy * ahead) * eye[KEY + 1]
-    focus = unit + np.float32(1.6) * max(-towards, zero) + np.float32(0.15) if inside else unit
-    corner = zero if inside else min(max((unit - ahead) * np.float32(1.6), zero), unit)
-    shade = unit
-    if eye[HAS_LIDS] > zero:
+    focus = UNIT + np.float32(1.6) * max(-towards, ZERO) + np.float32(0.15) if inside else UNIT
+    corner = ZERO if inside else min(max((UNIT - ahead) * np.float32(1.6), ZERO), UNIT)
+    shade = UNIT
+    if eye[HAS_LIDS] > ZERO:
         mm = eye[SCALE]
         across = (ox * eye[ACROSS] + oy * eye[ACROSS + 1] + oz * eye[ACROSS + 2]) * mm
         height = (ox * eye[UP] + oy * eye[UP + 1] + oz * eye[UP + 2]) * mm
-        under = max(np.float32(lid_height(eye, UPPER, across)) - height, zero)
-        over = max(height - np.float32(lid_height(eye, LOWER, across)), zero)
+        under = max(np.float32(lid_height(eye, UPPER, across)) - height, ZERO)
+        over = max(height - np.float32(lid_height(eye, LOWER, across)), ZERO)
         shade -= LID_SHADOW * np.exp(-under / LID_SHADOW_MM) + np.float32(0.18) * np.exp(-over * np.float32(1.6))
         line = (over - np.float32(0.3)) / WET_LINE_MM
-        glow += WET_LINE * np.exp(-line * line) * max(-ny * eye[KEY + 1] - nz + np.float32(0.3), zero) * shade
+        glow += WET_LINE * np.exp(-line * line) * max(-ny * eye[KEY + 1] - nz + np.float32(0.3), ZERO) * shade
     shade = max(shade, np.float32(0.1))
     table[AT_GLOW, g] = glow * shade
     for k in range(3):
         redness = np.float32(0.05) + np.float32(0.06) * np.float32(k)
-        white = unit if inside else SCLERA
-        table[AT_ALBEDO + k, g] *= ring * focus * white * (unit - corner * redness)
+        white = UNIT if inside else SCLERA
+        table[AT_ALBEDO + k, g] *= ring * focus * white * (UNIT - corner * redness)
         table[AT_DIFFUSE + k, g] *= shade
     for k in range(N_EXPOSURES):
         table[AT_EXPOSURE + k, g] *= shade

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tts2face.numeric.arrays import Array
-from tts2face.numeric.kernels import kernel
+from tts2face.numeric.kernels import UNIT, ZERO, kernel
 from tts2face.picture.kernels.eyes import light_eye
 from tts2face.picture.kernels.raster import NO_TRIANGLE
 from tts2face.picture.kernels.tables import (
@@ -141,13 +141,12 @@ def find_fragments(band: Band, n_layers: int, facets: Facets, fragments: Fragmen
     spread = fragments.spread
     pixels = fragments.pixels
     n_fragments = n_pixels = 0
-    unit = np.float32(1)
     n_samples = side * side
     middle = 0.5 * (side - 1)
     for r in range(band.n_rows // side):
         for x in range(owner.shape[2] // side):
             start = n_fragments
-            seen = unit
+            seen = UNIT
             if through.size > 0:
                 seen = np.float32(0)
                 for s in range(n_samples):
@@ -189,8 +188,8 @@ def find_fragments(band: Band, n_layers: int, facets: Facets, fragments: Fragmen
                             spread[g, 0] = spread[g, 1] = spread[g, 2] = np.float32(0)
                         spread[g, 0] += np.float32(column)
                         spread[g, 1] += np.float32(row + band.first_row)
-                        spread[g, 2] += unit
-            if n_fragments > start or seen < unit:
+                        spread[g, 2] += UNIT
+            if n_fragments > start or seen < UNIT:
                 for layer in range(n_layers, 4):
                     pixels[n_pixels, PIXEL_ENDS + layer] = n_fragments
                 pixels[n_pixels, PIXEL_X], pixels[n_pixels, PIXEL_Y] = x, r + band.first_row // side
@@ -213,11 +212,10 @@ def evaluate_fragments(
     texels = scene.texels
     levels = scene.levels
     linear = scene.linear
-    unit, zero = np.float32(1), np.float32(0)
     focal, middle_x, middle_y = np.float32(1 / lens[0]), np.float32(lens[1] - 0.5), np.float32(lens[2] - 0.5)
     pixel = np.float32((side / lens[0]) ** 2)
-    sx = sy = sz = e1x = e1y = e1z = e2x = e2y = e2z = rx = ry = rz = zero
-    ua = va = u1 = v1 = u2 = v2 = texel_area = zero
+    sx = sy = sz = e1x = e1y = e1z = e2x = e2y = e2z = rx = ry = rz = ZERO
+    ua = va = u1 = v1 = u2 = v2 = texel_area = ZERO
     last = NO_TRIANGLE
     a = 0
     b = 0
@@ -241,14 +239,14 @@ def evaluate_fragments(
                 u1, v1, u2, v2 = vertex[b, UV] - ua, vertex[b, UV + 1] - va, vertex[c, UV] - ua, vertex[c, UV + 1] - va
                 texel_area = abs(u1 * v2 - u2 * v1)
                 texel_area *= np.float32(levels[texture, 0, 1]) * np.float32(levels[texture, 0, 2])
-        share = unit / spread[g, 2]
+        share = UNIT / spread[g, 2]
         dx, dy = (spread[g, 0] * share - middle_x) * focal, (spread[g, 1] * share - middle_y) * focal
         qx, qy, qz = dy * e2z - e2y, e2x - dx * e2z, dx * e2y - dy * e2x
         determinant = e1x * qx + e1y * qy + e1z * qz
-        inverse = unit / determinant if determinant != zero else zero
-        wb = min(max((sx * qx + sy * qy + sz * qz) * inverse, zero), unit)
-        wc = min(max((dx * rx + dy * ry + rz) * inverse, zero), unit - wb)
-        wa = unit - wb - wc
+        inverse = UNIT / determinant if determinant != ZERO else ZERO
+        wb = min(max((sx * qx + sy * qy + sz * qz) * inverse, ZERO), UNIT)
+        wc = min(max((dx * rx + dy * ry + rz) * inverse, ZERO), UNIT - wb)
+        wa = UNIT - wb - wc
         for k in range(3):
             n, d = NORMAL + k, DIFFUSE + k
             table[AT_NORMAL + k, g] = wa * vertex[a, n] + wb * vertex[b, n] + wc * vertex[c, n]
@@ -267,10 +265,10 @@ def evaluate_fragments(
         table[AT_RAY, g], table[AT_RAY + 1, g] = dx, dy
         for k in range(5):
             table[AT_GLOSS + k, g] = materials[material, k]
-        table[AT_GLOW, g], table[AT_SHARE, g] = zero, spread[g, 2]
+        table[AT_GLOW, g], table[AT_SHARE, g] = ZERO, spread[g, 2]
         if number < 0:
-            turn_back(table, g, materials[material, OPEN_SURFACE] == zero)
-        if materials[material, EYE] > zero and len(eyes) > 0:
+            turn_back(table, g, materials[material, OPEN_SURFACE] == ZERO)
+        if materials[material, EYE] > ZERO and len(eyes) > 0:
             depth = -sz + wb * e1z + wc * e2z
             light_eye(eyes, (dx * depth, dy * depth, depth), g, table)
 

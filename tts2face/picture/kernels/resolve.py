@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from tts2face.numeric.arrays import Array
-from tts2face.numeric.kernels import inlined_kernel, kernel
+from tts2face.numeric.kernels import HALF, UNIT, ZERO, inlined_kernel, kernel
 from tts2face.picture.kernels.fragments import (
     PIXEL_ENDS,
     PIXEL_X,
@@ -24,22 +24,19 @@ def write_pixel(light: tuple[Any, Any, Any], cover: Any, tables: tuple[Any, Any]
     """Composite light and coverage over a pixel (y, x); a picture of four channels stores the coverage."""
     linear, encoded = tables
     y, x = at
-    unit = np.float32(1)
-    zero = np.float32(0)
-    half = np.float32(0.5)
     top = np.float32(len(encoded) - 1)
-    behind, scale = unit - cover, unit
+    behind, scale = UNIT - cover, UNIT
     if picture.shape[2] == 4:
-        picture[y, x, 3] = np.uint8(min(cover, unit) * np.float32(255) + half)
-        behind, scale = zero, unit / max(cover, np.float32(1e-6))
+        picture[y, x, 3] = np.uint8(min(cover, UNIT) * np.float32(255) + HALF)
+        behind, scale = ZERO, UNIT / max(cover, np.float32(1e-6))
     red, green, blue = light[0] * scale, light[1] * scale, light[2] * scale
-    if behind != zero:
+    if behind != ZERO:
         red += behind * linear[picture[y, x, 0]]
         green += behind * linear[picture[y, x, 1]]
         blue += behind * linear[picture[y, x, 2]]
-    picture[y, x, 0] = encoded[int(min(max(red, zero), unit) * top + half)]
-    picture[y, x, 1] = encoded[int(min(max(green, zero), unit) * top + half)]
-    picture[y, x, 2] = encoded[int(min(max(blue, zero), unit) * top + half)]
+    picture[y, x, 0] = encoded[int(min(max(red, ZERO), UNIT) * top + HALF)]
+    picture[y, x, 1] = encoded[int(min(max(green, ZERO), UNIT) * top + HALF)]
+    picture[y, x, 2] = encoded[int(min(max(blue, ZERO), UNIT) * top + HALF)]
 
 
 @kernel
@@ -47,10 +44,9 @@ def mix_samples(band: Band, p: int, facets: Facets, fragments: Fragments, total:
     """Add the mean over the samples of pixel number `p` of the composited layers: light and coverage (4,)."""
     pixel, table, colour = fragments.pixels[p], fragments.table, fragments.colour
     side, x, r = band.side, pixel[PIXEL_X], pixel[PIXEL_Y] - band.first_row // band.side
-    unit = np.float32(1)
     for s in range(side * side):
         red, green, blue, coverage = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
-        passing = band.through[r, x, s] if band.through.size > 0 else unit
+        passing = band.through[r, x, s] if band.through.size > 0 else UNIT
         for turn in range(3):
             layer = (0, 2, 1)[turn]
             g = pixel[PIXEL_ENDS + layer]
@@ -61,12 +57,12 @@ def mix_samples(band: Band, p: int, facets: Facets, fragments: Fragments, total:
                 continue
             while not is_same_surface(number, fragments.number_of[g], facets):
                 g += 1
-            behind = unit - table[AT_OPACITY, g]
+            behind = UNIT - table[AT_OPACITY, g]
             red, green, blue = red * behind + colour[0, g], green * behind + colour[1, g], blue * behind + colour[2, g]
-            coverage = unit - (unit - coverage) * behind
+            coverage = UNIT - (UNIT - coverage) * behind
         share = passing / np.float32(side * side)
         total[0], total[1], total[2] = total[0] + red * share, total[1] + green * share, total[2] + blue * share
-        total[3] += unit / np.float32(side * side) - share * (unit - coverage)
+        total[3] += UNIT / np.float32(side * side) - share * (UNIT - coverage)
 
 
 @kernel
@@ -78,35 +74,34 @@ def compose_band(
     table = fragments.table
     colour = fragments.colour
     through = band.through
-    unit, zero = np.float32(1), np.float32(0)
     n_samples = band.side * band.side
-    share = unit / np.float32(n_samples)
+    share = UNIT / np.float32(n_samples)
     total = np.zeros(4, np.float32)
     for p in range(n_pixels):
         start, end = rows[p, PIXEL_ENDS], rows[p, PIXEL_ENDS + 3]
         x, y = rows[p, PIXEL_X], rows[p, PIXEL_Y]
         r = y - band.first_row // band.side
-        red = zero
-        green = zero
-        blue = zero
-        rest = unit
-        least = unit
+        red = ZERO
+        green = ZERO
+        blue = ZERO
+        rest = UNIT
+        least = UNIT
         if through.size > 0:
-            rest, least = zero, through[r, x, 0]
+            rest, least = ZERO, through[r, x, 0]
             for s in range(n_samples):
                 rest += through[r, x, s]
                 least = min(least, through[r, x, s])
             rest /= np.float32(n_samples)
-            if least < unit:
+            if least < UNIT:
                 red, green, blue = band.strand_colour[r, x, 0], band.strand_colour[r, x, 1], band.strand_colour[r, x, 2]
         if end == start:  # hair only
-            write_pixel((red, green, blue), unit - rest, tables, picture, (y, x))
-        elif least < unit or rows[p, PIXEL_ENDS + 1] < end:
-            total[0], total[1], total[2], total[3] = red, green, blue, zero
+            write_pixel((red, green, blue), UNIT - rest, tables, picture, (y, x))
+        elif least < UNIT or rows[p, PIXEL_ENDS + 1] < end:
+            total[0], total[1], total[2], total[3] = red, green, blue, ZERO
             mix_samples(band, p, facets, fragments, total)
             write_pixel((total[0], total[1], total[2]), total[3], tables, picture, (y, x))
         else:
-            cover = zero
+            cover = ZERO
             for g in range(start, end):
                 weight = table[AT_SHARE, g] * share
                 red, green, blue = (

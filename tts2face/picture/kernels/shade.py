@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tts2face.numeric.arrays import Array
-from tts2face.numeric.kernels import inlined_kernel, kernel, vectorized_kernel
+from tts2face.numeric.kernels import HALF, UNIT, ZERO, inlined_kernel, kernel, vectorized_kernel
 from tts2face.picture.kernels.lamps import BRIGHTNESS, FIRST_LIGHT_ROW, FLOOR_ROW, SKY_ROW, UP_ROW
 from tts2face.picture.kernels.tables import (
     AT_ALBEDO,
@@ -60,32 +60,29 @@ def light_vertices(exposure: Array, lights: Array, wrap: Array, vertex: Array) -
     vertex : (V, N_VERTEX_COLUMNS)
         Vertex table: reads normals, writes diffuse light and exposure.
     """
-    zero = np.float32(0)
-    unit = np.float32(1)
-    half = np.float32(0.5)
     for v in range(len(vertex)):
         nx, ny, nz = vertex[v, NORMAL], vertex[v, NORMAL + 1], vertex[v, NORMAL + 2]
         around_edge = wrap[v]
-        if around_edge < zero:
-            around_edge = -unit - around_edge
-            if nx * vertex[v, 0] + ny * vertex[v, 1] + nz * vertex[v, 2] > zero:
+        if around_edge < ZERO:
+            around_edge = -UNIT - around_edge
+            if nx * vertex[v, 0] + ny * vertex[v, 1] + nz * vertex[v, 2] > ZERO:
                 nx = -nx
                 ny = -ny
                 nz = -nz
         up = nx * lights[UP_ROW, 0] + ny * lights[UP_ROW, 1] + nz * lights[UP_ROW, 2]
         for c in range(3):
-            middle = half * (lights[SKY_ROW, c] + lights[FLOOR_ROW, c])
-            swing = half * (lights[SKY_ROW, c] - lights[FLOOR_ROW, c])
+            middle = HALF * (lights[SKY_ROW, c] + lights[FLOOR_ROW, c])
+            swing = HALF * (lights[SKY_ROW, c] - lights[FLOOR_ROW, c])
             vertex[v, DIFFUSE + c] = (middle + swing * up) * exposure[v, 0]
         for k in range(FIRST_LIGHT_ROW, len(lights)):
             towards = nx * lights[k, 0] + ny * lights[k, 1] + nz * lights[k, 2]
             visible = exposure[v, 1 + k - FIRST_LIGHT_ROW]
-            if towards < -around_edge or visible <= zero:
+            if towards < -around_edge or visible <= ZERO:
                 continue
             for c in range(3):
                 reach = around_edge * SKIN_SCATTERING[c]
-                soaked = visible + reach * visible * (unit - visible)  # scattering reddens the edge of a shadow on skin
-                vertex[v, DIFFUSE + c] += lights[k, 3 + c] * soaked * max(towards + reach, zero) / (unit + reach)
+                soaked = visible + reach * visible * (UNIT - visible)  # scattering reddens the edge of a shadow on skin
+                vertex[v, DIFFUSE + c] += lights[k, 3 + c] * soaked * max(towards + reach, ZERO) / (UNIT + reach)
         vertex[v, EXPOSURE] = exposure[v, 0]
         vertex[v, EXPOSURE + 1], vertex[v, EXPOSURE + 2] = exposure[v, 1], exposure[v, 3]
         vertex[v, EXPOSURE + 3] = exposure[v, 4]
@@ -160,7 +157,6 @@ def shade_fragments(table: Array, n: int, lights: Array, scratch: Array, colour:
     colour : (3, H)
         Out: display light in [0, 1] of each fragment, multiplied by its opacity.
     """
-    unit, zero = np.float32(1), np.float32(0)
     nx, ny, nz = table[AT_NORMAL], table[AT_NORMAL + 1], table[AT_NORMAL + 2]
     gloss, view_x, view_y, view_z = scratch[0], scratch[1], scratch[2], scratch[3]
     facing, lobe, depth, around = scratch[4], scratch[5], scratch[9], table[AT_EXPOSURE]
@@ -168,19 +164,19 @@ def shade_fragments(table: Array, n: int, lights: Array, scratch: Array, colour:
     specular, dim, glow = table[AT_GLOSS], table[AT_DARK_GLOSS], table[AT_GLOW]
     red, green = table[AT_ALBEDO], table[AT_ALBEDO + 1]
     for i in range(n):
-        scale = unit / np.sqrt(nx[i] * nx[i] + ny[i] * ny[i] + nz[i] * nz[i] + np.float32(1e-20))
+        scale = UNIT / np.sqrt(nx[i] * nx[i] + ny[i] * ny[i] + nz[i] * nz[i] + np.float32(1e-20))
         nx[i], ny[i], nz[i] = nx[i] * scale, ny[i] * scale, nz[i] * scale
-        scale = -unit / np.sqrt(ray_x[i] * ray_x[i] + ray_y[i] * ray_y[i] + unit)
+        scale = -UNIT / np.sqrt(ray_x[i] * ray_x[i] + ray_y[i] * ray_y[i] + UNIT)
         view_x[i], view_y[i], view_z[i] = ray_x[i] * scale, ray_y[i] * scale, scale
         facing[i] = max(nx[i] * view_x[i] + ny[i] * view_y[i] + nz[i] * view_z[i], np.float32(1e-3))
         tone = np.float32(0.5) * (red[i] + green[i])
-        light = min(max((tone - DARK_ALBEDO) / (LIGHT_ALBEDO - DARK_ALBEDO), zero), unit)
-        gloss[i] = specular[i] * (unit - dim[i] * (unit - light))
-        edge = unit - facing[i]
+        light = min(max((tone - DARK_ALBEDO) / (LIGHT_ALBEDO - DARK_ALBEDO), ZERO), UNIT)
+        gloss[i] = specular[i] * (UNIT - dim[i] * (UNIT - light))
+        edge = UNIT - facing[i]
         edge *= edge * edge * edge * edge
         depth[i] = np.sqrt(rough[i]) * np.float32(0.5)  # of the shadowing term
-        smooth = unit - np.sqrt(np.sqrt(rough[i]))
-        grazing = (np.float32(0.25) * specular[i] + smooth * edge) * SKY_GLOSS * min(specular[i] * np.float32(8), unit)
+        smooth = UNIT - np.sqrt(np.sqrt(rough[i]))
+        grazing = (np.float32(0.25) * specular[i] + smooth * edge) * SKY_GLOSS * min(specular[i] * np.float32(8), UNIT)
         up = nx[i] * lights[UP_ROW, 0] + ny[i] * lights[UP_ROW, 1] + nz[i] * lights[UP_ROW, 2]
         lobe[i] = grazing * around[i] * around[i] * (np.float32(0.7) + np.float32(0.3) * up)
     for c in range(3):
@@ -193,21 +189,21 @@ def shade_fragments(table: Array, n: int, lights: Array, scratch: Array, colour:
         if k == FIRST_LIGHT_ROW:
             visible = table[AT_EXPOSURE + 1]
         for i in range(n):
-            towards = max(nx[i] * lx + ny[i] * ly + nz[i] * lz, zero)
+            towards = max(nx[i] * lx + ny[i] * ly + nz[i] * lz, ZERO)
             hx, hy, hz = lx + view_x[i], ly + view_y[i], lz + view_z[i]
-            inverse = unit / np.sqrt(hx * hx + hy * hy + hz * hz + np.float32(1e-9))
-            middle = max((nx[i] * hx + ny[i] * hy + nz[i] * hz) * inverse, zero)
-            edge = unit - min((lx * hx + ly * hy + lz * hz) * inverse, unit)
-            fresnel = unit + (unit / REFLECTANCE - unit) * edge * edge * edge * edge * edge
+            inverse = UNIT / np.sqrt(hx * hx + hy * hy + hz * hz + np.float32(1e-9))
+            middle = max((nx[i] * hx + ny[i] * hy + nz[i] * hz) * inverse, ZERO)
+            edge = UNIT - min((lx * hx + ly * hy + lz * hz) * inverse, UNIT)
+            fresnel = UNIT + (UNIT / REFLECTANCE - UNIT) * edge * edge * edge * edge * edge
             squared = middle * middle
-            spread = squared * (rough[i] - unit) + unit
+            spread = squared * (rough[i] - UNIT) + UNIT
             first = rough[i] / spread
             tight = rough[i] * SECOND_ROUGHNESS
-            spread = squared * (tight - unit) + unit
+            spread = squared * (tight - UNIT) + UNIT
             other = tight / spread
-            shadow = (towards * (unit - depth[i]) + depth[i]) * (facing[i] * (unit - depth[i]) + depth[i])
+            shadow = (towards * (UNIT - depth[i]) + depth[i]) * (facing[i] * (UNIT - depth[i]) + depth[i])
             both = (first * first + second[i] * other * other) / shadow
-            lobe[i] = gloss[i] * fresnel * towards * both * visible[i] * min(around[i] * np.float32(1.3), unit)
+            lobe[i] = gloss[i] * fresnel * towards * both * visible[i] * min(around[i] * np.float32(1.3), UNIT)
         for c in range(3):
             shine, strength = scratch[6 + c], lights[k, 3 + c]
             for i in range(n):
@@ -215,10 +211,10 @@ def shade_fragments(table: Array, n: int, lights: Array, scratch: Array, colour:
     for c in range(3):
         matt, shine, albedo = table[AT_DIFFUSE + c], scratch[6 + c], table[AT_ALBEDO + c]
         for i in range(n):
-            hidden = unit - around[i]
-            colour[c, i] = matt[i] * albedo[i] / (unit - hidden * hidden * albedo[i] * INTERREFLECTION) + shine[i]
+            hidden = UNIT - around[i]
+            colour[c, i] = matt[i] * albedo[i] / (UNIT - hidden * hidden * albedo[i] * INTERREFLECTION) + shine[i]
     opacity = table[AT_OPACITY]
     for i in range(n):
         kept, scale = kept_hue(colour[0, i], colour[1, i], colour[2, i])
         for c in range(3):
-            colour[c, i] = opacity[i] * (scale * colour[c, i] + (unit - kept) * tone_curve(colour[c, i]))
+            colour[c, i] = opacity[i] * (scale * colour[c, i] + (UNIT - kept) * tone_curve(colour[c, i]))

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tts2face.numeric.arrays import Array
-from tts2face.numeric.kernels import kernel, vectorized_kernel
+from tts2face.numeric.kernels import HALF, UNIT, ZERO, kernel, vectorized_kernel
 from tts2face.picture.kernels.lamps import FIRST_LIGHT_ROW, FLOOR_ROW, SKY_ROW, UP_ROW
 from tts2face.picture.kernels.shade import kept_hue, tone_curve
 from tts2face.picture.kernels.tables import NORMAL
@@ -66,45 +66,42 @@ def light_strands(vertices: Array, normals: Array, tangents: Array, light: Any, 
         Out: all columns but the texture coordinates.
     """
     exposure, lights, lens = light
-    zero = np.float32(0)
-    unit = np.float32(1)
-    half = np.float32(0.5)
     for i in range(len(vertices)):
         v = vertices[i]
         px, py, pz = vertex[v, 0], vertex[v, 1], vertex[v, 2]
         depth = max(pz, np.float32(lens[3]))
         table[i, AT_X], table[i, AT_Y] = lens[1] + lens[0] * px / depth, lens[2] + lens[0] * py / depth
-        table[i, AT_NEAR] = unit / depth if pz >= lens[3] else zero
+        table[i, AT_NEAR] = UNIT / depth if pz >= lens[3] else ZERO
         nx, ny, nz = vertex[v, NORMAL], vertex[v, NORMAL + 1], vertex[v, NORMAL + 2]
         ox, oy, oz = normals[i, 0], normals[i, 1], normals[i, 2]
-        turn = CARD_NORMAL if nx * ox + ny * oy + nz * oz > zero else -CARD_NORMAL
-        nx, ny, nz = turn * nx + half * ox, turn * ny + half * oy, turn * nz + half * oz
-        scale = unit / np.sqrt(nx * nx + ny * ny + nz * nz + np.float32(1e-9))
+        turn = CARD_NORMAL if nx * ox + ny * oy + nz * oz > ZERO else -CARD_NORMAL
+        nx, ny, nz = turn * nx + HALF * ox, turn * ny + HALF * oy, turn * nz + HALF * oz
+        scale = UNIT / np.sqrt(nx * nx + ny * ny + nz * nz + np.float32(1e-9))
         nx, ny, nz = nx * scale, ny * scale, nz * scale
         tx, ty, tz = tangents[i, 0], tangents[i, 1], tangents[i, 2]
-        scale = -unit / np.sqrt(px * px + py * py + pz * pz + np.float32(1e-9))
+        scale = -UNIT / np.sqrt(px * px + py * py + pz * pz + np.float32(1e-9))
         wx, wy, wz = px * scale, py * scale, pz * scale
         up = nx * lights[UP_ROW, 0] + ny * lights[UP_ROW, 1] + nz * lights[UP_ROW, 2]
         for c in range(3):
-            middle = half * (lights[SKY_ROW, c] + lights[FLOOR_ROW, c])
-            swing = half * (lights[SKY_ROW, c] - lights[FLOOR_ROW, c])
+            middle = HALF * (lights[SKY_ROW, c] + lights[FLOOR_ROW, c])
+            swing = HALF * (lights[SKY_ROW, c] - lights[FLOOR_ROW, c])
             table[i, AT_LIGHT + c] = np.float32(1.4) * (middle + swing * up) * exposure[v, 0]
         column = AT_LOBES
         for k in range(len(lights) - FIRST_LIGHT_ROW):
             lx, ly, lz = lights[FIRST_LIGHT_ROW + k, 0], lights[FIRST_LIGHT_ROW + k, 1], lights[FIRST_LIGHT_ROW + k, 2]
             seen = exposure[v, 1 + k]
             facing, along = nx * lx + ny * ly + nz * lz, tx * lx + ty * ly + tz * lz
-            sine = np.sqrt(max(unit - along * along, zero))
-            matt = np.float32(0.55) * sine * max(np.float32(0.25) + np.float32(0.75) * facing, zero)
-            matt = (matt + np.float32(0.45) * max(facing, zero)) * seen
+            sine = np.sqrt(max(UNIT - along * along, ZERO))
+            matt = np.float32(0.55) * sine * max(np.float32(0.25) + np.float32(0.75) * facing, ZERO)
+            matt = (matt + np.float32(0.45) * max(facing, ZERO)) * seen
             for c in range(3):
                 table[i, AT_LIGHT + c] += matt * lights[FIRST_LIGHT_ROW + k, 3 + c]
             if k == SHINING_LAMPS[0] or k == SHINING_LAMPS[1]:
                 hx, hy, hz = lx + wx, ly + wy, lz + wz
-                scale = unit / np.sqrt(hx * hx + hy * hy + hz * hz + np.float32(1e-9))
+                scale = UNIT / np.sqrt(hx * hx + hy * hy + hz * hz + np.float32(1e-9))
                 table[i, column] = (tx * hx + ty * hy + tz * hz) * scale
                 table[i, column + 1] = (nx * hx + ny * hy + nz * hz) * scale
-                table[i, column + 2] = min(max(np.float32(1.6) * facing + np.float32(0.35), zero), unit) * seen
+                table[i, column + 2] = min(max(np.float32(1.6) * facing + np.float32(0.35), ZERO), UNIT) * seen
                 column += 3
 
 
@@ -115,12 +112,11 @@ def shade_strands(fragments: StrandFragments, n: int, cards: Cards, lights: Arra
     table = cards.table
     triangles = cards.triangles
     gloss = cards.gloss
-    unit, zero = np.float32(1), np.float32(0)
     for i in range(n):
         t = which[0, i]
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         wb, wc = rows[4, i], rows[5, i]
-        wa = unit - wb - wc
+        wa = UNIT - wb - wc
         for k in range(AT_LIGHT, N_STRAND_COLUMNS):
             rows[7 + k - AT_LIGHT, i] = wa * table[a, k] + wb * table[b, k] + wc * table[c, k]
         rows[12, i] *= gloss[t]
@@ -136,7 +132,7 @@ def shade_strands(fragments: StrandFragments, n: int, cards: Cards, lights: Arra
         for i in range(n):
             first = tangent[i] + (shift[i] + FIRST_SHIFT) * normal[i]
             second = tangent[i] + (shift[i] + SECOND_SHIFT) * normal[i]
-            narrow, wide = max(unit - first * first, zero), max(unit - second * second, zero)
+            narrow, wide = max(UNIT - first * first, ZERO), max(UNIT - second * second, ZERO)
             narrow *= narrow
             narrow *= narrow
             narrow *= narrow
@@ -157,6 +153,6 @@ def shade_strands(fragments: StrandFragments, n: int, cards: Cards, lights: Arra
     for k in range(3):
         light = rows[7 + k]
         for i in range(n):
-            light[i] = (scale[i] * light[i] + (unit - kept[i]) * tone_curve(light[i])) * share[i]
+            light[i] = (scale[i] * light[i] + (UNIT - kept[i]) * tone_curve(light[i])) * share[i]
         for i in range(n):
             colour[which[1, i], which[2, i], k] += light[i]

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tts2face.numeric.arrays import Array
-from tts2face.numeric.kernels import inlined_kernel, kernel
+from tts2face.numeric.kernels import UNIT, ZERO, inlined_kernel, kernel
 from tts2face.picture.kernels.strand_light import (
     AT_NEAR,
     AT_U,
@@ -169,7 +169,6 @@ def draw_strands(cards: Cards, order: Array, scene: StrandScene, band: Covered, 
     texels, levels = scene.texels, scene.levels
     first_row, side = band.first_row, band.side
     which, rows = fragments.which, fragments.rows
-    unit, zero = np.float32(1), np.float32(0)
     n_rows, width, n_samples = through.shape
     planes, passing = np.zeros((4, 3), np.float32), np.zeros(n_samples, np.float32)
     wide, slopes = np.zeros((3, 3), np.float32), np.zeros(3, np.float32)
@@ -203,20 +202,20 @@ def draw_strands(cards: Cards, order: Array, scene: StrandScene, band: Covered, 
         place = (levels[number, level, 0], levels[number, level, 1], levels[number, level, 2])
         for r in range(first, last + 1):
             py = np.float32((r + top_px + 0.5) * side)
-            least, most = row_range(wide, py, py, (zero, np.float32(width * side)))
+            least, most = row_range(wide, py, py, (ZERO, np.float32(width * side)))
             for x in range(max(int(least) // side, left), min(int(most) // side, right) + 1):  # slivers reach far
                 if is_open[r, x] == 0:
                     continue
                 px = np.float32((x + 0.5) * side)
                 wb = b_0 + b_x * px + b_y * py
                 wc = c_0 + c_x * px + c_y * py
-                wa = unit - wb - wc
+                wa = UNIT - wb - wc
                 cover = border_cover(wa, slopes[0]) * border_cover(wb, slopes[1]) * border_cover(wc, slopes[2])
-                if cover <= zero:
+                if cover <= ZERO:
                     continue
                 seen = visible_share(band, r, x, planes[3], passing) * cover
-                wb = min(max(wb, zero), unit)
-                wc = min(max(wc, zero), unit - wb)
+                wb = min(max(wb, ZERO), UNIT)
+                wc = min(max(wc, ZERO), UNIT - wb)
                 if seen <= np.float32(2e-3):
                     continue
                 red, green, blue, coverage = read_texel(
@@ -224,8 +223,8 @@ def draw_strands(cards: Cards, order: Array, scene: StrandScene, band: Covered, 
                 )
                 if coverage < LEAST_COVERAGE:
                     continue
-                shift = (red + green + blue) * np.float32(1 / 3) / cards.mean_light[number] - unit
-                shift = min(max(shift, -unit), unit) * TEXTURE_SHIFT
+                shift = (red + green + blue) * np.float32(1 / 3) / cards.mean_light[number] - UNIT
+                shift = min(max(shift, -UNIT), UNIT) * TEXTURE_SHIFT
                 if n == which.shape[1]:
                     shade_strands(fragments, n, cards, scene.lights, band.colour)
                     n = 0
@@ -233,7 +232,7 @@ def draw_strands(cards: Cards, order: Array, scene: StrandScene, band: Covered, 
                 rows[0, n], rows[1, n], rows[2, n] = red, green, blue
                 rows[3, n], rows[4, n], rows[5, n], rows[6, n] = shift, wb, wc, seen * coverage
                 n += 1
-                rest = zero
+                rest = ZERO
                 for s in range(n_samples):
                     through[r, x, s] -= passing[s] * coverage * cover
                     rest = max(rest, through[r, x, s])
