@@ -1,8 +1,6 @@
 """Reading of a folder of videos and facial captures as input of the decomposition."""
 
-from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -27,9 +25,6 @@ from tts2face.video.media import read_sound
 from tts2face.video.networks import find_bundle
 from tts2face.video.pose import head_angles, remove_pose
 from tts2face.video.resampling import resample_to_grid, trim_and_fill
-
-WorkerInputs = tuple[Path, Path | None, Face, MarkerOptions]
-FileOutcome = FaceRecording | Refusal
 
 
 def read_video_recording(video: Path, tracker: CachedTracker) -> FaceRecording:
@@ -82,7 +77,7 @@ def read_recordings(
     ready = (run_options.folder(), model, face, markers)
     captured: list[FaceRecording] = []
     refused: list[Refusal] = []
-    for number, outcome in enumerate(_read_files(files, ready, jobs), start=1):
+    for number, (_, outcome) in enumerate(map_unordered(files, _FileReader, ready, jobs), start=1):
         if isinstance(outcome, Refusal):
             refused.append(outcome)
         else:
@@ -105,21 +100,12 @@ def find_recording_files(recordings: Path) -> list[Path]:
     return sorted(file for file in found if file.name != MANIFEST)
 
 
-def _read_files(files: Sequence[Path], ready: WorkerInputs, jobs: int) -> Iterator[FileOutcome]:
-    if jobs > 1:
-        yield from (outcome for _, outcome in map_unordered(files, _read_file, _start_worker, ready, jobs))
-        return
-    worker = _FileReader(*ready)
-    for file in files:
-        yield worker.read(file)
-
-
 class _FileReader:
     def __init__(self, cache: Path, model: Path | None, face: Face, marker_options: MarkerOptions) -> None:
         self._tracker = CachedTracker(cache, model) if model is not None else None
         self._face, self._marker_options = face, marker_options
 
-    def read(self, file: Path) -> FileOutcome:
+    def __call__(self, file: Path) -> FaceRecording | Refusal:
         """A recording, or the reason for its refusal."""
         try:
             check_regular_file(file)
@@ -128,14 +114,3 @@ class _FileReader:
             return read_capture_file(file, self._face, options=self._marker_options)
         except DataError as reason:
             return Refusal(file.stem, str(reason), file, 0.0)
-
-
-_worker: list[_FileReader] = []  # of this process; filled once by the pool
-
-
-def _start_worker(*ready: Any) -> None:
-    _worker.append(_FileReader(*ready))
-
-
-def _read_file(file: Path) -> FileOutcome:
-    return _worker[0].read(file)

@@ -172,9 +172,9 @@ def _observe_tasks(
     if jobs <= 1:
         worker = _VideoReader(cache, model)
         for number, task in enumerate(tasks):
-            yield task, worker.outcomes(task, _task_share_callback(on_progress, number, of))
+            yield task, worker(task, _task_share_callback(on_progress, number, of))
         return
-    for number, done in enumerate(map_unordered(tasks, _observe_task, _start_worker, (cache, model), jobs), start=1):
+    for number, done in enumerate(map_unordered(tasks, _VideoReader, (cache, model), jobs), start=1):
         yield done
         on_progress(STEPS_PER_VIDEO * number, of)
 
@@ -189,7 +189,7 @@ class _VideoReader:
     def __init__(self, cache: Path, model: Path) -> None:
         self._tracker, self._aligner = CachedTracker(cache, model), CachedAligner(cache)
 
-    def outcomes(self, task: VideoTask, on_share: ShareCallback) -> RecordingOutcomes:
+    def __call__(self, task: VideoTask, on_share: ShareCallback = lambda _: None) -> RecordingOutcomes:
         """An observation, or the reason for its refusal, for each utterance of a video."""
         found: RecordingOutcomes = []
         try:
@@ -218,17 +218,6 @@ def split_long_recording(recordings: tuple[Recording, ...], aligner: CachedAlign
         replace(whole, name=f"{whole.name}-{number:04d}", span=span, words=words)
         for number, (span, words) in enumerate(utterances, start=1)
     )
-
-
-_worker: list[_VideoReader] = []  # of this process; filled once by the pool
-
-
-def _start_worker(cache: Path, model: Path) -> None:
-    _worker.append(_VideoReader(cache, model))
-
-
-def _observe_task(task: VideoTask) -> RecordingOutcomes:
-    return _worker[0].outcomes(task, lambda share: None)
 
 
 class RecordingChecker:

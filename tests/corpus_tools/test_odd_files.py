@@ -29,11 +29,7 @@ def recordings(tmp_path: Path) -> Path:
 
 def test_each_is_refused_by_name(recordings: Path, tmp_path: Path) -> None:
     worker = _VideoReader(tmp_path, tmp_path / "no.task")
-    found = [
-        outcome
-        for task in group_by_video(find_recordings(recordings))
-        for outcome in worker.outcomes(task, lambda share: None)
-    ]
+    found = [outcome for task in group_by_video(find_recordings(recordings)) for outcome in worker(task)]
     reasons = {outcome.name: outcome.reason for outcome in found if isinstance(outcome, Refusal)}
     assert set(reasons) == set(REASONS)
     assert [name for name, reason in REASONS.items() if reason not in reasons[name]] == []

@@ -26,11 +26,12 @@ from corpus_tools.parallel import map_unordered
 
 def start(folder):
     (Path(folder) / str(os.getpid())).touch()
+    return time.sleep
 
 if __name__ == "__main__":
     from cli.process import INTERRUPTION
     INTERRUPTION.install()
-    list(map_unordered([600.0, 600.0], time.sleep, start, (sys.argv[1],), 2))
+    list(map_unordered([600.0, 600.0], start, (sys.argv[1],), 2))
 """
 
 COMPILER = """
