@@ -1,4 +1,11 @@
-"""Transcripts of videos: Praat TextGrids, word alignments of the GRID corpus, subtitles and plain text."""
+"""Transcripts of videos: Praat TextGrids, word alignments of the GRID corpus, subtitles and plain text.
+
+The next format:
+
+1. a function from the path of a file to its `SpokenCue` objects, with a DataError where it has no word;
+2. its row in `READERS`, by its ending; files are found beside videos in the order of the rows;
+3. its name in docs/recordings.md, and its file in ``tests/corpus_tools/test_transcripts.py``.
+"""
 
 import re
 from collections.abc import Iterator

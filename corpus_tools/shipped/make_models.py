@@ -164,6 +164,8 @@ def make_mouths(making: Making) -> None:
         refine_mouth(source, name, making.out / f"{name}.face", making.kept / "traced", making.report)
 
 
+# The next model: a function that gets a `Making` and writes its file into `Making.out`, its row here after all that it
+# needs, and its row in docs/shipped.md.
 STEPS: Mapping[str, Callable[[Making], None]] = {
     "phones": make_phones,
     "talker": make_talker,
