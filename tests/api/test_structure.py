@@ -29,6 +29,19 @@ PARSES = (
 )  # fmt: skip
 # Strings that name a module of a package above their own, or of a room of tts2face above theirs.
 NAMES_HIGHER = ()
+# Modules that name a type of arrays for themselves which `tts2face.numeric.arrays` names for all.
+ARRAY_ROOM = "tts2face.numeric.arrays"
+NAMES_ARRAYS = tuple(
+    f"tts2face.photo.{name}"
+    for name in (
+        "camera", "eyes", "fit", "light", "lines", "matte", "mesh", "mouth", "photograph", "shapes",
+        "speaking_photo", "spreading", "surface", "teeth",
+    )
+)  # fmt: skip
+ARRAY_NAME = re.compile(
+    r"^(?:Array|Floats|FloatArray|Float32Array|Ints|IntArray|Mask|Pixels|RealArray) = NDArray\[[\w.]+\]$",
+    re.MULTILINE,
+)
 PARSERS = {"json": {"load", "loads", "JSONDecoder"}, "tomllib": {"load", "loads"}}
 
 
@@ -72,6 +85,12 @@ def parsers(text: str, name: str) -> Iterator[str]:
         yield name
 
 
+def array_names(text: str, name: str) -> Iterator[str]:
+    """The module, if it names a type of arrays for itself."""
+    if name != ARRAY_ROOM and ARRAY_NAME.search(text):
+        yield name
+
+
 def names_above(name: str) -> list[str]:
     """Patterns of the names of modules of higher packages, and of higher rooms of tts2face."""
     above = rooms()
@@ -109,6 +128,7 @@ def is_module(name: str) -> bool:
 COUNTS: dict[str, tuple[Find, tuple[str, ...], str]] = {
     "starts of Python": (starts_of_python, STARTS_PYTHON, f"start it in {PROCESS_ROOM}"),
     "readers of JSON or TOML": (parsers, PARSES, "use lexicon.values.json_text.parse_json or a reader that exists"),
+    "names of types of arrays": (array_names, NAMES_ARRAYS, f"import the type from {ARRAY_ROOM}"),
     "names of higher modules": (higher_names, NAMES_HIGHER, "let the higher package or room pass what is needed"),
 }
 
@@ -142,6 +162,8 @@ def test_every_way_to_write_an_exception_is_found() -> None:
     assert list(higher_names(made, "tts2face.x")) == [
         "tts2face.x: corpus_tools.run_options", "tts2face.x: cli.main"
     ]  # fmt: skip
+    assert list(array_names("import x\nFloats = NDArray[np.float64]\n", "cli.x")) == ["cli.x"]
+    assert list(array_names("FloatArray = NDArray[np.float64]\n", ARRAY_ROOM)) == []
     assert "lexicon.x: tts2face.types" in list(higher_names(made, "lexicon.x"))
     assert list(higher_names(made, "cli.x")) == []
     given = 'run("tts2face.serving.x.tasks:TASKS", "tts2face.models:run", "tts2face.serving")'
