@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,14 @@ from tts2face.sound.pauses import speech_onset
 from tts2face.types import SOUND_RATE, Waveform, exact_rate, first_sample
 
 ONSET_S = 60  # of a recording of a cue, within which its first sound lies
+
+
+class FittedRecording(NamedTuple):
+    """A request that can be synthesised, seconds of its sound, and warnings."""
+
+    request: Request
+    speech_s: float
+    warnings: list[str]
 
 
 @contextmanager
@@ -47,8 +56,8 @@ def excerpt_of(segment: Segment, request: Request) -> Iterator[Request]:
         yield replace(request, source=replace(source, audio=path))
 
 
-def fit_recording(session: Session, request: Request, segment: Segment) -> tuple[Request, float, list[str]]:
-    """A request that can be synthesised, seconds of its sound, and warnings.
+def fit_recording(session: Session, request: Request, segment: Segment) -> FittedRecording:
+    """A request that follows the recording of a segment.
 
     An excerpt of a dubbing track may contain other words than the subtitles, or none: then lips follow the sound, or
     rest.
@@ -63,23 +72,24 @@ def fit_recording(session: Session, request: Request, segment: Segment) -> tuple
             return _without_words(session, request, segment)
         seconds = segment.window_frames / float(exact_rate(request.fps))
         idle = replace(request, source=Idle(max(seconds, IDLE_LIMITS_S[0])))
-        return idle, 0.0, [f"the recording has no speech here ({_reason(wrong)})"]
+        return FittedRecording(idle, 0.0, [f"the recording has no speech here ({_reason(wrong)})"])
     found = [f"{' '.join(mismatch.words)!r}" for piece in pieces for mismatch in piece.mismatches]
     # an excerpt of a dubbing track may have other words than its subtitles
     if found and segment.audio_begin is not None:
         return _without_words(session, request, segment)
     warnings = [f"the recording probably does not contain {', '.join(found)}"] if found else []
-    return request, sum(piece.clip.speech.waveform.duration for piece in pieces), warnings
+    return FittedRecording(request, sum(piece.clip.speech.waveform.duration for piece in pieces), warnings)
 
 
-def _without_words(session: Session, request: Request, segment: Segment) -> tuple[Request, float, list[str]]:
+def _without_words(session: Session, request: Request, segment: Segment) -> FittedRecording:
     source = request.source
     assert isinstance(source, Recorded)
     wordless = replace(request, source=replace(source, lips=FromPhones("", source.lips.articulation)))
-    wordless, seconds, warnings = fit_recording(session, wordless, segment)
-    if not isinstance(wordless.source, Idle):
-        warnings = [f"the recording contains other words than {source.text[:40]!r}; lips follow its sound", *warnings]
-    return wordless, seconds, warnings
+    fitted = fit_recording(session, wordless, segment)
+    if isinstance(fitted.request.source, Idle):
+        return fitted
+    other = f"the recording contains other words than {source.text[:40]!r}; lips follow its sound"
+    return fitted._replace(warnings=[other, *fitted.warnings])
 
 
 def _reason(error: DataError) -> str:
