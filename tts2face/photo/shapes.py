@@ -164,15 +164,14 @@ def closing(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson) -> Float
     """(V, 3) displacement that closes the lips of the picture, pixels and depths."""
     if person.lips.is_closed:
         return np.zeros((len(mesh.places), 3))
-    shares = np.array([person.upper_share, person.upper_share - 1])
     ways = person.lips.lower - person.lips.upper
     numbers = np.arange(N_LIP)
     follow: dict[int, Floats] = {}
     vertex_of = mesh.vertex_of
     at_landmark = np.linspace(0, N_LIP - 1, len(INNER_LIP_UPPER))
     for line, outer, ring, share, near, far in (
-        (mesh.upper_lip, OUTER_LIP_UPPER, LIP_RINGS[0], shares[0], 1.0, 1.0),
-        (mesh.lower_lip, OUTER_LIP_LOWER, LIP_RINGS[1], shares[1], *LOWER_FOLLOW),
+        (mesh.upper_lip, OUTER_LIP_UPPER, LIP_RINGS[0], person.upper_share, 1.0, 1.0),
+        (mesh.lower_lip, OUTER_LIP_LOWER, LIP_RINGS[1], person.upper_share - 1, *LOWER_FOLLOW),
     ):
         follow |= {int(vertex): share * ways[k] for k, vertex in zip(numbers, line, strict=True)}
         for row, part in ((ring, near), (outer, far)):
@@ -182,10 +181,9 @@ def closing(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson) -> Float
                     follow.setdefault(vertex_of[number], share * part * np.array(way))
     mouth = person.landmarks[[MOUTH_CORNER_RIGHT, MOUTH_CORNER_LEFT, *MOUTH_MIDDLE], :2]
     far_off = np.linalg.norm(mesh.places[mesh.landmark_vertices][:, None] - mouth, axis=2).min(axis=1)
-    zero = np.zeros(3)
     still = [mesh.landmark_vertices[far_off > LIP_STILL * person.scale], *mesh.upper_lids, *mesh.lower_lids]
     for vertex in np.concatenate([*still, _still(mesh, FEATURES_STILL * person.scale, still)]).tolist():
-        follow.setdefault(vertex, zero)
+        follow.setdefault(vertex, np.zeros(3))
     return spreading.exact(np.array(list(follow)), np.array(list(follow.values())))
 
 
