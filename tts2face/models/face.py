@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import accumulate
 from typing import Annotated, Any
 
 import numpy as np
@@ -197,10 +198,8 @@ def keep_parts(face: Face, is_kept: Callable[[FacePart], bool]) -> Face:
 
     Lamps light it: light of its own belongs to all parts.
     """
-    kept, triangles, first = [], [np.zeros((0, 3), np.int32)], 0
-    for part in face.parts:
-        if is_kept(part):
-            kept.append(replace(part, first=first))
-            triangles.append(face.triangles[part.first : part.first + part.count])
-            first += part.count
-    return replace(face, parts=tuple(kept), triangles=np.concatenate(triangles), light=Lamps())
+    kept = [part for part in face.parts if is_kept(part)]
+    firsts = accumulate((part.count for part in kept), initial=0)  # one more than there are parts
+    parts = tuple(replace(part, first=first) for part, first in zip(kept, firsts, strict=False))
+    triangles = [face.triangles[part.first : part.first + part.count] for part in kept]
+    return replace(face, parts=parts, triangles=np.concatenate([np.zeros((0, 3), np.int32), *triangles]), light=Lamps())

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -103,13 +104,13 @@ def assemble_face(
 
 
 def _parts(built: HeadPieces, firsts: NDArray[np.integer]) -> tuple[NDArray[np.int32], list[FacePart]]:
-    triangles, parts, start = [], [], 0
-    for first, piece in zip(firsts, built.pieces, strict=False):
-        for span in piece.spans:
-            triangles.append(span.triangles + first)
-            parts.append(FacePart(span.name, start, len(span.triangles), **span.material))
-            start += len(span.triangles)
-    return np.concatenate(triangles).astype(np.int32), parts
+    spans = [(span, first) for first, piece in zip(firsts, built.pieces, strict=False) for span in piece.spans]
+    starts = accumulate((len(span.triangles) for span, _ in spans), initial=0)
+    parts = [
+        FacePart(span.name, start, len(span.triangles), **span.material)
+        for (span, _), start in zip(spans, starts, strict=False)
+    ]
+    return np.concatenate([span.triangles + first for span, first in spans]).astype(np.int32), parts
 
 
 def _eyes(built: HeadPieces, firsts: NDArray[np.integer]) -> list[Eye]:

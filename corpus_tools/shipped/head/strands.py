@@ -144,15 +144,15 @@ def streaks(angles: FloatArray, width_px: float, n_steps: int, generator: np.ran
 
 def strand_tangents(cards: Cards, angles: FloatArray) -> FloatArray:
     """(N, 3) unit vectors along the strands, downwards, of cards whose texture has the directions `angles` (H, W)."""
-    vertices, triangles, uv, weld = cards.vertices, cards.triangles, cards.uv, cards.weld
+    vertices, triangles = cards.vertices, cards.triangles
     height, width = angles.shape
     to_second, to_third = (vertices[triangles[:, k]] - vertices[triangles[:, 0]] for k in (1, 2))
-    first, second = ((uv[triangles[:, k]] - uv[triangles[:, 0]]) * [width, height] for k in (1, 2))
+    first, second = ((cards.uv[triangles[:, k]] - cards.uv[triangles[:, 0]]) * [width, height] for k in (1, 2))
     determinant = first[:, 0] * second[:, 1] - second[:, 0] * first[:, 1]
     determinant = np.where(np.abs(determinant) < 1e-6, 1e-6, determinant)[:, None]
     along_u = (to_second * second[:, 1:] - to_third * first[:, 1:]) / determinant
     along_v = (to_third * first[:, :1] - to_second * second[:, :1]) / determinant
-    texel = np.clip((uv[triangles].mean(axis=1) * [width, height]).astype(np.int64), 0, [width - 1, height - 1])
+    texel = np.clip((cards.uv[triangles].mean(axis=1) * [width, height]).astype(np.int64), 0, [width - 1, height - 1])
     angle = angles[texel[:, 1], texel[:, 0]][:, None]
     flow = unit_vectors(along_u * np.cos(angle) + along_v * np.sin(angle))
     flow *= np.where(flow[:, 1:2] > 0, -1.0, 1.0)
@@ -160,13 +160,13 @@ def strand_tangents(cards: Cards, angles: FloatArray) -> FloatArray:
     for corner in triangles.T:
         np.add.at(tangents, corner, flow)
     for _ in range(N_SMOOTHINGS):
-        tangents = _weld_mean(tangents, weld)
+        tangents = _weld_mean(tangents, cards.weld)
         face = tangents[triangles].mean(axis=1)
         spread = tangents.copy()
         for corner in triangles.T:
             np.add.at(spread, corner, face)
         tangents = spread
-    return _weld_mean(tangents, weld)
+    return _weld_mean(tangents, cards.weld)
 
 
 def _weld_mean(vectors: FloatArray, weld: IntArray) -> FloatArray:

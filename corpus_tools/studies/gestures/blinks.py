@@ -51,15 +51,11 @@ class Blinks:
 def find_blinks(shut: NDArray[np.floating], lengths: NDArray[np.int32], fps: float) -> Blinks:
     """Blinks in concatenated recordings of `lengths` (R,) frames, from lid closures (T, 2) or (T,) in 0..1."""
     lids = np.asarray(shut, np.float64).reshape(len(shut), -1).mean(axis=1)
-    n, intervals, found = 0, [np.zeros(0)], [np.zeros((0, 4))]
-    for part in np.split(lids, np.cumsum(lengths)[:-1]):
-        onsets = blink_onsets(part) / fps
-        n += len(onsets)
-        intervals.append(np.diff(onsets))
-        found.append(_blink_phases(part, fps))
-    closing, opening, closing_speeds, opening_speeds = np.concatenate(found).T
-    seconds = float(np.sum(lengths)) / fps
-    return Blinks(n, seconds, np.concatenate(intervals), closing, opening, closing_speeds, opening_speeds)
+    parts = np.split(lids, np.cumsum(lengths)[:-1])
+    onsets = [blink_onsets(part) / fps for part in parts]
+    intervals = np.concatenate([np.diff(times) for times in onsets])
+    phases = np.concatenate([_blink_phases(part, fps) for part in parts]).T
+    return Blinks(sum(map(len, onsets)), float(np.sum(lengths)) / fps, intervals, *phases)
 
 
 def blink_onsets(lids: FloatArray) -> FloatArray:

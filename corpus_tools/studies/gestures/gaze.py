@@ -101,10 +101,10 @@ def study_gaze(folder: Path, *, n_made: int = 60, seed: int = 0, model: GazeMode
 
 def compare(people: Sequence[Mapping[str, Fixations]], model: GazeModel, *, n_made: int, seed: int) -> GazeStudy:
     """Compare people with made ones, whom the model draws."""
-    measured, made, found = {}, {}, []
+    measured = {state: tuple(measures(person[state]) for person in people) for state in STATES}
+    made = {state: tuple(measures(made_person(model, state, seed + at)) for at in range(n_made)) for state in STATES}
+    found = []
     for state in STATES:
-        measured[state] = tuple(measures(person[state]) for person in people)
-        made[state] = tuple(measures(made_person(model, state, seed + at)) for at in range(n_made))
         for trait, distance in TRAITS.items():
             between = [distance(taken, other) for taken, other in combinations(measured[state], 2)]
             to_made = [distance(item, other) for item in measured[state] for other in made[state]]
