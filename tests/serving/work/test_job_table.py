@@ -281,7 +281,7 @@ def test_a_job_whose_workflow_has_ended_without_it_fails_with_the_reason(
     with open_client(url) as queue:
         queue.cancel_workflows([cancelled])
         queue.delete_workflows([removed])
-    JobRunner(url, store, open_store(store), job_blobs(store)).end_abandoned()
+    JobRunner(url, open_store(store), job_blobs(store)).end_abandoned()
     found = {name: client.table.get(name) for name in (waiting, cancelled, removed)}
     states = {name: (one.state, one.error) for name, one in found.items() if one is not None}
     assert states[waiting] == ("waiting", None)

@@ -1,8 +1,8 @@
-"""An engine that queues segments in a database, under names by their content, and waits for its workers."""
+"""Engines that queue segments in a database, under names by their content, and wait for its workers."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 from tts2face.serving.batch.engine import OnMessage, Rendered
 from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import Store, wait_for_store
-from tts2face.serving.work.connection import DatabaseAwayError
+from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
 from tts2face.serving.work.local_workers import LocalWorkers, local_workers
 from tts2face.serving.work.queues import APPLICATION, APPLICATION_VERSION, QUEUE, WORKFLOW
@@ -22,21 +22,52 @@ ACTIVE = frozenset({"PENDING", "ENQUEUED", "DELAYED"})
 
 
 @dataclass(frozen=True, slots=True)
-class DatabaseEngine:
-    """Queues segments for the workers of a database.
+class QueueEngine:
+    """Queues segments for the workers of a prepared database, which are started elsewhere.
 
     Parameters
     ----------
-    n_workers
-        Workers started on this machine while the batch runs; with 0 only those of other machines work.
+    priority
+        Jobs with smaller numbers are taken first; from 1.
+    on_message
+        Called with lines for people.
+    on_wait
+        Called at each poll of the jobs; what it raises ends the waiting.
+    """
+
+    url: str
+    priority: int
+    on_message: OnMessage = lambda _: None
+    on_wait: Callable[[], object] = lambda: None
+
+    def render(self, segments: Mapping[str, Segment], store: Store) -> Iterator[Rendered]:
+        """Yield each segment as soon as it is stored or has failed."""
+        with open_client(self.url) as client, closing(JobDatabase(self.url)) as database:
+            awaited = _Awaited(client, enqueue(client, database, segments, self.priority))
+            while awaited.waiting:
+                self.on_wait()
+                for address, reason in awaited.ended():
+                    result = wait_for_store(partial(store.result, address), self.on_message)
+                    yield Rendered(address, result, "" if result is not None else reason)
+                # the last one ends the loop at once
+                if awaited.waiting:
+                    time.sleep(POLL_S)
+
+
+@dataclass(frozen=True, slots=True)
+class DatabaseEngine:
+    """Queues the segments of a batch in a database, and starts workers on this machine.
+
+    Parameters
+    ----------
     store_url
         Store as the local workers open it.
+    n_workers
+        Workers started on this machine while the batch runs; with 0 only those of other machines work.
     priority
         Jobs with smaller numbers are taken first; from 1.
     on_message
         Called with lines for people; in other threads with those of the local workers.
-    on_wait
-        Called at each poll of the jobs; what it raises ends the waiting.
     """
 
     database: str
@@ -44,7 +75,6 @@ class DatabaseEngine:
     n_workers: int = 1
     priority: int = 10
     on_message: OnMessage = lambda _: None
-    on_wait: Callable[[], None] = lambda: None
 
     def render(self, segments: Mapping[str, Segment], store: Store) -> Iterator[Rendered]:
         """Yield each segment as soon as it is stored or has failed."""
@@ -53,19 +83,10 @@ class DatabaseEngine:
         url = database_url(self.database)
         prepare_database(url)
         here = LocalWorkers(self.database, self.store_url, self.n_workers, self.on_message)
-        with open_client(url) as client, Workers(url) as workers, local_workers(here) as supervise:
-            awaited = _Awaited(client, enqueue(client, workers, segments, self.priority))
+        with Workers(url) as workers, local_workers(here) as supervise:
             if self.n_workers == 0 and not workers.alive():
                 self.on_message("no worker is alive in this database; start `tts2face worker` with it")
-            while awaited.waiting:
-                supervise()
-                self.on_wait()
-                for address, reason in awaited.ended():
-                    result = wait_for_store(partial(store.result, address), self.on_message)
-                    yield Rendered(address, result, "" if result is not None else reason)
-                # the last one ends the loop at once
-                if awaited.waiting:
-                    time.sleep(POLL_S)
+            yield from QueueEngine(url, self.priority, self.on_message, supervise).render(segments, store)
 
 
 @dataclass(slots=True)
@@ -124,7 +145,7 @@ def open_client(url: str) -> Iterator[Any]:
         client.destroy()
 
 
-def enqueue(client: Any, workers: Workers, segments: Mapping[str, Segment], priority: int) -> dict[str, str]:
+def enqueue(client: Any, database: JobDatabase, segments: Mapping[str, Segment], priority: int) -> dict[str, str]:
     """Queue segments; their addresses by the names of their jobs.
 
     The name of a job is the content address of its segment, so that two batches share it. A job that has ended without
@@ -142,7 +163,7 @@ def enqueue(client: Any, workers: Workers, segments: Mapping[str, Segment], prio
         missing = [(name, address) for name, address in names.items() if address not in active]
         jobs = [(_enqueue_options(name, priority), address, segments[address].as_json()) for name, address in missing]
         try:
-            with workers.transaction() as change:
+            with database.transaction() as change:
                 for job in jobs:
                     client.enqueue_in_transaction(change.connection, *job)
         except (

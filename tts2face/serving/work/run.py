@@ -17,7 +17,7 @@ from tts2face.serving.batch.store import Store, wait_for_store
 from tts2face.serving.work.blobs import BlobStore, open_blobs, place_file, place_models
 from tts2face.serving.work.changes import Ending, JobChanges
 from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase, connection_errors
-from tts2face.serving.work.engine import ACTIVE, JOBS_PER_QUERY, DatabaseEngine, failure_reason, open_client
+from tts2face.serving.work.engine import ACTIVE, JOBS_PER_QUERY, QueueEngine, failure_reason, open_client
 from tts2face.serving.work.jobs import DONE, FAILED, JobFile, JobRecord
 from tts2face.serving.work.kinds import KINDS, JobCancelledError, JobTask, Product, Products
 from tts2face.storage.bucket import StoreAwayError
@@ -57,15 +57,14 @@ class JobRunner:
     ----------
     url
         URL of the database.
-    place, store
-        Store of segments, as its name and opened.
+    store
+        Store of segments.
     blobs
         Stores of files; the first one is that of jobs.
     """
 
-    def __init__(self, url: str, place: str, store: Store, blobs: Callable[[], tuple[BlobStore, ...]]) -> None:
+    def __init__(self, url: str, store: Store, blobs: Callable[[], tuple[BlobStore, ...]]) -> None:
         self._url = url
-        self._place = place
         self._store = store
         self._blobs = blobs
 
@@ -121,7 +120,7 @@ class JobRunner:
                 }
                 work = folder.path / "work"
                 work.mkdir()
-                engine = _JobEngine(watch, partial(DatabaseEngine, self._url, self._place, 0))
+                engine = _JobEngine(watch, self._url)
                 task = JobTask(
                     self._request(job), inputs, work, engine, self._store, watch.report, watch.check,
                     self._url, lambda: self._blobs()[1],
@@ -225,7 +224,7 @@ class _JobEngine:
     """Queues the segments of a job for all workers."""
 
     watch: JobWatch
-    make: Callable[..., DatabaseEngine]
+    url: str
 
     def render(self, segments: Mapping[str, Segment], store: Store) -> Iterator[Rendered]:
         """Yield each segment as soon as it is stored or has failed."""
@@ -234,7 +233,7 @@ class _JobEngine:
         self.watch.changes.note_segments(self.watch.job_id, segments)
         # short jobs first: a clip must not wait for a film that came before it
         priority = min(SMALLEST_PRIORITY + len(segments) // SEGMENTS_PER_STEP, LARGEST_PRIORITY)
-        yield from self.make(priority, on_wait=self.watch.check).render(segments, store)
+        yield from QueueEngine(self.url, priority, on_wait=self.watch.check).render(segments, store)
 
 
 def _without_folders(message: str, folder: Path) -> str:

@@ -77,7 +77,7 @@ class Worker:
         self._store: Store = open_store(store)
         blobs = job_blobs(store)
         self._segments = SegmentWorker(self._store, blobs, renderer=renderer, core=core, on_message=on_message)
-        self._jobs = JobRunner(self._url, store, self._store, blobs)
+        self._jobs = JobRunner(self._url, self._store, blobs)
         self._on_message = on_message
         self.executor_id = f"{uuid.uuid4().hex[:20]}"
         self._place = f"{socket.gethostname()}, process {os.getpid()}"

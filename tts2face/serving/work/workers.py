@@ -7,10 +7,9 @@ segment that two workers take nevertheless is rendered twice and stored once, as
 """
 
 from collections.abc import Iterable
-from contextlib import AbstractContextManager
 from typing import Any
 
-from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase, Transaction, create_tables, database_reason
+from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase, create_tables, database_reason
 from tts2face.serving.work.queues import APPLICATION_VERSION, JOB_WORKFLOW, PLACES, WORKFLOW, WORKFLOWS
 
 BEAT_S = 1.5  # between two heartbeats of a worker
@@ -52,10 +51,6 @@ class Workers:
     def create(self) -> None:
         """Create the table where it is missing; several processes may do so at once."""
         create_tables(self._database, (_TABLE,))
-
-    def transaction(self) -> AbstractContextManager[Transaction]:
-        """Context of a transaction in the database."""
-        return self._database.transaction()
 
     def now(self) -> float:
         """Seconds since 1970 by the clock of the database."""

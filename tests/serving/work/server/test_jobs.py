@@ -23,6 +23,7 @@ from tests.serving.work.conftest import ROOT, Postgres, StartWorker
 from tests.world import World
 from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import open_store
+from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database, shown_url
 from tts2face.serving.work.engine import DatabaseEngine, enqueue, open_client
 from tts2face.serving.work.local_workers import LocalWorker, LocalWorkers
@@ -49,8 +50,8 @@ worker.run(until=lambda: worker.n_rendered == 1)
 def queue(database: str, segments: dict[str, Segment], priority: int = 10) -> None:
     url = database_url(database)
     prepare_database(url)
-    with open_client(url) as client, Workers(url) as workers:
-        enqueue(client, workers, segments, priority)
+    with open_client(url) as client, closing(JobDatabase(url)) as jobs:
+        enqueue(client, jobs, segments, priority)
 
 
 def collect(database: str, segments: dict[str, Segment], tmp_path: Path) -> dict[str, str]:

@@ -5,7 +5,6 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -26,7 +25,15 @@ from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import open_store
 from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
-from tts2face.serving.work.engine import JOBS_PER_QUERY, POLL_S, DatabaseEngine, _Awaited, enqueue, open_client
+from tts2face.serving.work.engine import (
+    JOBS_PER_QUERY,
+    POLL_S,
+    DatabaseEngine,
+    QueueEngine,
+    _Awaited,
+    enqueue,
+    open_client,
+)
 from tts2face.serving.work.queue_control import cancel_jobs, list_jobs, prune_jobs
 from tts2face.serving.work.worker import MAX_POLLS_PER_S, Worker, poll_interval
 from tts2face.serving.work.worker import POLL_S as WORKER_POLL_S
@@ -138,8 +145,8 @@ def test_batches_of_the_same_segments_in_another_order_are_queued_at_once(
     n_queued: list[int] = []
 
     def enqueue_all(names: list[str]) -> None:
-        with open_client(url) as client, Workers(url) as workers:
-            n_queued.append(len(enqueue(client, workers, {name: work[name] for name in names}, 10)))
+        with open_client(url) as client, closing(JobDatabase(url)) as jobs:
+            n_queued.append(len(enqueue(client, jobs, {name: work[name] for name in names}, 10)))
 
     orders = (list(work), list(work)[::-1], sorted(work))
     threads = [threading.Thread(target=enqueue_all, args=(order,)) for order in orders]
@@ -160,9 +167,8 @@ def test_a_job_of_a_clock_a_day_ahead_delays_no_later_one(
     assert collect(database, early, tmp_path) == dict.fromkeys(early, "")
     move_by_a_day(database, "completed_at")
     work = segments("Two.", "Three.")
-    engine = DatabaseEngine(database, str(tmp_path / "store"), n_workers=0)
     n_looks: list[None] = []
-    watched = replace(engine, on_wait=lambda: n_looks.append(None))
+    watched = QueueEngine(database_url(database), 10, on_wait=lambda: n_looks.append(None))
     found = [one.reason for one in watched.render(work, open_store(tmp_path / "store"))]
     assert found == ["", ""]
     assert len(n_looks) * POLL_S < 30.0  # not by a look at all jobs, which came once in a minute
