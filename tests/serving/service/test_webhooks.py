@@ -186,7 +186,8 @@ def test_a_host_that_was_taken_out_of_the_settings_is_told_no_more(tmp_path: Pat
         def tries(name: str) -> int:
             record = client.table.get(name)
             assert record is not None
-            return record.webhook_tries
+            assert record.webhook is not None
+            return record.webhook.tries
 
         asyncio.run(run())
         assert removed.messages == []

@@ -14,14 +14,14 @@ from tests.packages import needs, reason
 pytest.importorskip("dbos", reason=reason("dbos"))
 
 from tts2face.serving.batch.store import open_store
-from tts2face.serving.work import client as job_client
+from tts2face.serving.work import changes as job_changes
 from tts2face.serving.work.blobs import open_blobs
 from tts2face.serving.work.changes import Ending, JobChanges
 from tts2face.serving.work.client import JobClient
 from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
 from tts2face.serving.work.engine import _enqueue_options, open_client
-from tts2face.serving.work.jobs import JobFile, NewJob, OtherBodyError, QueueFullError
+from tts2face.serving.work.jobs import JobFile, NewJob, OtherBodyError, QueueFullError, Webhook
 from tts2face.serving.work.queues import WORKFLOWS
 from tts2face.serving.work.run import JobRunner, job_blobs
 
@@ -142,7 +142,7 @@ def test_a_job_ends_once(client: JobClient, changes: JobChanges) -> None:
     assert changes.begin(record.id) is None
     found = client.table.get(record.id)
     assert found is not None
-    assert (found.state, found.error, found.n_done, len(found.outputs)) == ("done", None, 1, 1)
+    assert (found.state, found.error, found.progress.done, len(found.outputs)) == ("done", None, 1, 1)
     events, may_follow = client.table.events(record.id, 1)
     assert [one.content.get("state", "progress") for one in events] == ["running", "progress", "done"]
     assert [one.number for one in events] == [2, 3, 4]
@@ -245,32 +245,32 @@ def test_jobs_are_counted_by_state(client: JobClient, changes: JobChanges) -> No
 def test_a_webhook_is_taken_by_one_server_and_sent_again_until_it_arrives(
     client: JobClient, changes: JobChanges, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(job_client, "FIRST_PAUSE_S", -1.0)  # due at once
-    monkeypatch.setattr(job_client, "MAX_TRIES", 3)
+    monkeypatch.setattr(job_changes, "FIRST_PAUSE_S", -1.0)  # due at once
+    monkeypatch.setattr(job_changes, "MAX_TRIES", 3)
     record, _ = client.submit(new_job(webhook="https://example.org/done"))
-    assert client.due_webhooks() == []
+    assert client.changes.due_webhooks() == []
     changes.end(record.id, Ending("failed", error="why"))
     for number in range(3):
-        (delivery,) = due = client.due_webhooks()
+        (delivery,) = due = client.changes.due_webhooks()
         assert (delivery.job_id, delivery.key_name, delivery.n_tries) == (record.id, "ann", number)
-        assert client.due_webhooks(busy=["bob", "ann"]) == []
-        assert client.take_webhooks(due) == due
-        assert client.take_webhooks(due) == client.due_webhooks() == []  # leased
-        client.note_delivery(delivery, is_delivered=False)
+        assert client.changes.due_webhooks(busy=["bob", "ann"]) == []
+        assert client.changes.take_webhooks(due) == due
+        assert client.changes.take_webhooks(due) == client.changes.due_webhooks() == []  # leased
+        client.changes.note_delivery(delivery, is_delivered=False)
     found = client.table.get(record.id)
     assert found is not None
-    assert (found.webhook_state, found.webhook_tries) == ("failed", 3)
-    assert client.due_webhooks() == []
+    assert found.webhook == Webhook("https://example.org/done", "failed", 3)
+    assert client.changes.due_webhooks() == []
 
 
 def test_a_webhook_that_a_clock_a_day_ahead_put_off_is_due(client: JobClient, changes: JobChanges) -> None:
     record, _ = client.submit(new_job(webhook="https://example.org/done"))
     changes.end(record.id, Ending("failed", error="why"))
-    client.note_delivery(client.due_webhooks()[0], is_delivered=False)
-    assert client.due_webhooks() == []  # in a moment
+    client.changes.note_delivery(client.changes.due_webhooks()[0], is_delivered=False)
+    assert client.changes.due_webhooks() == []  # in a moment
     with client._database.transaction(is_change=True) as change:
         assert change.run("UPDATE tts2face_jobs SET webhook_due = webhook_due + 86400.0")
-    assert [one.job_id for one in client.due_webhooks()] == [record.id]
+    assert [one.job_id for one in client.changes.due_webhooks()] == [record.id]
 
 
 def test_a_job_whose_workflow_has_ended_without_it_fails_with_the_reason(

@@ -1,7 +1,6 @@
 """Jobs as the API shows them, and the envelope of a new one."""
 
 import json
-from collections.abc import Mapping
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -80,23 +79,12 @@ class JobPage(BaseModel):
 
 def job_view(record: JobRecord) -> Job:
     """A job for the list."""
-    return Job(**_fields(record))
+    return Job.model_validate(record, from_attributes=True)
 
 
 def job_detail(record: JobRecord) -> JobDetail:
     """A job with its results."""
-    return JobDetail(**_fields(record), results=[_file(file) for file in record.outputs])
-
-
-def _fields(record: JobRecord) -> Mapping[str, Any]:
-    webhook = None
-    if record.webhook is not None:
-        webhook = WebhookState(url=record.webhook, state=record.webhook_state or "", tries=record.webhook_tries)
-    return {
-        **{name: getattr(record, name) for name in ("id", "kind", "state", "created", "started", "finished", "error")},
-        "progress": Progress(done=record.n_done, of=record.n_all),
-        "webhook": webhook,
-    }
+    return JobDetail(**dict(job_view(record)), results=[_file(file) for file in record.outputs])
 
 
 def _file(file: JobFile) -> ResultFile:

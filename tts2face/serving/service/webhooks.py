@@ -15,7 +15,7 @@ import time
 from collections import Counter
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Protocol, TypeVar
 from urllib.parse import SplitResult, urlsplit
 
@@ -24,7 +24,8 @@ import h11
 from tts2face import __version__
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.settings import SECRET_PREFIX, ServiceSettings
-from tts2face.serving.work.client import JobClient, WebhookDelivery
+from tts2face.serving.work.changes import WebhookDelivery
+from tts2face.serving.work.client import JobClient
 from tts2face.serving.work.jobs import JobRecord
 
 CALL_S = 10.0  # of a whole call, however often its receiver sends a byte; services that receive webhooks answer in 5
@@ -205,9 +206,9 @@ class Webhooks:
         if keys.total() >= PLACES:
             return 0
         busy = [name for name, n_places in keys.items() if n_places >= KEY_PLACES]
-        due = await self._call(partial(JobClient.due_webhooks, busy=busy))
+        due = await self._call(lambda client: client.changes.due_webhooks(busy))
         chosen = self._with_places(due, keys)
-        for delivery in await self._call(partial(JobClient.take_webhooks, due=chosen)) if chosen else ():
+        for delivery in await self._call(lambda client: client.changes.take_webhooks(chosen)) if chosen else ():
             task = asyncio.create_task(self._deliver(delivery))
             self._sending[task] = delivery
             task.add_done_callback(self._sending.pop)
@@ -234,4 +235,4 @@ class Webhooks:
                 if host_of(urlsplit(delivery.url)) in self._settings.webhook_hosts:  # it may have been taken out since
                     secret = self._settings.webhook_secret
                     arrives = await send_message(delivery.url, record.id, self._message_of(record), secret)
-                await self._call(partial(JobClient.note_delivery, delivery=delivery, is_delivered=arrives))
+                await self._call(lambda client: client.changes.note_delivery(delivery, is_delivered=arrives))

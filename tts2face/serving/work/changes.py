@@ -1,4 +1,4 @@
-"""Changes of jobs by whoever executes them: taken, progress and end; each end happens once."""
+"""Changes of a job after it was queued: taken, progress, its end, which happens once, and the message about it."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -6,6 +6,12 @@ from typing import Any
 
 from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.jobs import INPUT, IS_OPEN, OUTPUT, JobFile, JobRecord, JobTable, insert_files, remove_unused
+
+LEASE_S = 60.0  # within which a server delivers a webhook that it has taken
+# of webhooks: the last try comes 8 hours after the first
+FIRST_PAUSE_S = 2.0
+PAUSE_FACTOR = 3.0
+MAX_TRIES = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,8 +23,19 @@ class Ending:
     error: str | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class WebhookDelivery:
+    """A webhook that is to be sent now."""
+
+    job_id: str
+    key_name: str
+    url: str
+    n_tries: int
+    due: float
+
+
 class JobChanges:
-    """Changes of jobs by whoever executes them."""
+    """Changes of the jobs of a database."""
 
     def __init__(self, database: JobDatabase) -> None:
         self._database = database
@@ -115,3 +132,51 @@ class JobChanges:
         """Call `remove` with the files that no job uses, while no job can begin to use them."""
         with self._database.transaction(is_change=True) as change:
             remove_unused(change, hashes, remove)
+
+    def due_webhooks(self, busy: Sequence[str] = (), limit: int = 1000) -> list[WebhookDelivery]:
+        """Webhooks that are to be sent now, those due longest first; none of the keys `busy`.
+
+        One that is due later than a lease or the pause after its last try lasts was put off by a clock that has been
+        set back since.
+        """
+        longest = " ".join(f"WHEN {n_tries} THEN {max(LEASE_S, _pause_s(n_tries))}" for n_tries in range(1, MAX_TRIES))
+        now = self._database.now
+        names = {f"key{number}": name for number, name in enumerate(busy)}
+        others = f"key_name NOT IN ({', '.join(f':{name}' for name in names)}) AND " if names else ""
+        query = (
+            f"SELECT id, key_name, webhook, webhook_tries, webhook_due FROM tts2face_jobs WHERE {others}"
+            f"(webhook_due <= {now} OR webhook_due > {now} + CASE webhook_tries {longest} ELSE {LEASE_S} END) "
+            "ORDER BY webhook_due LIMIT :limit"
+        )
+        with self._database.transaction() as read:
+            return [WebhookDelivery(*row) for row in read.rows(query, limit=limit, **names)]
+
+    def take_webhooks(self, due: Sequence[WebhookDelivery]) -> list[WebhookDelivery]:
+        """Those of some due webhooks that no other server has taken; none gets them for `LEASE_S`."""
+        taken = []
+        for delivery in due:
+            with self._database.transaction(is_change=True) as change:
+                if change.run(
+                    f"UPDATE tts2face_jobs SET webhook_due = {self._database.now} + :lease "
+                    "WHERE id = :id AND webhook_due = :due", id=delivery.job_id, due=delivery.due, lease=LEASE_S,
+                ):  # fmt: skip
+                    taken.append(delivery)
+        return taken
+
+    def note_delivery(self, delivery: WebhookDelivery, *, is_delivered: bool) -> None:
+        """Note that a webhook has arrived, or when it is sent again."""
+        n_tries = delivery.n_tries + 1
+        is_last = is_delivered or n_tries >= MAX_TRIES
+        due = "NULL" if is_last else f"{self._database.now} + :pause"
+        state = "delivered" if is_delivered else "failed" if is_last else "waiting"
+        pause = {} if is_last else {"pause": _pause_s(n_tries)}
+        with self._database.transaction(is_change=True) as change:
+            change.run(
+                f"UPDATE tts2face_jobs SET webhook_due = {due}, webhook_tries = :tries, webhook_state = :state "
+                "WHERE id = :id", id=delivery.job_id, tries=n_tries, state=state, **pause,
+            )  # fmt: skip
+
+
+def _pause_s(n_tries: int) -> float:
+    """Seconds between a number of tries to send a webhook and the next one."""
+    return FIRST_PAUSE_S * PAUSE_FACTOR ** (n_tries - 1)

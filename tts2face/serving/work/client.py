@@ -1,16 +1,14 @@
-"""Jobs of the service as its server sees them: submit, cancel, delete, webhooks."""
+"""Jobs of the service as its server sees them: submit, cancel, delete."""
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import Any
 
 from tts2face.serving.work.blobs import BlobStore
 from tts2face.serving.work.changes import Ending, JobChanges
 from tts2face.serving.work.connection import JobDatabase, Transaction
 from tts2face.serving.work.engine import ACTIVE, JOBS_PER_QUERY
-from tts2face.serving.work.jobs import CANCELLED, JobRecord, JobTable, NewJob
-from tts2face.serving.work.kinds import KINDS
+from tts2face.serving.work.jobs import CANCELLED, JobRecord, NewJob
 from tts2face.serving.work.queues import APPLICATION, APPLICATION_VERSION, JOB_WORKFLOW, QUEUE
 from tts2face.serving.work.usage import UsageTable
 
@@ -18,22 +16,6 @@ CONNECT_S = 2  # to PostgreSQL; then the request is refused
 SESSION_OPTIONS = "-c statement_timeout=10000 -c lock_timeout=8000"  # ms
 N_CONNECTIONS = 8
 FILES_PER_CHANGE = 100  # while all changes of jobs wait
-LEASE_S = 60.0  # within which a server delivers a webhook that it has taken
-# of webhooks: the last try comes 8 hours after the first
-FIRST_PAUSE_S = 2.0
-PAUSE_FACTOR = 3.0
-MAX_TRIES = 10
-
-
-@dataclass(frozen=True, slots=True)
-class WebhookDelivery:
-    """A webhook that is to be sent now."""
-
-    job_id: str
-    key_name: str
-    url: str
-    n_tries: int
-    due: float
 
 
 class JobClient:
@@ -55,7 +37,8 @@ class JobClient:
             system_database_url=url, application_name=APPLICATION, retry_connection_errors=False, lazy=True
         )
         self.blobs = blobs
-        self.table, self._changes = JobTable(self._database), JobChanges(self._database)
+        self.changes = JobChanges(self._database)
+        self.table = self.changes.table
         self.usage = UsageTable(self._database)
 
     def close(self) -> None:
@@ -77,7 +60,7 @@ class JobClient:
         def enqueue(change: Transaction, n_waiting: int) -> None:
             put_missing()
             options = {
-                "queue_name": KINDS[new.kind].queue,
+                "queue_name": new.queue,
                 "workflow_name": JOB_WORKFLOW,
                 "workflow_id": new.id,
                 "app_version": APPLICATION_VERSION,
@@ -90,9 +73,9 @@ class JobClient:
     def cancel(self, job_id: str) -> bool:
         """Cancel an open job, and the segments that only it uses; false if it has ended before."""
         segments = self.table.own_segments(job_id)
-        if not self._changes.end(job_id, Ending(CANCELLED, error="cancelled")):
+        if not self.changes.end(job_id, Ending(CANCELLED, error="cancelled")):
             return False
-        self._changes.forget_inputs(job_id, self.blobs.delete)
+        self.changes.forget_inputs(job_id, self.blobs.delete)
         self._client.cancel_workflows([job_id])
         for at in range(0, len(segments), JOBS_PER_QUERY):
             found = [self._active(address) for address in segments[at : at + JOBS_PER_QUERY]]
@@ -124,51 +107,8 @@ class JobClient:
 
         old = [sha256 for sha256, stored_s in self.blobs.entries() if stored_s < before]
         for at in range(0, len(old), FILES_PER_CHANGE):
-            self._changes.remove_unused(set(old[at : at + FILES_PER_CHANGE]), remove)
+            self.changes.remove_unused(set(old[at : at + FILES_PER_CHANGE]), remove)
         return n_removed
-
-    def due_webhooks(self, busy: Sequence[str] = (), limit: int = 1000) -> list[WebhookDelivery]:
-        """Webhooks that are to be sent now, those due longest first; none of the keys `busy`.
-
-        One that is due later than a lease or the pause after its last try lasts was put off by a clock that has been
-        set back since.
-        """
-        longest = " ".join(f"WHEN {n_tries} THEN {max(LEASE_S, _pause_s(n_tries))}" for n_tries in range(1, MAX_TRIES))
-        now = self._database.now
-        names = {f"key{number}": name for number, name in enumerate(busy)}
-        others = f"key_name NOT IN ({', '.join(f':{name}' for name in names)}) AND " if names else ""
-        query = (
-            f"SELECT id, key_name, webhook, webhook_tries, webhook_due FROM tts2face_jobs WHERE {others}"
-            f"(webhook_due <= {now} OR webhook_due > {now} + CASE webhook_tries {longest} ELSE {LEASE_S} END) "
-            "ORDER BY webhook_due LIMIT :limit"
-        )
-        with self._database.transaction() as read:
-            return [WebhookDelivery(*row) for row in read.rows(query, limit=limit, **names)]
-
-    def take_webhooks(self, due: Sequence[WebhookDelivery]) -> list[WebhookDelivery]:
-        """Those of some due webhooks that no other server has taken; none gets them for `LEASE_S`."""
-        taken = []
-        for delivery in due:
-            with self._database.transaction(is_change=True) as change:
-                if change.run(
-                    f"UPDATE tts2face_jobs SET webhook_due = {self._database.now} + :lease "
-                    "WHERE id = :id AND webhook_due = :due", id=delivery.job_id, due=delivery.due, lease=LEASE_S,
-                ):  # fmt: skip
-                    taken.append(delivery)
-        return taken
-
-    def note_delivery(self, delivery: WebhookDelivery, *, is_delivered: bool) -> None:
-        """Note that a webhook has arrived, or when it is sent again."""
-        n_tries = delivery.n_tries + 1
-        is_last = is_delivered or n_tries >= MAX_TRIES
-        due = "NULL" if is_last else f"{self._database.now} + :pause"
-        state = "delivered" if is_delivered else "failed" if is_last else "waiting"
-        pause = {} if is_last else {"pause": _pause_s(n_tries)}
-        with self._database.transaction(is_change=True) as change:
-            change.run(
-                f"UPDATE tts2face_jobs SET webhook_due = {due}, webhook_tries = :tries, webhook_state = :state "
-                "WHERE id = :id", id=delivery.job_id, tries=n_tries, state=state, **pause,
-            )  # fmt: skip
 
     def is_reachable(self) -> bool:
         """Whether the database answers; raises `DatabaseAwayError` if not."""
@@ -185,8 +125,3 @@ class JobClient:
             load_output=False,
         )
         return [job.workflow_id for job in found]
-
-
-def _pause_s(n_tries: int) -> float:
-    """Seconds between a number of tries to send a webhook and the next one."""
-    return FIRST_PAUSE_S * PAUSE_FACTOR ** (n_tries - 1)

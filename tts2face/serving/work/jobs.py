@@ -7,16 +7,15 @@ from typing import Any, Literal, get_args
 
 from lexicon.errors import BackendError, InputError
 from tts2face.serving.work.connection import JobDatabase, Transaction, create_tables
+from tts2face.serving.work.kinds import KINDS
 from tts2face.serving.work.queues import JOB_WORKFLOW, WORKFLOWS
 
 State = Literal["waiting", "running", "done", "failed", "cancelled"]  # of jobs, and of the studio's background work
 WAITING, RUNNING, DONE, FAILED, CANCELLED = STATES = get_args(State)
 OPEN_STATES = (WAITING, RUNNING)
 ENDINGS = (DONE, FAILED, CANCELLED)
-COLUMNS = (
-    "id", "key_name", "kind", "state", "request", "body_hash", "created", "started", "finished", "n_done", "n_all",
-    "error", "webhook", "webhook_state", "webhook_tries",
-)  # fmt: skip
+FACTS = ("id", "key_name", "kind", "state", "request", "body_hash", "created", "started", "finished", "error")
+COLUMNS = (*FACTS, "n_done", "n_all", "webhook", "webhook_state", "webhook_tries")
 INPUT, OUTPUT = "input", "output"  # roles of files
 # The column has the ending, which belongs to the results and is written with them. Of an open job it has one word for
 # ever (workers of earlier versions write another): whether it waits or runs is what DBOS says, and a begun job whose
@@ -92,6 +91,28 @@ class NewJob:
     idempotency_key: str | None = None
     webhook: str | None = None
 
+    @property
+    def queue(self) -> str:
+        """Queue of its kind."""
+        return KINDS[self.kind].queue
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Parts of a job that are done, and all of them; 0 while they are not known."""
+
+    done: int
+    of: int
+
+
+@dataclass(frozen=True, slots=True)
+class Webhook:
+    """The message about the end of a job: its URL, whether it waits, was delivered or failed, and the tries so far."""
+
+    url: str
+    state: str
+    tries: int
+
 
 @dataclass(frozen=True, slots=True)
 class JobRecord:
@@ -112,14 +133,11 @@ class JobRecord:
     request: Mapping[str, Any]
     body_hash: str
     created: float
-    started: float | None = None
-    finished: float | None = None
-    n_done: int = 0
-    n_all: int = 0
-    error: str | None = None
-    webhook: str | None = None
-    webhook_state: str | None = None
-    webhook_tries: int = 0
+    started: float | None
+    finished: float | None
+    error: str | None
+    progress: Progress
+    webhook: Webhook | None
     inputs: tuple[JobFile, ...] = field(default=())
     outputs: tuple[JobFile, ...] = field(default=())
 
@@ -140,8 +158,10 @@ class JobEvent:
 
 def record_from_row(row: Any) -> JobRecord:
     """The record of a row with `COLUMNS`."""
-    values = dict(zip(COLUMNS, row, strict=True))
-    return JobRecord(**{**values, "request": json.loads(values["request"])})
+    *facts, done, of, url, state, tries = row
+    values = dict(zip(FACTS, facts, strict=True)) | {"progress": Progress(done, of)}
+    webhook = None if url is None else Webhook(url, state, tries)
+    return JobRecord(**values | {"request": json.loads(values["request"]), "webhook": webhook})
 
 
 def event_from_row(row: Any) -> JobEvent:
