@@ -33,7 +33,7 @@ from tts2face.serving.service.decoders import (
 )
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import add_key
-from tts2face.serving.work.uploaded_file import CHILD_BYTES, DECODE, HANDLERS, MEASURE, PICTURE
+from tts2face.serving.work.uploaded_file import CHILD_BYTES, DECODE, HANDLERS, MEASURE, PICTURE, FileOrder
 from tts2face.storage import pictures
 from tts2face.storage.pictures import decoding_bytes, open_picture
 
@@ -171,7 +171,8 @@ def test_twenty_clips_with_small_files_of_large_pictures_share_the_memory(
     async def run() -> None:
         queue = Decoders()
         asked = [(f"key{number % 4}", tmp_path / f"a.{'webp' if number % 3 else 'png'}") for number in range(20)]
-        await asyncio.gather(*(queue.decode(key, (PICTURE, path, path, 4e7), "it", 60.0) for key, path in asked))
+        orders = [(key, FileOrder(PICTURE, path, path, 4e7)) for key, path in asked]
+        await asyncio.gather(*(queue.decode(key, order, "it", 60.0) for key, order in orders))
 
     asyncio.run(run())
     assert 0 < most[0] <= MEMORY_BYTES

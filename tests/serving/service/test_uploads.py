@@ -13,7 +13,7 @@ from PIL import Image
 
 from tests.processes.answered import refusal
 from tts2face.serving.service.decoders import Decoders
-from tts2face.serving.work.uploaded_file import PICTURE, SOUND, SUBTITLES, VIDEO
+from tts2face.serving.work.uploaded_file import PICTURE, SOUND, SUBTITLES, VIDEO, FileOrder
 
 RATE = 16_000
 PLAYLIST = b"#EXTM3U\n#EXT-X-TARGETDURATION:10\n#EXTINF:10,\nfile:///etc/passwd\n#EXT-X-ENDLIST\n"
@@ -137,5 +137,5 @@ def test_a_full_disk_is_not_a_fault_of_the_file(kind: str, content: bytes, tmp_p
     """The guard answers this error; a refusal would tell the client to send another file."""
     (tmp_path / "given").write_bytes(content)
     with pytest.raises(OSError, match="No space left") as full:
-        asyncio.run(Decoders().decode("a", (kind, tmp_path / "given", Path("/dev/full"), 1e6), "it", 60.0))
+        asyncio.run(Decoders().decode("a", FileOrder(kind, tmp_path / "given", Path("/dev/full"), 1e6), "it", 60.0))
     assert full.value.errno == errno.ENOSPC

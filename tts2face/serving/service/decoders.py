@@ -20,7 +20,7 @@ from tts2face.processes.parent import ChildEndedError
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.exchange import while_client_stays
 from tts2face.serving.work.tools import run_take_tool
-from tts2face.serving.work.uploaded_file import DECODE, MEASURE, PICTURE, program
+from tts2face.serving.work.uploaded_file import DECODE, MEASURE, PICTURE, FileOrder, program
 
 MAX_REASON = 300  # characters
 MEMORY_BYTES = 1 << 30  # of what is decoded at the same time; the largest picture of the default settings takes .8 GB
@@ -134,8 +134,8 @@ class Decoders:
         self._memory = MemoryBudget(MEMORY_BYTES)
         self._bodies: Counter[str] = Counter()
 
-    async def decode(self, key: str, arguments: tuple[str, Path, Path, float], name: str, timeout_s: float) -> None:
-        """Decode a file of a key (kind, source, target and limit of `uploaded_file.decode`); `name` is for messages.
+    async def decode(self, key: str, asked: FileOrder, name: str, timeout_s: float) -> None:
+        """Decode a file of a key; `name` is for messages.
 
         Raises
         ------
@@ -144,14 +144,13 @@ class Decoders:
         OSError
             The disk is full.
         """
-        kind, source, target, limit = arguments
-        order = {"kind": kind, "source": str(source), "target": str(target), "limit": limit}
+        order = asked._asdict() | {"source": str(asked.source), "target": str(asked.target)}
         async with self._uploads.turn(key):
             with while_client_stays(), _refusing(name, timeout_s):
-                async with started(program(kind)) as child:
+                async with started(program(asked.kind)) as child:
                     n_bytes = (await child.call(MEASURE, order, timeout_s=timeout_s)).content["memory_bytes"]
                     async with self._memory.reserved(n_bytes):  # the time counts from then on
-                        if kind == PICTURE:
+                        if asked.kind == PICTURE:
                             _limit_memory(child.pid, n_bytes)
                         answer = (await child.call(DECODE, order, timeout_s=timeout_s)).content
         # the child's disk is the server's: its error is raised here, as one of the server

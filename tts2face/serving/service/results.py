@@ -1,10 +1,11 @@
 """Results of synthesis processes: the messages of a `Work`, counted and cached, and the answers over HTTP with them."""
 
 import json
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import AsyncExitStack, aclosing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Protocol
 
 from fastapi import Request as HttpRequest
@@ -33,8 +34,8 @@ WARM_TEXT = "Hi."
 
 def warm_steps(settings: ServiceSettings) -> tuple[Step, ...]:
     """Steps of synthesis processes: the longest compilation first, then the voice and the models of a movie."""
-    first = {"voice": new_work(settings, kind="speech", request={"text": WARM_TEXT}),
-             "models": new_work(settings, format="mp4", request={"text": WARM_TEXT})}  # fmt: skip
+    spoken = replace(default_work(settings), request={"text": WARM_TEXT})
+    first = {"voice": replace(spoken, kind="speech"), "models": replace(spoken, format="mp4")}
     kernels = {f"kernels of {part}": f"compile_{part}" for part in ("pictures", "motion", "gestures", "sound")}
     return (
         *(Step(name, call, first["models"].models, is_shared=True) for name, call in kernels.items()),
@@ -42,15 +43,13 @@ def warm_steps(settings: ServiceSettings) -> tuple[Step, ...]:
     )
 
 
-def new_work(settings: ServiceSettings, *, models: dict[str, Any] | None = None, **fields: Any) -> Work:
-    """A `Work` with the models of the settings unless it names others."""
-    defaults = {"talker": settings.talker, "face": settings.face, "palette": settings.palette}
-    return Work(models=defaults | (models or {}), owner=_common_owner(settings), **fields)
+def default_work(settings: ServiceSettings) -> Work:
+    """A `Work` with the models of the settings.
 
-
-def _common_owner(settings: ServiceSettings) -> str:
-    """For whom processes keep finished sentences, whoever asks: the one user of a service without keys."""
-    return LOCAL_KEY.name if settings.studio and settings.keys is None else ""
+    Processes keep its finished sentences, whoever asks, for the one user of a service without keys.
+    """
+    models = {"talker": settings.talker, "face": settings.face, "palette": settings.palette}
+    return Work(models=models, owner=LOCAL_KEY.name if settings.studio and settings.keys is None else "")
 
 
 class Results:
@@ -67,10 +66,11 @@ class Results:
         self._settings, self._permissions = settings, permissions
         self._pool, self._metrics = pool, metrics
         self._cache = cache
+        self._default = default_work(settings)
 
-    def work(self, *, models: dict[str, Any] | None = None, **fields: Any) -> Work:
+    def work(self, *, models: Mapping[str, Any] = MappingProxyType({}), **fields: Any) -> Work:
         """A `Work` with the models of the settings unless it names others."""
-        return new_work(self._settings, models=models, **fields)
+        return replace(self._default, models={**self._default.models, **models}, **fields)
 
     def check_length(self, text: str) -> None:
         """Refuse a text of more than `text_characters`."""

@@ -6,7 +6,7 @@ from pathlib import Path
 from tts2face.serving.batch.content_address import file_hash
 from tts2face.serving.service.decoders import Decoders
 from tts2face.serving.service.uploads import RESOURCE_TIMEOUT_S
-from tts2face.serving.work.uploaded_file import DRAW
+from tts2face.serving.work.uploaded_file import DRAW, FileOrder
 from tts2face.storage.files import translate_disk_errors
 from tts2face.storage.shipped import find_file
 from tts2face.storage.temporary import Temporary
@@ -25,7 +25,7 @@ async def shipped_picture(decoders: Decoders, data: Path, kind: str, name: str) 
             with translate_disk_errors(path):
                 path.parent.mkdir(parents=True, exist_ok=True)
                 with Temporary(path) as temporary:
-                    arguments = f"{DRAW}{kind}", source, temporary.path, 0.0
-                    await decoders.decode("", arguments, name, RESOURCE_TIMEOUT_S)
+                    order = FileOrder(f"{DRAW}{kind}", source, temporary.path, 0.0)
+                    await decoders.decode("", order, name, RESOURCE_TIMEOUT_S)
                     temporary.replace(path)
     return path

@@ -1,6 +1,7 @@
 """Uploaded files: never opened by the server itself, never stored under a client's name."""
 
 import json
+import shutil
 import tempfile
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
@@ -8,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import UploadFile
 
 from lexicon.values.json_text import parse_json
@@ -16,7 +18,7 @@ from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.work import resource_check
 from tts2face.serving.work.resource_check import STATEMENT
-from tts2face.serving.work.uploaded_file import PICTURE, PLACES, SOUND, SUBTITLES, VIDEO
+from tts2face.serving.work.uploaded_file import PICTURE, PLACES, SOUND, SUBTITLES, VIDEO, FileOrder
 
 RESOURCE_TIMEOUT_S = 300.0  # a check takes 3 to 7 s; with other work on the machine, and kernels to compile, longer
 UPLOAD_PREFIX = "tts2face-upload-"  # of names of private folders
@@ -68,7 +70,8 @@ class UploadFolder:
         RefusedError
             They have no cues, or too many.
         """
-        path = await self._decode(f"{SUBTITLES}{encoding or ''}", name, upload, suffix, max_cues)
+        given, path = await self._save(name, upload), self.path / f"{name}{suffix}"
+        await self._check(FileOrder(SUBTITLES, given, path, max_cues, encoding), name, self.settings.decode_s)
         numbers: dict[str, float] = parse_json(Path(f"{path}.json").read_text(), name)
         return path, numbers
 
@@ -81,7 +84,7 @@ class UploadFolder:
             It is no video, too long, or its pictures are too large.
         """
         given, checked = await self._save(name, upload), self.path / f"{name}.video"
-        await self._check((VIDEO, given, checked, self.settings.video_s), name, self.settings.decode_s)
+        await self._check(FileOrder(VIDEO, given, checked, self.settings.video_s), name, self.settings.decode_s)
         facts = parse_json(checked.read_text(), name)
         return given.rename(given.with_suffix(facts["suffix"])), float(facts["seconds"])
 
@@ -92,7 +95,7 @@ class UploadFolder:
         """
         checked = self.path / "checked"
         checked.mkdir()
-        await self._check((kind, given, checked, max_bytes), f"the {kind}", RESOURCE_TIMEOUT_S)
+        await self._check(FileOrder(kind, given, checked, max_bytes), f"the {kind}", RESOURCE_TIMEOUT_S)
         return checked
 
     async def avatar(self, photo: Path, max_bytes: float) -> Path:
@@ -111,7 +114,7 @@ class UploadFolder:
         RefusedError
             It shows no face that can be moved.
         """
-        await self._check((PLACES, photo, self.path, 0.0), "the photo", RESOURCE_TIMEOUT_S)
+        await self._check(FileOrder(PLACES, photo, self.path, 0.0), "the photo", RESOURCE_TIMEOUT_S)
         found: dict[str, Any] = parse_json((self.path / resource_check.PLACES).read_text(), "the photo")
         return self.path / resource_check.SHOWN, found
 
@@ -121,12 +124,12 @@ class UploadFolder:
 
     async def _decode(self, kind: str, name: str, upload: UploadFile, suffix: str, limit: float) -> Path:
         given, decoded = await self._save(name, upload), self.path / f"{name}{suffix}"
-        await self._check((kind, given, decoded, limit), name, self.settings.decode_s)
+        await self._check(FileOrder(kind, given, decoded, limit), name, self.settings.decode_s)
         given.unlink(missing_ok=True)
         return decoded
 
-    async def _check(self, arguments: tuple[str, Path, Path, float], name: str, timeout_s: float) -> None:
-        await self.decoders.decode(self.key, arguments, name, timeout_s)
+    async def _check(self, order: FileOrder, name: str, timeout_s: float) -> None:
+        await self.decoders.decode(self.key, order, name, timeout_s)
 
     async def _save(self, name: str, upload: UploadFile) -> Path:
         path = self.path / f"{name}.upload"
@@ -135,10 +138,13 @@ class UploadFolder:
 
 
 async def save_upload(upload: UploadFile, path: Path) -> None:
-    """Write an uploaded file to a path."""
-    with path.open("wb") as file:
-        while block := await upload.read(BLOCK_BYTES):
-            file.write(block)
+    """Write an uploaded file to a path, in a thread."""
+
+    def copy() -> None:
+        with path.open("wb") as file:
+            shutil.copyfileobj(upload.file, file, BLOCK_BYTES)
+
+    await run_in_threadpool(copy)
 
 
 @asynccontextmanager

@@ -20,7 +20,7 @@ from tts2face.serving.service.state import ServiceState
 from tts2face.serving.service.uploads import MAX_TEXT_BYTES
 from tts2face.serving.studio.requests import check_project
 from tts2face.serving.studio.studio_host import StudioHost
-from tts2face.serving.work.uploaded_file import SOUND, SUBTITLES
+from tts2face.serving.work.uploaded_file import SOUND, SUBTITLES, FileOrder
 from tts2face.session.project import MAX_NAME, Project
 
 SOUND_SUFFIXES = (
@@ -108,7 +108,7 @@ async def _decoded(state: ServiceState, key: ApiKey, given: tuple[str, Path, str
     with tempfile.TemporaryDirectory(prefix="tts2face-upload-") as folder:
         target = Path(folder, f"checked{suffix}")
         try:
-            await state.decoders.decode(key.name, (kind, path, target, limit), "the file", settings.decode_s)
+            await state.decoders.decode(key.name, FileOrder(kind, path, target, limit), "the file", settings.decode_s)
         except RefusedError as refused:
             raise InputError(refused.message) from refused
         yield target

@@ -23,6 +23,7 @@ from tts2face.serving.studio.styles import Styles
 from tts2face.serving.studio.take_store import FILM, PREVIEW, READY, SOUND, TABLE, VIDEO, TakeEntry, TakeStore
 from tts2face.serving.studio.work import BackgroundWork, WorkKind
 from tts2face.serving.work.uploaded_file import SOUND as SOUND_KIND
+from tts2face.serving.work.uploaded_file import FileOrder
 from tts2face.storage.files import translate_disk_errors, write_atomically
 
 WORK, ORDER = "take", "work.json"  # kind of work, and its order in the folder of a take
@@ -82,8 +83,8 @@ class Takes:
         self._styles.check_scope(key)
         folder, settings = self.store.folder(key.name, number), self._studio.state.settings
         try:
-            arguments = SOUND_KIND, source, folder / f"new-{SOUND}", settings.sound_s
-            await self._studio.state.decoders.decode(key.name, arguments, "the sound", settings.decode_s)
+            order = FileOrder(SOUND_KIND, source, folder / f"new-{SOUND}", settings.sound_s)
+            await self._studio.state.decoders.decode(key.name, order, "the sound", settings.decode_s)
         except RefusedError as refused:
             raise InputError(refused.message) from refused
         os.replace(folder / f"new-{SOUND}", folder / SOUND)

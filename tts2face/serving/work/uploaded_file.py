@@ -2,9 +2,8 @@
 
 A file becomes a plain one (sound: mono .wav at 48 kHz; picture: .png); a resource (talker, face, palette, dictionary)
 is checked and written, with its description and picture, into the folder ``target``; ``draw-`` and its kind draw the
-picture ``target`` only; ``places`` finds lips and lids in a photo for the folder ``target``; ``subtitles-`` and an
-encoding check subtitles; a video is measured. ``limit`` is the largest duration in seconds, number of pixels or cues,
-or size in bytes.
+picture ``target`` only; ``places`` finds lips and lids in a photo for the folder ``target``; subtitles are checked, and
+a video is measured. ``limit`` is the largest duration in seconds, number of pixels or cues, or size in bytes.
 """
 
 import json
@@ -14,7 +13,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -42,7 +41,7 @@ SOUND = "sound"
 PICTURE = "picture"
 VIDEO = "video"
 DRAW = "draw-"
-SUBTITLES = "subtitles-"
+SUBTITLES = "subtitles"
 PLACES = "places"
 LIMITS = ProcessLimits(memory_bytes=2 << 30, cpu_s=60, file_bytes=1 << 30, n_files=64)
 MEDIA_BYTES = 1 << 30  # of addresses of a reader of sounds, videos and subtitles; 265 MB measured
@@ -65,6 +64,16 @@ DECODE, MEASURE = "decode", "measure"  # names of the calls
 MIB = 1 << 20
 # Memory of a child besides pixels: of Python with a decoder; with the models of a check. Measured, rounded up.
 CHILD_BYTES, RESOURCE_BYTES = 96 * MIB, 512 * MIB
+
+
+class FileOrder(NamedTuple):
+    """A file that is decoded; the encoding is that of subtitles, None where they say it."""
+
+    kind: str
+    source: Path
+    target: Path
+    limit: float
+    encoding: str | None = None
 
 
 @contextmanager
@@ -192,18 +201,19 @@ def check_subtitles(source: Path, target: Path, max_cues: float, encoding: str |
     Path(f"{target}.json").write_text(json.dumps(numbers))
 
 
-def decode(kind: str, source: Path, target: Path, limit: float) -> None:
-    """Decode or check one file of a kind.
+def decode(order: FileOrder) -> None:
+    """Decode or check a file.
 
     Raises
     ------
     RefusedFileError
         It is not what it should be.
     """
+    kind, source, target, limit, encoding = order
     if kind in RESOURCE_KINDS:
         check_resource(kind, source, target, limit)
-    elif kind.startswith(SUBTITLES):
-        check_subtitles(source, target, limit, kind.removeprefix(SUBTITLES) or None)
+    elif kind == SUBTITLES:
+        check_subtitles(source, target, limit, encoding)
     elif kind == PLACES:
         find_places(source, target)
     elif kind.startswith(DRAW):
@@ -240,7 +250,7 @@ def _photo_bytes(source: Path) -> int:
 def _decode(call: Call) -> dict[str, Any]:
     asked = call.content
     try:
-        decode(asked["kind"], Path(asked["source"]), Path(asked["target"]), float(asked["limit"]))
+        decode(FileOrder(**{**asked, "source": Path(asked["source"]), "target": Path(asked["target"])}))
     except OSError as error:
         if not is_disk_full(error):
             raise
@@ -258,7 +268,7 @@ def program(kind: str) -> Program:
 
 def _is_resource(kind: str) -> bool:
     """Whether a file of a kind is checked with models, which takes longer."""
-    return kind not in {SOUND, PICTURE, VIDEO} and not kind.startswith(SUBTITLES)
+    return kind not in {SOUND, PICTURE, VIDEO, SUBTITLES}
 
 
 HANDLERS: Mapping[str, Handler] = MappingProxyType({DECODE: _decode, MEASURE: _measure})
