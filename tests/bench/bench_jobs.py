@@ -21,13 +21,13 @@ from tests.serving.work.conftest import Postgres
 from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.segment_result import SegmentResult
 from tts2face.serving.batch.store import open_store
-from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
 from tts2face.serving.work.engine import DatabaseEngine, enqueue, open_client
 from tts2face.serving.work.local_workers import LocalWorker, LocalWorkers
 from tts2face.serving.work.queue_control import list_jobs
 from tts2face.serving.work.worker import Worker, poll_interval
 from tts2face.serving.work.workers import BEAT_S, Workers
+from tts2face.storage.sql import Database
 
 CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
 SETTINGS = "-c max_connections=1200 -c shared_preload_libraries=pg_stat_statements -c shared_buffers=512MB"
@@ -150,7 +150,7 @@ def bench_workers(place: Path, database: str, server: Postgres | None, chosen: a
     url = database_url(database)
     with workers(database, store, chosen.workers, chosen.seconds) as children:
         began = time.perf_counter()
-        with open_client(url) as client, closing(JobDatabase(url)) as table:
+        with open_client(url) as client, closing(Database(url)) as table:
             enqueue(client, table, plan.segments, 10)
         print(f"queued {len(plan.segments)} in {time.perf_counter() - began:.1f} s", flush=True)
         load = Load(server, database, children)
@@ -176,7 +176,7 @@ def bench_load(place: Path, database: str, server: Postgres | None, chosen: argp
     assert server is not None, "--database postgres"
     plan = plan_of(place, 1)
     url = database_url(database)
-    with open_client(url) as client, closing(JobDatabase(url)) as table:
+    with open_client(url) as client, closing(Database(url)) as table:
         enqueue(client, table, plan.segments, 10)
     fill_queue(database, chosen.jobs)
     interval = poll_interval(chosen.workers)
@@ -244,7 +244,7 @@ def bench_memory(place: Path, database: str, server: Postgres | None, chosen: ar
     plan = plan_of(place, chosen.jobs)
     store = place / "store"
     url = database_url(database)
-    with workers(database, store, 1, 0.0) as (child,), open_client(url) as client, closing(JobDatabase(url)) as table:
+    with workers(database, store, 1, 0.0) as (child,), open_client(url) as client, closing(Database(url)) as table:
         enqueue(client, table, plan.segments, 10)
         done = 0
         while done < chosen.jobs:

@@ -17,10 +17,10 @@ from tts2face.serving.service import job_service, readiness
 from tts2face.serving.service.preparation import Preparation, Step
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.work.changes import JobChanges
-from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
 from tts2face.serving.work.jobs import NewJob
 from tts2face.serving.work.run import CHECK_S, FULL, JobWatch
+from tts2face.storage.sql import Database
 
 MB = 1 << 20
 
@@ -178,7 +178,7 @@ def test_probes_do_not_fill_the_log(tmp_path: Path, caplog: pytest.LogCaptureFix
 def test_a_running_job_says_why_it_waits(tmp_path: Path, free: dict[str, int], monkeypatch: pytest.MonkeyPatch) -> None:
     url = database_url(tmp_path / "jobs.sqlite")
     prepare_database(url)
-    database = JobDatabase(url)
+    database = Database(url)
     try:
         changes = JobChanges(database)
         changes.table.submit(NewJob("one", "a", "clip", {}, "0"), lambda *_: None)

@@ -29,9 +29,9 @@ pytest.importorskip("dbos", reason=reason("dbos"))
 from tts2face.serving.work.blobs import open_blobs
 from tts2face.serving.work.changes import Ending, JobChanges
 from tts2face.serving.work.client import JobClient
-from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
 from tts2face.serving.work.jobs import NewJob
+from tts2face.storage.sql import Database
 
 
 def test_the_signature_is_that_of_standard_webhooks() -> None:
@@ -105,7 +105,7 @@ def client(tmp_path: Path) -> Iterator[JobClient]:
 def end_job(tmp_path: Path, client: JobClient, key: str, url: str) -> str:
     """A job of a key that has failed; its webhook is due."""
     record, _ = client.submit(NewJob(uuid.uuid4().hex, key, "clip", {"text": "Hi."}, "0" * 64, webhook=url))
-    connections = JobDatabase(database_url(str(tmp_path / "service.sqlite")))
+    connections = Database(database_url(str(tmp_path / "service.sqlite")))
     assert JobChanges(connections).end(record.id, Ending("failed", error="why"))
     connections.close()
     return record.id

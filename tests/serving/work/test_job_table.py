@@ -18,12 +18,12 @@ from tts2face.serving.work import changes as job_changes
 from tts2face.serving.work.blobs import open_blobs
 from tts2face.serving.work.changes import Ending, JobChanges
 from tts2face.serving.work.client import JobClient
-from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
 from tts2face.serving.work.engine import _enqueue_options, open_client
 from tts2face.serving.work.jobs import JobFile, NewJob, OtherBodyError, QueueFullError, Webhook
 from tts2face.serving.work.queues import WORKFLOWS
 from tts2face.serving.work.run import JobRunner, job_blobs
+from tts2face.storage.sql import Database, DatabaseAwayError
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def client(database: str, tmp_path: Path) -> Iterator[JobClient]:
 
 @pytest.fixture
 def changes(database: str) -> Iterator[JobChanges]:
-    connections = JobDatabase(database_url(database))
+    connections = Database(database_url(database))
     yield JobChanges(connections)
     connections.close()
 

@@ -13,11 +13,11 @@ from tests.models.made import write_made_talker
 from tests.serving.work.stub_builder import MADE, ORDER
 from tts2face.serving.work import tools
 from tts2face.serving.work.blobs import open_blobs
-from tts2face.serving.work.connection import DatabaseAwayError
 from tts2face.serving.work.database import database_url
 from tts2face.serving.work.kinds import JobCancelledError, JobTask, Products
 from tts2face.serving.work.resources import ResourceTable
 from tts2face.serving.work.talker_job import run_talker
+from tts2face.storage.sql import DatabaseAwayError
 
 Run = Callable[..., Products]
 

@@ -14,9 +14,9 @@ from tts2face.serving.service.access import RateLimits
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.work import usage
-from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase
 from tts2face.serving.work.database import database_url
 from tts2face.serving.work.usage import SharedUsage, Spent, UsageTable
+from tts2face.storage.sql import Database, DatabaseAwayError
 
 FIVE = ApiKey("a", "", requests_per_minute=5, concurrent=3, speech_s_per_day=100)
 
@@ -33,7 +33,7 @@ class Server:
     """
 
     def __init__(self, url: str, name: str) -> None:
-        self.database, self.name, self.now = JobDatabase(url), name, 0.0
+        self.database, self.name, self.now = Database(url), name, 0.0
         self.table, self.limits = UsageTable(self.database), RateLimits(lambda: self.now)
 
     def n_allowed(self, n: int, key: ApiKey = FIVE) -> int:

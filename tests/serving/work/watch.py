@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from tts2face.serving.batch.store import RESULT_SUFFIX
-from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import database_url
+from tts2face.storage.sql import Database
 
 INTERVAL_S = 0.5
 
@@ -62,7 +62,7 @@ class StoreWatch:
 
 def ends_of_jobs(database: str) -> tuple[Mapping[str, int], Mapping[str, int]]:
     """How often each job of the service was done, and its number of results."""
-    opened = JobDatabase(database_url(database))
+    opened = Database(database_url(database))
     try:
         with opened.transaction() as look:
             done = '%"state": "done"%'

@@ -23,13 +23,13 @@ from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.webhooks import Webhooks
 from tts2face.serving.work.blobs import open_blobs
 from tts2face.serving.work.client import JobClient
-from tts2face.serving.work.connection import DatabaseAwayError, connection_errors
 from tts2face.serving.work.database import database_url, prepare_database, shown_url
 from tts2face.serving.work.jobs import STATES, OtherBodyError, QueueFullError
 from tts2face.serving.work.local_workers import LocalWorkers, local_workers
 from tts2face.serving.work.queue_control import prune_jobs, unfinished_segments
 from tts2face.serving.work.run import BLOBS
 from tts2face.storage.files import translate_disk_errors
+from tts2face.storage.sql import DatabaseAwayError, connection_errors
 
 Value = TypeVar("Value")
 RETRY_S = 2.0  # between two tries to open the database

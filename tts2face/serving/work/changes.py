@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.jobs import INPUT, IS_OPEN, OUTPUT, JobFile, JobRecord, JobTable, insert_files, remove_unused
+from tts2face.storage.sql import Database
 
 LEASE_S = 60.0  # within which a server delivers a webhook that it has taken
 # of webhooks: the last try comes 8 hours after the first
@@ -37,7 +37,7 @@ class WebhookDelivery:
 class JobChanges:
     """Changes of the jobs of a database."""
 
-    def __init__(self, database: JobDatabase) -> None:
+    def __init__(self, database: Database) -> None:
         self._database = database
         self.table = JobTable(database)
 

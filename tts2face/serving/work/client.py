@@ -6,11 +6,11 @@ from typing import Any
 
 from tts2face.serving.work.blobs import BlobStore
 from tts2face.serving.work.changes import Ending, JobChanges
-from tts2face.serving.work.connection import JobDatabase, Transaction
 from tts2face.serving.work.engine import ACTIVE, JOBS_PER_QUERY
 from tts2face.serving.work.jobs import CANCELLED, JobRecord, NewJob
 from tts2face.serving.work.queues import APPLICATION, APPLICATION_VERSION, JOB_WORKFLOW, QUEUE
 from tts2face.serving.work.usage import UsageTable
+from tts2face.storage.sql import Database, Transaction
 
 CONNECT_S = 2  # to PostgreSQL; then the request is refused
 SESSION_OPTIONS = "-c statement_timeout=10000 -c lock_timeout=8000"  # ms
@@ -32,7 +32,7 @@ class JobClient:
     def __init__(self, url: str, blobs: BlobStore) -> None:
         from dbos import DBOSClient
 
-        self._database = JobDatabase(url, n_connections=N_CONNECTIONS, connect_s=CONNECT_S, options=SESSION_OPTIONS)
+        self._database = Database(url, n_connections=N_CONNECTIONS, connect_s=CONNECT_S, options=SESSION_OPTIONS)
         self._client: Any = DBOSClient(
             system_database_url=url, application_name=APPLICATION, retry_connection_errors=False, lazy=True
         )

@@ -6,14 +6,14 @@ from contextlib import closing
 from pathlib import Path
 
 from lexicon.errors import BackendError, InputError
-from tts2face.serving.work.connection import (
-    DatabaseAwayError,
-    JobDatabase,
-    database_reason,
-)
 from tts2face.serving.work.jobs import JobTable
 from tts2face.serving.work.usage import UsageTable
 from tts2face.serving.work.workers import Workers
+from tts2face.storage.sql import (
+    Database,
+    DatabaseAwayError,
+    database_reason,
+)
 
 DEFAULT_DATABASE = "tts2face-jobs.sqlite"
 POSTGRES_SCHEMES = ("postgresql://", "postgres://", "postgresql+psycopg://")
@@ -62,7 +62,7 @@ def prepare_database(url: str) -> None:
         DBOS.migrate(url)
         with Workers(url) as workers:
             workers.create()
-        jobs = JobDatabase(url)
+        jobs = Database(url)
         try:
             JobTable(jobs).create()
             UsageTable(jobs).create()

@@ -10,11 +10,11 @@ from typing import Any
 from tts2face.serving.batch.engine import OnMessage, Rendered
 from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import Store, wait_for_store
-from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
 from tts2face.serving.work.local_workers import LocalWorkers, local_workers
 from tts2face.serving.work.queues import APPLICATION, APPLICATION_VERSION, QUEUE, WORKFLOW
 from tts2face.serving.work.workers import Workers
+from tts2face.storage.sql import Database, DatabaseAwayError
 
 POLL_S = 0.5  # between two polls of the jobs that are awaited
 JOBS_PER_QUERY = 500
@@ -42,7 +42,7 @@ class QueueEngine:
 
     def render(self, segments: Mapping[str, Segment], store: Store) -> Iterator[Rendered]:
         """Yield each segment as soon as it is stored or has failed."""
-        with open_client(self.url) as client, closing(JobDatabase(self.url)) as database:
+        with open_client(self.url) as client, closing(Database(self.url)) as database:
             awaited = _Awaited(client, enqueue(client, database, segments, self.priority))
             while awaited.waiting:
                 self.on_wait()
@@ -145,7 +145,7 @@ def open_client(url: str) -> Iterator[Any]:
         client.destroy()
 
 
-def enqueue(client: Any, database: JobDatabase, segments: Mapping[str, Segment], priority: int) -> dict[str, str]:
+def enqueue(client: Any, database: Database, segments: Mapping[str, Segment], priority: int) -> dict[str, str]:
     """Queue segments; their addresses by the names of their jobs.
 
     The name of a job is the content address of its segment, so that two batches share it. A job that has ended without

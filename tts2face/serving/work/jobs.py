@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
 from lexicon.errors import BackendError, InputError
-from tts2face.serving.work.connection import JobDatabase, Transaction, create_tables
 from tts2face.serving.work.kinds import KINDS
 from tts2face.serving.work.queues import JOB_WORKFLOW, WORKFLOWS
+from tts2face.storage.sql import Database, Transaction, create_tables
 
 State = Literal["waiting", "running", "done", "failed", "cancelled"]  # of jobs, and of the studio's background work
 WAITING, RUNNING, DONE, FAILED, CANCELLED = STATES = get_args(State)
@@ -186,7 +186,7 @@ class JobTable:
         Its connections.
     """
 
-    def __init__(self, database: JobDatabase) -> None:
+    def __init__(self, database: Database) -> None:
         self.database = database
         running = _RUNNING.format(workflows=WORKFLOWS[database.kind])
         self._state = f"CASE WHEN NOT {IS_OPEN} THEN state WHEN id IN ({running}) THEN 'running' ELSE 'waiting' END"

@@ -8,12 +8,12 @@ from typing import Any
 
 from lexicon.errors import InputError
 from tts2face.serving.batch.segment import segment_from_json
-from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
 from tts2face.serving.work.engine import ACTIVE, JOBS_PER_QUERY, enqueue, failure_reason, open_client
 from tts2face.serving.work.jobs import CANCELLED, FAILED, State
 from tts2face.serving.work.queues import JOB_WORKFLOW, WORKFLOW
 from tts2face.serving.work.workers import Workers
+from tts2face.storage.sql import Database
 
 STATES: Mapping[str, State] = {
     "ENQUEUED": "waiting",
@@ -100,7 +100,7 @@ def retry_jobs(database: str, names: Sequence[str] = (), priority: int | None = 
     """Queue failed and cancelled jobs again by name, or all of them; their number."""
     ended = frozenset(status for status, state in STATES.items() if state in (FAILED, CANCELLED))
     url = _prepared(database)
-    with open_client(url) as client, closing(JobDatabase(url)) as jobs:
+    with open_client(url) as client, closing(Database(url)) as jobs:
         chosen = [_find(client, name) for name in names] if names else _of_states(client, ended)
         latest = {job.workflow_id.partition(".")[0]: job for job in chosen if job.status in ended}
         for address, job in latest.items():

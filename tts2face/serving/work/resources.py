@@ -10,8 +10,8 @@ from typing import Any
 
 from lexicon.values.json_text import parse_json
 from tts2face.serving.work.blobs import BlobStore
-from tts2face.serving.work.connection import JobDatabase, Transaction, create_tables
 from tts2face.serving.work.resource_check import CONTENT, DESCRIPTION, PICTURE
+from tts2face.storage.sql import Database, Transaction, create_tables
 
 # The second table has one row; its update is the lock under which names, quotas and contents are changed.
 _TABLES = (
@@ -105,7 +105,7 @@ class ResourceTable:
     """
 
     def __init__(self, url: str) -> None:
-        self._database = JobDatabase(url)
+        self._database = Database(url)
         self._is_created = False
 
     def close(self) -> None:

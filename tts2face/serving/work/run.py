@@ -16,11 +16,11 @@ from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import Store, wait_for_store
 from tts2face.serving.work.blobs import BlobStore, open_blobs, place_file, place_models
 from tts2face.serving.work.changes import Ending, JobChanges
-from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase, connection_errors
 from tts2face.serving.work.engine import ACTIVE, JOBS_PER_QUERY, QueueEngine, failure_reason, open_client
 from tts2face.serving.work.jobs import DONE, FAILED, JobFile, JobRecord
 from tts2face.serving.work.kinds import KINDS, JobCancelledError, JobTask, Product, Products
 from tts2face.storage.bucket import StoreAwayError
+from tts2face.storage.sql import Database, DatabaseAwayError, connection_errors
 from tts2face.storage.temporary import Temporary
 from tts2face.storage.user_folders import without_folders
 
@@ -103,7 +103,7 @@ class JobRunner:
 
     @contextmanager
     def _changes(self) -> Iterator[JobChanges]:
-        database = JobDatabase(self._url, n_connections=2)
+        database = Database(self._url, n_connections=2)
         try:
             yield JobChanges(database)
         finally:

@@ -12,11 +12,11 @@ from typing import Any
 from lexicon.errors import DataError
 from tts2face.processes.message import Message
 from tts2face.processes.parent import Child
-from tts2face.serving.work.connection import DatabaseAwayError
 from tts2face.serving.work.kinds import JobTask, Product, Products
 from tts2face.serving.work.resource_check import TALKER
 from tts2face.serving.work.resources import ResourceTable, Usage, keep_files, over_quota, resource_from_folder
 from tts2face.serving.work.tools import TALKER_TOOL, limits_of, talker_build
+from tts2face.storage.sql import DatabaseAwayError
 
 AWAY_S = 2.0  # between tries to reach the database
 N_SHOWN_NOTES = 20  # refused parts, and warnings, that are reported

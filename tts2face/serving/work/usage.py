@@ -6,7 +6,7 @@ Each server adds what it has counted since it last did, and reads what the other
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from tts2face.serving.work.connection import JobDatabase, Transaction, create_tables
+from tts2face.storage.sql import Database, Transaction, create_tables
 
 SHARED = ""  # server of the rows that all servers write
 RUNS_S = 6.0  # for which a server that says no more counts as running what it ran; rows of this time are read again
@@ -52,7 +52,7 @@ class SharedUsage:
 class UsageTable:
     """Usage of keys in a database."""
 
-    def __init__(self, database: JobDatabase) -> None:
+    def __init__(self, database: Database) -> None:
         self._database, self._read_until = database, 0.0
         kind, now = database.kind, database.now
         refilled = f"{LARGER[kind]}({now} - tts2face_key_usage.at, 0.0) * :most / :period"

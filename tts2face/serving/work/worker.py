@@ -20,7 +20,6 @@ from lexicon.errors import BackendError
 from tts2face.processes.child import Call, Handler
 from tts2face.serving.batch.engine import OnMessage, SegmentRenderer
 from tts2face.serving.batch.store import Store, open_store
-from tts2face.serving.work.connection import DatabaseAwayError, database_reason
 from tts2face.serving.work.database import database_url, prepare_database, quiet_dbos
 from tts2face.serving.work.pauses import EnginePauses
 from tts2face.serving.work.queues import (
@@ -34,6 +33,7 @@ from tts2face.serving.work.queues import (
 from tts2face.serving.work.run import JobRunner, job_blobs
 from tts2face.serving.work.segment_worker import SegmentWorker, is_cancelled
 from tts2face.serving.work.workers import BEAT_S, Workers, list_running, return_work
+from tts2face.storage.sql import DatabaseAwayError, database_reason
 
 POLL_S = 0.2  # between two polls of the queue
 MAX_POLLS_PER_S = 200.0  # of all workers together: with more than 40, each polls less often

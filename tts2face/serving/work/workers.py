@@ -9,8 +9,8 @@ segment that two workers take nevertheless is rendered twice and stored once, as
 from collections.abc import Iterable
 from typing import Any
 
-from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase, create_tables, database_reason
 from tts2face.serving.work.queues import APPLICATION_VERSION, JOB_WORKFLOW, PLACES, WORKFLOW, WORKFLOWS
+from tts2face.storage.sql import Database, DatabaseAwayError, create_tables, database_reason
 
 BEAT_S = 1.5  # between two heartbeats of a worker
 DEAD_AFTER_S = 6.0  # without a heartbeat; with the interval of polling this is below 10 s
@@ -32,7 +32,7 @@ class Workers:
     """Table of workers with the time of their last heartbeat, by the clock of the database."""
 
     def __init__(self, url: str) -> None:
-        self._database = JobDatabase(url)
+        self._database = Database(url)
         self._now = self._database.now
         self._table = WORKFLOWS[self._database.kind]
         self._waiting = f"SELECT 1 FROM {self._table} WHERE {_WAITS} AND {_OURS} LIMIT 1"

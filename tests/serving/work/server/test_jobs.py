@@ -23,13 +23,13 @@ from tests.serving.work.conftest import ROOT, Postgres, StartWorker
 from tests.world import World
 from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import open_store
-from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database, shown_url
 from tts2face.serving.work.engine import DatabaseEngine, enqueue, open_client
 from tts2face.serving.work.local_workers import LocalWorker, LocalWorkers
 from tts2face.serving.work.queue_control import cancel_jobs, list_jobs, prune_jobs, retry_jobs, show_job
 from tts2face.serving.work.queues import APPLICATION_VERSION
 from tts2face.serving.work.workers import DEAD_AFTER_S, Workers
+from tts2face.storage.sql import Database
 
 Segments = Callable[..., dict[str, Segment]]
 Rendered = Callable[[], list[tuple[str, int]]]
@@ -50,7 +50,7 @@ worker.run(until=lambda: worker.n_rendered == 1)
 def queue(database: str, segments: dict[str, Segment], priority: int = 10) -> None:
     url = database_url(database)
     prepare_database(url)
-    with open_client(url) as client, closing(JobDatabase(url)) as jobs:
+    with open_client(url) as client, closing(Database(url)) as jobs:
         enqueue(client, jobs, segments, priority)
 
 

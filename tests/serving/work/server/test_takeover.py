@@ -23,7 +23,6 @@ from tests.serving.work.server.test_jobs import collect, queue
 from tests.serving.work.stub_worker import Stub
 from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import open_store
-from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
 from tts2face.serving.work.engine import (
     JOBS_PER_QUERY,
@@ -38,6 +37,7 @@ from tts2face.serving.work.queue_control import cancel_jobs, list_jobs, prune_jo
 from tts2face.serving.work.worker import MAX_POLLS_PER_S, Worker, poll_interval
 from tts2face.serving.work.worker import POLL_S as WORKER_POLL_S
 from tts2face.serving.work.workers import BEAT_S, DEAD_AFTER_S, Workers
+from tts2face.storage.sql import Database
 
 Segments = Callable[..., dict[str, Segment]]
 
@@ -145,7 +145,7 @@ def test_batches_of_the_same_segments_in_another_order_are_queued_at_once(
     n_queued: list[int] = []
 
     def enqueue_all(names: list[str]) -> None:
-        with open_client(url) as client, closing(JobDatabase(url)) as jobs:
+        with open_client(url) as client, closing(Database(url)) as jobs:
             n_queued.append(len(enqueue(client, jobs, {name: work[name] for name in names}, 10)))
 
     orders = (list(work), list(work)[::-1], sorted(work))
@@ -206,7 +206,7 @@ def test_all_jobs_of_a_large_batch_are_looked_at(monkeypatch: pytest.MonkeyPatch
 def move_by_a_day(database: str, column: str) -> None:
     """Move times of the engine's table into the future, as a clock that was ahead has left them."""
     url = database_url(database)
-    jobs = JobDatabase(url)
+    jobs = Database(url)
     table = "workflow_status" if jobs.kind == "sqlite" else "dbos.workflow_status"
     with jobs.transaction() as change:
         assert change.run(f"UPDATE {table} SET {column} = {column} + 86400000")

@@ -1,4 +1,4 @@
-"""Connections to the database of jobs: SQLite or PostgreSQL, with transactions whose failures are `BackendError`."""
+"""A database, SQLite or PostgreSQL: transactions whose failures are `BackendError`, and the creation of tables."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -9,9 +9,9 @@ from lexicon.errors import BackendError
 
 NOW = {"sqlite": "(julianday('now') - 2440587.5) * 86400.0", "postgresql": "EXTRACT(EPOCH FROM clock_timestamp())"}
 N_CREATE_TRIES, CREATE_PAUSE_S = 5, 0.2  # of tables that another process may be creating
-LOCK_KEY = 5_742_301  # of PostgreSQL's advisory lock for changes of jobs
-# SQLite begins a transaction, and takes its lock for writing, with the first statement that changes something.
-_LOCK = {"sqlite": "DELETE FROM tts2face_jobs WHERE id = ''", "postgresql": f"SELECT pg_advisory_xact_lock({LOCK_KEY})"}
+LOCK_KEY = 5_742_301  # of PostgreSQL's advisory lock for transactions that wait for each other
+# SQLite's driver begins a transaction with the first change; this one begins with the lock for writing.
+_LOCK = {"sqlite": "BEGIN IMMEDIATE", "postgresql": f"SELECT pg_advisory_xact_lock({LOCK_KEY})"}
 
 
 class DatabaseAwayError(BackendError):
@@ -35,8 +35,8 @@ def database_reason(error: Exception, n_characters: int = 200) -> str:
     return " ".join(str(getattr(error, "orig", None) or error).split())[:n_characters]
 
 
-class JobDatabase:
-    """Transactions in the tables of jobs."""
+class Database:
+    """Transactions in a database, by its URL."""
 
     def __init__(self, url: str, *, n_connections: int = 4, connect_s: int = 5, options: str = "") -> None:
         import sqlalchemy
@@ -109,7 +109,7 @@ class Transaction:
         return self.connection.execute(self._sql(statement), values).scalar()
 
 
-def create_tables(database: JobDatabase, statements: Sequence[str]) -> None:
+def create_tables(database: Database, statements: Sequence[str]) -> None:
     """Create tables where they are missing; several processes may do so at once."""
 
     def create() -> None:
