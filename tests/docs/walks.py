@@ -41,9 +41,12 @@ from tests.serving.service.receiver import Receiver
 from tests.serving.studio.chromium import Browser
 from tts2face.serving.service.keys import LOCAL_KEY
 from tts2face.serving.studio.recordings import RecordingStore
+from tts2face.serving.work.database import database_url
+from tts2face.serving.work.workers import Workers
 
 TEXT = "We were away a year ago, but Bob may move five big maps."
-IDLE_S = 10.0  # of a server that is asked for the list of voices alone
+IDLE_S = 10.0  # of a server that is asked for the list of voices and a page alone
+OTHERS = ("/v1/voices", "/studio/")
 PICTURE = ("--size", "96x96", "--fps", "10")
 SRT = b"1\n00:00:00,500 --> 00:00:02,500\nANN: Hello there.\n"
 TAKES = {
@@ -113,12 +116,15 @@ class Traced:
 
     @contextmanager
     def server(self, **settings: str) -> Iterator[ServeProcess]:
-        """A service that is ready, with one synthesis process and one worker."""
+        """A service that is ready, with one synthesis process and one worker, which both have begun to wait."""
         process = ServeProcess(environment=self._environment | settings)
         try:
             process.wait_until_ready()
+            with Workers(database_url(Path(process.data.name) / "service.sqlite")) as workers:
+                eventually(workers.alive, 120)
             with self.recorded():
-                httpx.get(f"{process.url}/v1/voices").raise_for_status()
+                for path in OTHERS:
+                    httpx.get(f"{process.url}{path}", timeout=120).raise_for_status()
                 time.sleep(IDLE_S)
             self._idle = set(self._read())
             yield process

@@ -3,6 +3,7 @@
 Python imports this module by its name when it starts. `PYTHONWALK` names a folder with a file ``on``, whose only byte
 switches the record on and off for all processes, and `PYTHONWALK_ROOT` the checkout. Each process appends to a file of
 its own: nanoseconds, and the function as ``file:line:name``, once; what runs while modules are imported is left out.
+Calls in `ALWAYS` do not wait for the switch: its processes start and poll by themselves, some of it once in a minute.
 """
 
 import mmap
@@ -14,6 +15,7 @@ from types import CodeType, FrameType
 from typing import Any
 
 PACKAGES = ("cli", "corpus_tools", "tts2face", "lexicon")
+ALWAYS = "tts2face/serving/work/"
 
 
 def start(folder: str, root: str) -> None:
@@ -22,11 +24,12 @@ def start(folder: str, root: str) -> None:
         is_on = mmap.mmap(switch.fileno(), 1)
     out = open(f"{folder}/{os.getpid()}-{time.time_ns()}.calls", "a", buffering=1, encoding="utf-8")  # noqa: SIM115
     tops = tuple(f"{root}/{package}/" for package in PACKAGES)
+    always = f"{root}/{ALWAYS}"
     seen: set[CodeType] = set()
 
     def record(frame: FrameType, event: str, _argument: Any) -> None:
         code = frame.f_code
-        if event != "call" or not is_on[0] or code in seen or not code.co_filename.startswith(tops):
+        if event != "call" or code in seen or not code.co_filename.startswith(tops if is_on[0] else always):
             return
         if not is_import(frame):
             seen.add(code)

@@ -232,7 +232,7 @@ def test_no_format_takes_more_memory_than_is_said(tmp_path: Path, name: str) -> 
 def test_a_decoder_takes_no_more_than_is_reserved_for_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever a file makes of its head: here the decoder gets 100 MB too little."""
     (tmp_path / "given").write_bytes(one_colour("PNG", 6300))
-    asked = PICTURE, tmp_path / "given", tmp_path / "made", 4e7
+    asked = FileOrder(PICTURE, tmp_path / "given", tmp_path / "made", 4e7)
     asyncio.run(Decoders().decode("a", asked, "it", 120.0))
     with Image.open(tmp_path / "made") as made:
         assert made.size == (6300, 6300)
