@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from tests.serving.work.conftest import Postgres
-from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
 from tts2face.serving.work.jobs import CANCELLED, DONE, FAILED, OPEN_STATES, RUNNING, WAITING, JobTable
 from tts2face.serving.work.queues import JOB_QUEUE, JOB_WORKFLOW, QUEUE, WORKFLOW, WORKFLOWS
+from tts2face.storage.sql import Database
 
 N_KEYS = 20
 N_RUNNING = 8
@@ -35,7 +35,7 @@ def state_of(number: int, n_jobs: int) -> str:
     return FAILED if number % 101 == 0 else CANCELLED if number % 211 == 0 else DONE
 
 
-def fill(database: JobDatabase, n_jobs: int) -> None:
+def fill(database: Database, n_jobs: int) -> None:
     """Jobs with their workflows and segments."""
     jobs: list[dict[str, Any]] = []
     workflows: list[dict[str, Any]] = []
@@ -81,7 +81,7 @@ def questions(table: JobTable) -> Iterator[tuple[str, Callable[[], Any]]]:
     yield "numbers by state", table.counts
 
 
-def measure(database: JobDatabase) -> None:
+def measure(database: Database) -> None:
     """Print the least milliseconds of each question, which other work on the machine disturbs least."""
     table = JobTable(database)
     for name, ask in questions(table):
@@ -111,7 +111,7 @@ def main() -> None:
             place = server.database()
         url = database_url(place)
         prepare_database(url)
-        database = JobDatabase(url)
+        database = Database(url)
         stack.callback(database.close)
         with database.transaction() as read:
             is_new = not read.value("SELECT count(*) FROM tts2face_jobs")
