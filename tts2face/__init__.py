@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from tts2face.interchange.characters.saving import save_face as save_face
     from tts2face.interchange.subtitles.cues import Cue as Cue
     from tts2face.interchange.subtitles.cues import Subtitles as Subtitles
+    from tts2face.interchange.subtitles.options import SubtitleOptions as SubtitleOptions
     from tts2face.interchange.subtitles.reader import read_subtitles as read_subtitles
     from tts2face.models.face import Face as Face
     from tts2face.models.face_loading import load_face as load_face
@@ -109,6 +110,7 @@ __all__ = [
     "Session",
     "Speech",
     "Spoken",
+    "SubtitleOptions",
     "Subtitles",
     "Talker",
     "Trajectory",
@@ -184,6 +186,7 @@ _MODULES = {
     "tts2face.session.session": ("Session",),
     "tts2face.session.animated_face": ("AnimatedFace",),
     "tts2face.interchange.subtitles.cues": ("Cue", "Subtitles"),
+    "tts2face.interchange.subtitles.options": ("SubtitleOptions",),
     "tts2face.interchange.subtitles.reader": ("read_subtitles",),
     "tts2face.session.speech_stream": ("Piece",),
     "tts2face.session.performance": ("Performance",),

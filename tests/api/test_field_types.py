@@ -39,6 +39,7 @@ from tts2face.gestures.elements import (
 )
 from tts2face.gestures.field import FieldOptions
 from tts2face.gestures.timeline import Timeline
+from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.lips.options import ExcludedToken, SynthesisOptions
 from tts2face.models.palette_editing import StyleMix
 from tts2face.picture.options import Picture
@@ -59,7 +60,7 @@ SPEECH = Speech(Waveform(np.zeros(800), 8000), PhoneSequence(["a"], [0.0, 0.1]),
 MADE: tuple[Any, ...] = (
     Request(), SourceOptions(), Spoken("a"), FromPhones(), FromSound("network"), Recorded(Path("a.wav")), Idle(1.0),
     Listening(1.0), Models(), Picture(), Project(), Timeline(), BatchOptions(), Cast(), Role({}, {}), LineSettings(),
-    ServiceSettings(), Performance(take=Path("a.mp4")), StreamFormat("mp3", Picture()),
+    SubtitleOptions(), ServiceSettings(), Performance(take=Path("a.mp4")), StreamFormat("mp3", Picture()),
     SynthesisOptions(), FieldOptions(), ExcludedToken("a", 0.0), SentenceEdges("a", 0, ("a",), (0.0, 0.1)),
     StyleMix("neutral"), Reference(KEPT, project=Project()),
     StyleSpan("head", "sad", 0.0), ExpressionSpan("happy", 0.5), GazeTarget(0.0, 0.0), ListeningSpan(), Nod(0.0),

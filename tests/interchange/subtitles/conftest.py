@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from tts2face.interchange.subtitles.cues import Subtitles
+from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.interchange.subtitles.reader import read_subtitles
-from tts2face.interchange.subtitles.reading import Reading
 
 EVENTS = "[Script Info]\n\n[Events]\nFormat: Layer, Start, End, Style, Name, MarginL, MarginR, MarginV, Effect, Text\n"
 ReadText = Callable[..., Subtitles]
@@ -22,7 +22,7 @@ def read(tmp_path: Path) -> ReadText:
     ) -> Subtitles:
         path = tmp_path / f"a{suffix}"
         path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
-        return read_subtitles(path, encoding, Reading(**choices))  # type: ignore[arg-type]
+        return read_subtitles(path, encoding, SubtitleOptions(**choices))  # type: ignore[arg-type]
 
     return read_text
 

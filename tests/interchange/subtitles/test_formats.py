@@ -9,8 +9,8 @@ import pytest
 
 from lexicon.errors import DataError, InputError
 from tests.interchange.subtitles.conftest import ReadText, srt
+from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.interchange.subtitles.reader import read_subtitles
-from tts2face.interchange.subtitles.reading import Reading
 
 BOTH = [(1.0, 3.0, "The train was late. Again."), (4.0, 6.0, "We walked home.")]
 SAMI = """<SAMI><HEAD><STYLE TYPE="text/css"><!--
@@ -159,10 +159,10 @@ def test_a_track_is_chosen_by_number_and_language_and_said(tmp_path: Path) -> No
         ({"track": "de"}, 2),
         ({"track": "eng"}, 1),
     ):
-        found = read_subtitles(film, None, Reading(**choices))  # type: ignore[arg-type]
+        found = read_subtitles(film, None, SubtitleOptions(**choices))  # type: ignore[arg-type]
         assert found.warnings[0].message == f"{shown} {number} is read, --track names another one"
     with pytest.raises(InputError, match="there is no track 'fr' of text"):
-        read_subtitles(film, None, Reading(track="fr"))
+        read_subtitles(film, None, SubtitleOptions(track="fr"))
 
 
 NO_TEXT = {

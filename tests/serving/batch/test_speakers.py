@@ -116,3 +116,34 @@ def test_all_but_some_roles_can_be_left_out(plan_of: Planner, tmp_path: Path) ->
     assert [output.name for output in plan_of(SRT, cast=cast).outputs] == ["one-0001.mp4"]
     with pytest.raises(DataError, match='silent must be true or false, not "yes"'):
         cast_of(tmp_path, '[default]\nsilent = "yes"\n')
+
+
+def test_what_nobody_says_is_left_out_unless_a_role_or_the_table_asks_for_it(plan_of: Planner, tmp_path: Path) -> None:
+    content = SIGNS.replace("Default,", "Main,")
+    plan = plan_of(content, name="one.ass")
+    assert [line.segment is None for line in plan.lines] == [False, True, True, False]
+    assert [note.message.partition(";")[0] for note in plan.notes] == [
+        "1 sign, such as 'Keep out.', is not spoken",
+        "1 credit, such as 'Subtitles by Somebody', is not spoken",
+    ]
+    cast = cast_of(tmp_path, '[[role]]\nsubtitle_style = "sign*"\nsilent = false\n')
+    assert [line.segment is None for line in plan_of(content, name="one.ass", cast=cast).lines][1] is False
+    kept = plan_of(content, name="one.ass", keep=("signs", "credits"))
+    assert [line.segment is None for line in kept.lines] == [False] * 4
+    assert not kept.notes
+
+
+def test_a_sign_that_is_left_out_changes_no_face(plan_of: Planner) -> None:
+    content = (
+        "[Events]\nFormat: Start, End, Style, Text\n"
+        "Dialogue: 0:00:01.00,0:00:03.00,Sign,Keep out\nDialogue: 0:00:01.00,0:00:03.00,Main,Hello there.\n"
+    )
+    assert [line.casting.other for line in plan_of(content, name="one.ass").lines if line.segment] == [0]
+
+
+def test_speakers_can_be_read_as_words(plan_of: Planner) -> None:
+    plan = plan_of(speakers=False)
+    assert [(line.speaker, line.text) for line in plan.lines][0] == ("", "ANN: Hello there.")
+    assert [note.message.partition(",")[0] for note in plan_of().notes][-1].startswith(
+        "speakers by names before a colon: ANN"
+    )

@@ -23,10 +23,8 @@ EBU_STL = b"STL"
 
 def check_text(head: bytes, name: str) -> None:
     """Refuse the head of a file that is known to hold no text (`DataError`)."""
-    for begin, reason in _HEADS:
-        if head.startswith(begin) and (
-            begin != b"PG" or (len(head) > 10 and head[10] in (0x14, 0x15, 0x16, 0x17, 0x80))
-        ):
+    for mark, reason in _HEADS:
+        if head.startswith(mark) and (mark != b"PG" or head[10:11] in _PGS_SEGMENTS):
             raise DataError(f"{name} {reason}")
 
 

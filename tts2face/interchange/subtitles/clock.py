@@ -9,6 +9,8 @@ CLOCK = re.compile(_CLOCK)
 _ARROW = r"\s*(?:-{1,3}\s*>|–+\s*>|—+\s*>|→)\s*"
 TIMING = re.compile(rf"^\s*{_CLOCK}{_ARROW}(?:{_CLOCK})?(.*)$")
 HAS_ARROW = re.compile(r"-{1,2}\s?>|[–—]>|→")
+# An instant whose last part counts frames: 00:00:01:12, and 00:00:01;12 of drop-frame counting.
+_FRAMES = re.compile(r"(?<![\d:])(\d{1,3}):(\d\d):(\d\d)([:;])(\d\d)(?![\d:;])")
 
 
 def clock_seconds(sign: str | None, hours: str | None, minutes: str, seconds: str, fraction: str | None) -> float:
@@ -23,10 +25,6 @@ def parse_clock(written: str) -> float | None:
     """Seconds of a clock reading such as ``0:01:02.50``; None if it cannot be read."""
     match = CLOCK.fullmatch(written.strip())
     return None if match is None else clock_seconds(*match.groups())
-
-
-# An instant whose last part counts frames: 00:00:01:12, and 00:00:01;12 of drop-frame counting.
-_FRAMES = re.compile(r"(?<![\d:])(\d{1,3}):(\d\d):(\d\d)([:;])(\d\d)(?![\d:;])")
 
 
 def without_frames(lines: Sequence[str], fps: float | None) -> tuple[list[str], float | None]:

@@ -40,13 +40,6 @@ def decode_file(path: Path, encoding: str | None = None, language: str | None = 
         Encoding of files without a byte order mark that are not UTF-8, such as ``cp1250``; None: it is guessed.
     language
         Language of the words, where it is known, which decides the guess.
-
-    Raises
-    ------
-    InputError
-        There is no such encoding.
-    DataError
-        The file cannot be read, is too large, or is not text.
     """
     check_regular_file(path)
     try:

@@ -1,6 +1,7 @@
 """Tracks of subtitles in films (Matroska, MP4, MOV, WebM), read by PyAV."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,32 +16,44 @@ _TEXT = {
     "mov_text": PLAIN_MARKUP, "ass": SUBSTATION_MARKUP, "ssa": SUBSTATION_MARKUP,
 }  # fmt: skip
 _PICTURES = frozenset({"hdmv_pgs_subtitle", "dvd_subtitle", "dvb_subtitle", "xsub"})
+# Codes of ISO 639-2, as films have them, by those of ISO 639-1.
+_SHORT = {
+    "eng": "en", "ger": "de", "deu": "de", "fre": "fr", "fra": "fr", "spa": "es", "ita": "it", "por": "pt",
+    "dut": "nl", "nld": "nl", "swe": "sv", "dan": "da", "nor": "nb", "nob": "nb", "fin": "fi", "pol": "pl",
+    "cze": "cs", "ces": "cs", "slo": "sk", "slk": "sk", "slv": "sl", "hun": "hu", "rum": "ro", "ron": "ro",
+    "hrv": "hr", "srp": "sr", "bul": "bg", "rus": "ru", "ukr": "uk", "gre": "el", "ell": "el", "tur": "tr",
+    "heb": "he", "ara": "ar", "per": "fa", "fas": "fa", "vie": "vi", "tha": "th", "jpn": "ja", "kor": "ko",
+    "chi": "zh", "zho": "zh", "cmn": "zh", "yue": "zh", "est": "et", "lav": "lv", "lit": "lt", "ice": "is", "isl": "is",
+    "cat": "ca", "hin": "hi", "ind": "id", "glg": "gl", "baq": "eu", "eus": "eu", "wel": "cy", "cym": "cy",
+}  # fmt: skip
 SECONDS = 1_000_000  # units of the times of a container
 
 
-def film_seconds(path: Path) -> float | None:
-    """Length of a film or recording as it states it; None if it does not, or cannot be read."""
+@dataclass(frozen=True, slots=True)
+class Film:
+    """Length of a film or recording and its frames a second, as it states them; None where it does not."""
+
+    seconds: float | None = None
+    fps: float | None = None
+
+
+def film_facts(path: Path) -> Film:
+    """Length and rate of a film or recording; none of a file that cannot be read as one."""
     import av
 
     try:
         with av.open(str(path)) as container:
-            return None if not container.duration else container.duration / SECONDS
+            video = next(iter(container.streams.video), None)
+            rate = None if video is None else video.average_rate
+            return Film(container.duration / SECONDS if container.duration else None, float(rate) if rate else None)
     except (OSError, ValueError):
-        return None
+        return Film()
 
 
 def read_film(
     path: Path, language: str | None, track: str | None
 ) -> tuple[list[WrittenCue], list[SubtitleWarning], float | None]:
-    """Cues of a track of subtitles, warnings with the track that is chosen, and the length of the film.
-
-    Raises
-    ------
-    InputError
-        There is no such track.
-    DataError
-        The film cannot be read, or has no track of text.
-    """
+    """Cues of a track of subtitles, warnings with the track that is chosen, and the length of the film."""
     import av
 
     try:
@@ -111,33 +124,21 @@ def _is_language(stream: Any, language: str) -> bool:
     return bool(own) and (own == wanted or _SHORT.get(own, own) == _SHORT.get(wanted, wanted))
 
 
-# Codes of ISO 639-2, as films have them, by those of ISO 639-1.
-_SHORT = {
-    "eng": "en", "ger": "de", "deu": "de", "fre": "fr", "fra": "fr", "spa": "es", "ita": "it", "por": "pt",
-    "dut": "nl", "nld": "nl", "swe": "sv", "dan": "da", "nor": "nb", "nob": "nb", "fin": "fi", "pol": "pl",
-    "cze": "cs", "ces": "cs", "slo": "sk", "slk": "sk", "slv": "sl", "hun": "hu", "rum": "ro", "ron": "ro",
-    "hrv": "hr", "srp": "sr", "bul": "bg", "rus": "ru", "ukr": "uk", "gre": "el", "ell": "el", "tur": "tr",
-    "heb": "he", "ara": "ar", "per": "fa", "fas": "fa", "vie": "vi", "tha": "th", "jpn": "ja", "kor": "ko",
-    "chi": "zh", "zho": "zh", "cmn": "zh", "yue": "zh", "est": "et", "lav": "lv", "lit": "lt", "ice": "is", "isl": "is",
-    "cat": "ca", "hin": "hi", "ind": "id", "glg": "gl", "baq": "eu", "eus": "eu", "wel": "cy", "cym": "cy",
-}  # fmt: skip
-
-
 def _cues(packets: Any, codec: str, markup: Markup, start_s: float) -> list[WrittenCue]:
     cues = []
     for number, packet in enumerate(packets, start=1):
         if packet.pts is None or not packet.size:
             continue
-        begin = float(packet.pts * packet.time_base) - start_s
-        end = begin + float(packet.duration * packet.time_base) if packet.duration else None
+        start = float(packet.pts * packet.time_base) - start_s
+        end = start + float(packet.duration * packet.time_base) if packet.duration else None
         content = bytes(packet)
         if codec == "mov_text":
             content = content[2 : 2 + int.from_bytes(content[:2], "big")]
         text = content.decode("utf-8", errors="replace").replace("\r\n", "\n").strip("\0\n")
         if markup is SUBSTATION_MARKUP:
-            cue = packet_cue(text, begin, end, number)
+            cue = packet_cue(text, start, end, number)
             cues += [] if cue is None else [cue]
         elif text.strip():
-            cue = WrittenCue(begin, end, text, number, markup=markup)
+            cue = WrittenCue(start, end, text, number, markup=markup)
             cues.append(with_voice(cue) if codec == "webvtt" else cue)
     return cues

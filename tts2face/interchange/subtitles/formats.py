@@ -1,4 +1,4 @@
-"""The formats of subtitle files: their names and endings, how their content tells them, and their readers."""
+"""The formats of subtitle files: their names and endings, how their content shows them, and their readers."""
 
 import re
 from types import MappingProxyType
@@ -8,14 +8,21 @@ from tts2face.interchange.subtitles.clock import HAS_ARROW, without_frames
 from tts2face.interchange.subtitles.cues import SubtitleWarning, WrittenCue
 from tts2face.interchange.subtitles.frames import MICRODVD, MPL2, read_microdvd, read_mpl2
 from tts2face.interchange.subtitles.lyrics import LINE, read_lyrics
+from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.interchange.subtitles.pairs import PAIR, read_pairs
-from tts2face.interchange.subtitles.reading import Reading
 from tts2face.interchange.subtitles.sami import read_sami
 from tts2face.interchange.subtitles.substation import read_substation
 from tts2face.interchange.subtitles.ttml import read_ttml
 
-SUBRIP, WEBVTT, SUBSTATION, TTML = "SubRip", "WebVTT", "SubStation Alpha", "TTML"
-MICRODVD_NAME, MPL2_NAME, PAIRS, LRC, SAMI = "MicroDVD", "MPL2", "SubViewer", "LRC", "SAMI"
+SUBRIP = "SubRip"
+WEBVTT = "WebVTT"
+SUBSTATION = "SubStation Alpha"
+TTML = "TTML"
+MICRODVD_NAME = "MicroDVD"
+MPL2_NAME = "MPL2"
+PAIRS = "SubViewer"
+LRC = "LRC"
+SAMI = "SAMI"
 SUFFIXES = MappingProxyType({
     ".srt": SUBRIP, ".vtt": WEBVTT, ".ass": SUBSTATION, ".ssa": SUBSTATION, ".ttml": TTML, ".dfxp": TTML, ".itt": TTML,
     ".xml": TTML, ".sbv": PAIRS, ".sub": MICRODVD_NAME, ".mpl": MPL2_NAME, ".lrc": LRC, ".smi": SAMI, ".sami": SAMI,
@@ -46,29 +53,21 @@ def subtitle_format(text: str, suffix: str) -> str:
     return next((name for name, line in _BY_LINES if any(line.match(written) for written in lines)), named)
 
 
-def read_format(text: str, suffix: str, reading: Reading) -> tuple[list[WrittenCue], list[SubtitleWarning]]:
-    """Cues of the text of a subtitle file as they are written, and its defects.
-
-    Raises
-    ------
-    InputError
-        There is no such track.
-    DataError
-        Nothing of it can be read, or its times have no unit in which they can be meant.
-    """
+def read_format(text: str, suffix: str, options: SubtitleOptions) -> tuple[list[WrittenCue], list[SubtitleWarning]]:
+    """Cues of the text of a subtitle file as they are written, and its defects."""
     kind = subtitle_format(text, suffix)
     if kind == TTML:
         return read_ttml(text)
     if kind == SAMI:
-        return read_sami(text, reading.language, reading.track)
+        return read_sami(text, options.language, options.track)
     lines = text.split("\n")
     if kind in {SUBRIP, WEBVTT}:
-        lines, rate = without_frames(lines, reading.fps)
+        lines, rate = without_frames(lines, options.fps)
         cues, warnings = read_webvtt(lines) if kind == WEBVTT else read_subrip(lines)
-        if rate is not None and reading.fps is None and cues:
+        if rate is not None and options.fps is None and cues:
             message = f"the times end in frames, which are taken for {rate:g} a second (--subtitle-fps)"
             warnings.append(SubtitleWarning(cues[0].line, message))
         return cues, warnings
     if kind == MICRODVD_NAME:
-        return read_microdvd(lines, reading.fps)
+        return read_microdvd(lines, options.fps)
     return {SUBSTATION: read_substation, PAIRS: read_pairs, MPL2_NAME: read_mpl2, LRC: read_lyrics}[kind](lines)

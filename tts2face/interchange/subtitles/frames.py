@@ -17,13 +17,7 @@ TENTHS = 10.0
 
 
 def read_microdvd(lines: Sequence[str], fps: float | None) -> tuple[list[WrittenCue], list[SubtitleWarning]]:
-    """Cues of lines such as ``{25}{75}Hello.|Bye.``; where neither rate nor file states it, at 25 frames a second.
-
-    Raises
-    ------
-    DataError
-        The times cannot be meant at any rate.
-    """
+    """Cues of lines such as ``{25}{75}Hello.|Bye.``; where neither rate nor file states it, at 25 frames a second."""
     warnings: list[SubtitleWarning] = []
     first = next((match for line in lines if (match := MICRODVD.match(line))), None)
     stated = _RATE.match(first[3]) if first is not None and int(first[1]) <= 1 else None

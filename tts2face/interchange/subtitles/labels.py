@@ -77,7 +77,7 @@ class FoundLabel:
 
 
 def labels_of(text: str) -> list[FoundLabel]:
-    """What stands before a colon at the start of the lines of a text without tags."""
+    """Labels before a colon at the start of the lines of a text without tags."""
     if ":" not in text and "：" not in text:
         return []
     return [

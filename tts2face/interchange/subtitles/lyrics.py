@@ -34,18 +34,18 @@ def read_lyrics(lines: Sequence[str]) -> tuple[list[WrittenCue], list[SubtitleWa
         last = _WORD.search(words, words.rfind("<")) if words.endswith(">") else None
         end = parse_clock(last[1]) if last else None
         text = " ".join(_WORD.sub("", words).split())
-        begins = [parse_clock(instant) for instant in _INSTANT.findall(match["instants"])]
-        found += [(begin, end if len(begins) == 1 else None, text, number) for begin in begins if begin is not None]
+        starts = [parse_clock(instant) for instant in _INSTANT.findall(match["instants"])]
+        found += [(start, end if len(starts) == 1 else None, text, number) for start in starts if start is not None]
     found.sort(key=lambda line: line[0])
     empty = [at for at, _, text, _ in found if not text]
     cues = []
-    for begin, end, text, number in found:
+    for start, end, text, number in found:
         if text:
-            until = end if end is not None else next((at for at in empty if at > begin), None)
-            is_next = until is not None and not any(begin < at < until for at, _, other, _ in found if other)
+            until = end if end is not None else next((at for at in empty if at > start), None)
+            is_next = until is not None and not any(start < at < until for at, _, other, _ in found if other)
             cues.append(
                 WrittenCue(
-                    begin - offset,
+                    start - offset,
                     until - offset if until is not None and (is_next or end is not None) else None,
                     text,
                     number,

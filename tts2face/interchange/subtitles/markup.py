@@ -1,4 +1,4 @@
-"""What is no text in a cue, by format: tags, overrides, entities and invisible characters."""
+"""Text of a cue without what is none in its format: tags, overrides, entities and invisible characters."""
 
 import html
 import re
@@ -27,7 +27,7 @@ _OVERRIDE = re.compile(r"\{[^{}]*\}")  # libass shows nothing of a block in brac
 
 @dataclass(frozen=True, slots=True)
 class Markup:
-    """What a format has besides text."""
+    """Signs of a format that are no text."""
 
     has_tags: bool = False
     has_entities: bool = False
@@ -57,7 +57,9 @@ def plain_text(written: str, markup: Markup = SUBRIP_MARKUP) -> str:
 
 def without_drawings(text: str) -> str:
     """Text of SubStation Alpha without the coordinates of its drawings."""
-    kept, is_drawing, at = [], False, 0
+    kept: list[str] = []
+    is_drawing = False
+    at = 0
     for block in _OVERRIDE.finditer(text):
         kept += [] if is_drawing else [text[at : block.start()]]
         modes = _DRAWING_MODE.findall(block[0])

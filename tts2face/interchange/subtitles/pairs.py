@@ -1,4 +1,4 @@
-"""YouTube's ``.sbv`` and SubViewer's ``.sub``: blocks of lines that begin with two instants and a comma."""
+"""YouTube's ``.sbv`` and SubViewer's ``.sub``: blocks of lines that start with two instants and a comma."""
 
 import re
 from collections.abc import Sequence
@@ -25,10 +25,10 @@ def read_pairs(lines: Sequence[str]) -> tuple[list[WrittenCue], list[SubtitleWar
         if match is None:
             texts.append(_BREAK.sub("\n", line))
             continue
-        begin, end = parse_clock(match[1]), parse_clock(match[2])
-        if begin is None:
+        start, end = parse_clock(match[1]), parse_clock(match[2])
+        if start is None:
             warnings.append(SubtitleWarning(number, f"the start {match[1]!r} cannot be read; the cue is left out"))
         else:
-            at = begin, end, number
+            at = start, end, number
         texts = []
     return cues, warnings

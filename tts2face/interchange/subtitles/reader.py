@@ -23,12 +23,13 @@ from tts2face.interchange.subtitles.encodings import Decoded
 from tts2face.interchange.subtitles.formats import NAMES, read_format
 from tts2face.interchange.subtitles.labels import find_speakers
 from tts2face.interchange.subtitles.markup import plain_text
-from tts2face.interchange.subtitles.reading import AS_IS, Reading
+from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.interchange.subtitles.repeats import without_carried, without_copies
 from tts2face.interchange.subtitles.spoken_text import SpokenText, spoken_lines, spoken_text
 from tts2face.interchange.subtitles.timing import MAX_S, estimated_end, placed
 from tts2face.interchange.subtitles.unspoken import LYRICS, REPEATS, SIGNS, notes_of, with_credits
 
+DEFAULTS = SubtitleOptions()
 MAX_NAMED = 12  # speakers in a note
 OVERLAP_S = 1e-6  # an end that is the next start differs by rounding at most
 
@@ -42,7 +43,7 @@ class _File:
     film_s: float | None = None
 
 
-def read_subtitles(path: Path | str, encoding: str | None = None, reading: Reading = AS_IS) -> Subtitles:
+def read_subtitles(path: Path | str, encoding: str | None = None, options: SubtitleOptions = DEFAULTS) -> Subtitles:
     """Cues of a subtitle file, or of a film's track of subtitles, in order of time, and warnings of its defects.
 
     The content decides the format where it is unmistakable, else the suffix. Defects are read as players do and
@@ -54,7 +55,7 @@ def read_subtitles(path: Path | str, encoding: str | None = None, reading: Readi
     ----------
     encoding
         Encoding of text that is neither UTF-8 nor marked; None: it is guessed, with a warning.
-    reading
+    options
         Other choices, as the language, speakers, and what is spoken of what is only shown.
 
     Raises
@@ -66,22 +67,22 @@ def read_subtitles(path: Path | str, encoding: str | None = None, reading: Readi
     """
     path = Path(path)
     try:
-        file = _read(path, encoding, reading)
-        cues = placed(file.written, file.warnings, shift=reading.shift, film_s=file.film_s)
+        file = _read(path, encoding, options)
+        cues = placed(file.written, file.warnings, shift=options.shift, film_s=file.film_s)
     except DataError as wrong:
         raise wrong if str(path) in str(wrong) else DataError(f"{path}, {wrong}") from wrong
     if not cues:
         raise DataError(_nothing(path, file.warnings))
     notes: list[SubtitleWarning] = []
-    if REPEATS not in reading.keep:
+    if REPEATS not in options.keep:
         cues = without_carried(without_copies(cues, file.warnings), notes)
     cues = _without_styles_of_all(with_credits(cues))
-    timed = _timed(cues, reading, file.warnings, notes)
+    timed = _timed(cues, options, file.warnings, notes)
     by_line = sorted(file.warnings, key=lambda warning: warning.line)
     return Subtitles(path, timed, tuple(by_line), tuple(notes))
 
 
-def _read(path: Path, encoding: str | None, reading: Reading) -> _File:
+def _read(path: Path, encoding: str | None, options: SubtitleOptions) -> _File:
     """Cues of a file as they are written, in its order."""
     check_regular_file(path)
     try:
@@ -95,12 +96,12 @@ def _read(path: Path, encoding: str | None, reading: Reading) -> _File:
     if is_film(head):
         from tts2face.interchange.subtitles.film_track import read_film
 
-        written, warnings, film_s = read_film(path, reading.language, reading.track)
-        return _File(written, warnings, reading.film_s or film_s)
-    decoded = decode_file(path, encoding, reading.language)
+        written, warnings, film_s = read_film(path, options.language, options.track)
+        return _File(written, warnings, options.film_s or film_s)
+    decoded = decode_file(path, encoding, options.language)
     text = decoded.text.replace("\r\n", "\n").replace("\r", "\n")
-    written, warnings = read_format(text, path.suffix, reading)
-    return _File(written, [*_encoding_warnings(decoded), *warnings], reading.film_s)
+    written, warnings = read_format(text, path.suffix, options)
+    return _File(written, [*_encoding_warnings(decoded), *warnings], options.film_s)
 
 
 def _encoding_warnings(decoded: Decoded) -> list[SubtitleWarning]:
@@ -130,18 +131,21 @@ def _without_styles_of_all(cues: Sequence[WrittenCue]) -> list[WrittenCue]:
 
 
 def _timed(
-    written: Sequence[WrittenCue], reading: Reading, warnings: list[SubtitleWarning], notes: list[SubtitleWarning]
+    written: Sequence[WrittenCue],
+    options: SubtitleOptions,
+    warnings: list[SubtitleWarning],
+    notes: list[SubtitleWarning],
 ) -> tuple[Cue, ...]:
     """Cues with their ends, words and speakers."""
-    said = [not cue.kind or cue.kind in reading.keep for cue in written]
+    said = [not cue.kind or cue.kind in options.keep for cue in written]
     plain = [plain_text(cue.text, cue.markup) for cue, is_said in zip(written, said, strict=True) if is_said]
     # Only a text with a colon is divided, as most have none.
     labels = find_speakers(["\n".join(spoken_lines(text)) if ":" in text or "：" in text else text for text in plain])
-    speakers: Collection[str] = labels.keys() if reading.speakers else ()
+    speakers: Collection[str] = labels.keys() if options.speakers else ()
     cues: list[Cue] = []
     left_out: list[tuple[str, int, str]] = []
     for number, (cue, is_said) in enumerate(zip(written, said, strict=True)):
-        text = spoken_text(cue.text, cue.markup, keep=reading.keep, speakers=speakers)
+        text = spoken_text(cue.text, cue.markup, keep=options.keep, speakers=speakers)
         if is_said:
             left_out += [(kind, cue.line, words) for kind, words in text.left_out]
         else:
@@ -150,7 +154,7 @@ def _timed(
         made = _cue(number, written, text, warnings)
         cues.append(made if is_said else replace(made, kind=cue.kind))
     notes += notes_of(left_out)
-    notes += _note_of_speakers(cues, labels if reading.speakers else {})
+    notes += _note_of_speakers(cues, labels if options.speakers else {})
     return tuple(cues)
 
 

@@ -1,4 +1,4 @@
-"""What a cue shows again: copies at one time, and lines that roll, scroll or grow from cue to cue.
+"""Words that are shown again: copies at one time, and lines that roll, scroll or grow from cue to cue.
 
 Rolling captions show a line when it is new, and again while the next one is spoken; conversions of them to cues hold
 each word several times. A repetition in speech ("No." "No.", a chorus) carries no line to a cue of more words, and
@@ -26,7 +26,7 @@ _MARKS = re.compile(r"[^\w]+")
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """What a cue takes over of the cue before it.
+    """Words that a cue takes over from the cue before it.
 
     `n_carried` counts words; `is_strong` says that the step is one of rolling captions and no repetition in speech.
     """
@@ -141,7 +141,7 @@ def _steps(cues: Sequence[WrittenCue], shown: Sequence[Sequence[Sequence[str]]])
 
 
 def _step(before: WrittenCue, cue: WrittenCue, old: Sequence[Sequence[str]], new: Sequence[Sequence[str]]) -> _Step:
-    """What the lines of a cue take over of the lines before: from one of them on, all words begin the cue."""
+    """Words taken over from the lines before: from one of these lines on, all words begin the cue."""
     begins_late = before.end_s is not None and cue.begin_s - before.end_s > MAX_GAP_S
     if begins_late or before.speaker != cue.speaker or cue.begin_s - before.begin_s < 1e-6:
         return _Step()
@@ -189,10 +189,10 @@ def _after(lines: Sequence[Sequence[str]], n_words: int) -> str:
 
 def _new_begin(cue: WrittenCue, n_carried: int) -> float:
     """Seconds at which the first new word begins: an instant within the cue that stands before it, else its start."""
-    begin = cue.begin_s
+    start = cue.begin_s
     for match in _INSTANT.finditer(cue.text):
         n_before = len(plain_text(cue.text[: match.start()], cue.markup).split())
         at = parse_clock(match[1])
-        if n_before == n_carried and at is not None and begin <= at < (cue.end_s or at):
+        if n_before == n_carried and at is not None and start <= at < (cue.end_s or at):
             return at
-    return begin
+    return start

@@ -19,13 +19,7 @@ _END = re.compile(r"</BODY>|</SAMI>", re.IGNORECASE)
 
 
 def read_sami(text: str, language: str | None, track: str | None) -> tuple[list[WrittenCue], list[SubtitleWarning]]:
-    """Cues of one class: the one that is named, of a language, or the first one.
-
-    Raises
-    ------
-    InputError
-        There is no such class.
-    """
+    """Cues of one class: the one that is named, of a language, or the first one."""
     languages = {name.casefold(): found[1] for name, body in _STYLE.findall(text) if (found := _LANGUAGE.search(body))}
     classes: dict[str, list[WrittenCue]] = {}
     names: dict[str, str] = {}
@@ -38,14 +32,14 @@ def read_sami(text: str, language: str | None, track: str | None) -> tuple[list[
         for name, words in _paragraphs(body[sync.end() : end]):
             names.setdefault(name.casefold(), name)
             cues = classes.setdefault(name.casefold(), [])
-            begin = int(sync[1]) / 1000.0
+            start = int(sync[1]) / 1000.0
             if cues and cues[-1].end_s is None:
                 last = cues.pop()
                 cues.append(
-                    WrittenCue(last.begin_s, begin, last.text, last.line, language=last.language, markup=PLAIN_MARKUP)
+                    WrittenCue(last.begin_s, start, last.text, last.line, language=last.language, markup=PLAIN_MARKUP)
                 )
             cues.append(
-                WrittenCue(begin, None, words, line, language=languages.get(name.casefold()), markup=PLAIN_MARKUP)
+                WrittenCue(start, None, words, line, language=languages.get(name.casefold()), markup=PLAIN_MARKUP)
             )
     worded = {key: [cue for cue in cues if cue.text] for key, cues in classes.items()}
     worded = {key: cues for key, cues in worded.items() if cues}

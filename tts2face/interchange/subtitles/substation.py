@@ -85,12 +85,12 @@ def _dialogue(written: str, fields: Sequence[str], number: int, warnings: list[S
     return _cue(found, start, end, number)
 
 
-def packet_cue(written: str, begin_s: float, end_s: float | None, number: int) -> WrittenCue | None:
+def packet_cue(written: str, start_s: float, end_s: float | None, number: int) -> WrittenCue | None:
     """Cue of a packet of a film: a dialogue line without its times, after its number and layer; None if it is none."""
     values = written.split(",", len(PACKET_FIELDS) - 1)
     if len(values) < len(PACKET_FIELDS):
         return None
-    return _cue(dict(zip(PACKET_FIELDS, values, strict=True)), begin_s, end_s, number)
+    return _cue(dict(zip(PACKET_FIELDS, values, strict=True)), start_s, end_s, number)
 
 
 def _cue(found: Mapping[str, str], start: float, end: float | None, number: int) -> WrittenCue:

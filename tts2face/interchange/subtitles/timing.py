@@ -21,13 +21,7 @@ POSSIBLE_SPEEDS, LIKELY_SPEEDS = (0.7, 150.0), (3.0, 45.0)
 def placed(
     written: Sequence[WrittenCue], warnings: list[SubtitleWarning], *, shift: float = 0.0, film_s: float | None = None
 ) -> list[WrittenCue]:
-    """Cues in order of time, without those that lie before or after the film.
-
-    Raises
-    ------
-    DataError
-        All times are equal, or most cues lie after the end of the film.
-    """
+    """Cues in order of time, without those that lie before or after the film."""
     cues = _in_columns(_over_midnight(written, warnings), warnings)
     _check_different(cues)
     cues = [replace(cue, begin_s=cue.begin_s + shift, end_s=_plus(cue.end_s, shift)) for cue in cues] if shift else cues
@@ -72,11 +66,11 @@ def _over_midnight(cues: Sequence[WrittenCue], warnings: list[SubtitleWarning]) 
         if before - (cue.begin_s + offset) > DAY_S / 2 and before < MAX_S:
             offset += DAY_S
             warnings.append(SubtitleWarning(cue.line, "the clock begins anew at midnight here; the times go on"))
-        begin, end = cue.begin_s + offset, _plus(cue.end_s, offset)
-        if end is not None and begin - end > DAY_S / 2 and begin < MAX_S:
+        start, end = cue.begin_s + offset, _plus(cue.end_s, offset)
+        if end is not None and start - end > DAY_S / 2 and start < MAX_S:
             end += DAY_S
-        unwrapped.append(replace(cue, begin_s=begin, end_s=end))
-        before = max(begin, before) if begin < MAX_S else before
+        unwrapped.append(replace(cue, begin_s=start, end_s=end))
+        before = max(start, before) if start < MAX_S else before
     return unwrapped
 
 
@@ -93,9 +87,9 @@ def _in_columns(cues: Sequence[WrittenCue], warnings: list[SubtitleWarning]) -> 
 def _check_different(cues: Sequence[WrittenCue]) -> None:
     """Refuse times that are all equal: they are missing, whatever the file says."""
     worded = [cue for cue in cues if cue.text.strip()]
-    begins = {cue.begin_s for cue in worded}
+    starts = {cue.begin_s for cue in worded}
     has_lengths = any(cue.end_s is not None and cue.end_s > cue.begin_s for cue in worded)
-    if len(begins) == 1 and (len(worded) > 2 or (len(worded) > 1 and not has_lengths)):
+    if len(starts) == 1 and (len(worded) > 2 or (len(worded) > 1 and not has_lengths)):
         raise DataError(
             f"line {worded[0].line}: all {len(worded)} cues begin at {worded[0].begin_s:g} s, so that the file has no "
             "times; export it with them"
@@ -141,17 +135,17 @@ def estimated_end(number: int, cues: Sequence[WrittenCue], text: str) -> float:
     It lies at most at the start of the next cue, and at the end of cues that begin at the same instant: words of no
     length share the time up to the next instant that is written.
     """
-    begin = cues[number].begin_s
-    end = begin + max(MIN_ESTIMATED_S, len(text) / CHARACTERS_PER_S)
+    start = cues[number].begin_s
+    end = start + max(MIN_ESTIMATED_S, len(text) / CHARACTERS_PER_S)
     first, after = number, number + 1
-    while first > 0 and cues[first - 1].begin_s > begin - SAME_INSTANT_S:
+    while first > 0 and cues[first - 1].begin_s > start - SAME_INSTANT_S:
         first -= 1
-    while after < len(cues) and cues[after].begin_s <= begin + SAME_INSTANT_S:
+    while after < len(cues) and cues[after].begin_s <= start + SAME_INSTANT_S:
         after += 1
     if after < len(cues):
         end = min(end, cues[after].begin_s)
     for cue in cues[first:after]:
-        if cue.end_s is not None and cue.end_s > begin + SAME_INSTANT_S:
+        if cue.end_s is not None and cue.end_s > start + SAME_INSTANT_S:
             end = min(end, cue.end_s)
     return end
 

@@ -63,11 +63,6 @@ def read_ttml(text: str) -> tuple[list[WrittenCue], list[SubtitleWarning]]:
 
     Where neither the document nor the specification gives its times a unit in which they can be meant, they have the
     one in which they can.
-
-    Raises
-    ------
-    DataError
-        It is no XML, or its times cannot be meant in any unit.
     """
     stated = _TtmlReader()
     found = stated.read(text)
@@ -91,7 +86,9 @@ class _TtmlReader:
 
     def __init__(self, bare_s: float = 1.0, tick_rate: int | None = None) -> None:
         self.has_ticks_alone = self.has_bare_times = False  # times whose unit is not stated
-        self._bare_s, self._other_tick_rate, self._is_rate_stated = bare_s, tick_rate, False
+        self._bare_s = bare_s
+        self._other_tick_rate = tick_rate
+        self._is_rate_stated = False
         self._elements: list[_Element] = []
         self._paragraphs: list[_Paragraph] = []
         self._agents: dict[str, str] = {}
@@ -153,7 +150,8 @@ class _TtmlReader:
 
     def _open(self, name: str, own: Attributes, parent: _Element) -> _Element:
         start = parent.next_s if parent.is_sequence else parent.begin_s
-        given, end, is_damaged = start, parent.end_s, parent.is_damaged
+        given, end = start, parent.end_s
+        is_damaged = parent.is_damaged
         if name in _TIMED:
             offset = self._seconds(own.get("begin"))
             is_damaged = parent.is_damaged or ("begin" in own and offset is None)

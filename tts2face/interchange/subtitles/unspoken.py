@@ -1,4 +1,4 @@
-"""What subtitles show and nobody says: signs, effects, annotations, lyrics, credits, and what is shown again."""
+"""Text that subtitles show and nobody says: signs, effects, annotations, lyrics, credits, and what is shown again."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -9,8 +9,12 @@ from lexicon.dictionary import word_set
 from tts2face.interchange.subtitles.cues import SubtitleWarning, WrittenCue
 from tts2face.interchange.subtitles.markup import PLAIN_MARKUP, plain_text
 
-ANNOTATIONS, LYRICS, SIGNS = "annotations", "lyrics", "signs"
-EFFECTS, CREDITS, REPEATS = "effects", "credits", "repeats"
+ANNOTATIONS = "annotations"
+LYRICS = "lyrics"
+SIGNS = "signs"
+EFFECTS = "effects"
+CREDITS = "credits"
+REPEATS = "repeats"
 KINDS = MappingProxyType({
     ANNOTATIONS: "noises and manners in brackets, such as [door slams]",
     LYRICS: "sung lines between notes, or in styles of songs",

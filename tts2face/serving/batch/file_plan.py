@@ -11,12 +11,11 @@ from lexicon.errors import DataError, InputError
 from lexicon.sentence_length import n_letters
 from tts2face.interchange.exports.table import batch_format
 from tts2face.interchange.subtitles.cues import Cue
-from tts2face.interchange.subtitles.film_track import film_seconds
-from tts2face.interchange.subtitles.reader import read_subtitles
 from tts2face.request import IDLE_LIMITS_S, ONLY_SPOKEN, SOURCE_OPTIONS, Request
 from tts2face.serving.batch.cast import Cast
 from tts2face.serving.batch.cast_checks import check_names
 from tts2face.serving.batch.content_address import file_hash
+from tts2face.serving.batch.cue_file import left_out_cues, read_cue_file
 from tts2face.serving.batch.cue_sentences import MAX_GAP_S, has_end_mark, sentence_groups, spoken_part
 from tts2face.serving.batch.export import check_faces
 from tts2face.serving.batch.lines import Lines
@@ -145,23 +144,17 @@ class FilePlan:
         if self.base.options.audio is not None:
             names = (self.name, self.path.stem, *([""] if self.base.n_files == 1 else []))
             self.recordings = find_recordings(self.base.options.audio, self.path, names)
-        track = self.recordings.track
-        reading = self.base.options.reading(
-            non_defaults(self.base.request).get("language"), None if track is None else film_seconds(track)
-        )
-        read = read_subtitles(self.path, self.base.options.encoding, reading)
+        read = read_cue_file(self.path, self.base.options, self.base.request, self.recordings.track)
         for warning in read.warnings:
             self._warn(warning.line, warning.message)
         self.notes += [PlanWarning(str(self.path), note.line, note.message) for note in read.notes]
         cues = [self._divide(cue) for cue in read.cues if cue.text]
         self.n_cues, self._is_in_capitals = len(read.cues), is_in_capitals(cue.text for cue in cues)
-        # What nobody says is spoken only where a role or the table of lines asks for it.
-        cues += [replace(cue, text=cue.shown) for cue in read.cues if cue.kind and any(map(str.isalnum, cue.shown))]
-        cues = sorted(map(self._moved, cues), key=lambda cue: cue.begin_s)
+        cues = sorted(map(self._moved, [*cues, *left_out_cues(read)]), key=lambda cue: cue.begin_s)
         fps = exact_rate(self.base.request.fps)
         self._lines = [line for cue in cues for line in cue_lines(cue)]
         for _, group in groupby(self._lines, key=lambda line: round(line[0].begin_s * float(fps))):
-            self.speakers.tell_apart(list(group))
+            self.speakers.tell_apart([line for line in group if not line[0].kind or self.speakers.is_spoken(*line)])
         margins = (MARGIN_S, MARGIN_S) if self.recordings.track else (self.base.lead, 0.0)
         before, after = (round(margin * fps) for margin in margins)
         windows = cue_windows(cues, fps, (before, after), is_spoken=self.speakers.is_spoken, rate_of=self._rate_of)

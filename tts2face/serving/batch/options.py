@@ -8,7 +8,8 @@ from lexicon.errors import BackendError, InputError
 from lexicon.marked_text import RATE_LIMITS
 from lexicon.values.fields import check_fields
 from tts2face.interchange.exports.table import batch_format
-from tts2face.interchange.subtitles.reading import Reading
+from tts2face.interchange.subtitles.film_track import Film
+from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.option import option
 from tts2face.request import option_fields
 
@@ -80,7 +81,7 @@ class BatchOptions:
         if self.per not in CLIP_UNITS:
             raise InputError(f"--per must be {', '.join(CLIP_UNITS[:-1])} or {CLIP_UNITS[-1]}, not {self.per!r}")
         self._check_formats()
-        self.reading()
+        self.subtitle_options()
         if self.overflow not in OVERFLOW_POLICIES:
             raise InputError(f"--overflow must be extend, cut-pauses or report, not {self.overflow!r}")
         if not 1.0 <= self.max_rate <= RATE_LIMITS[1]:
@@ -94,16 +95,16 @@ class BatchOptions:
         if self.audio is not None and not self.audio.is_dir():
             raise InputError(f"there is no folder of recordings {self.audio}; check the path")
 
-    def reading(self, language: str | None = None, film_s: float | None = None) -> Reading:
-        """Choices of the reader of subtitles, with what is known besides: language, and seconds of the film."""
-        return Reading(
+    def subtitle_options(self, language: str | None = None, film: Film | None = None) -> SubtitleOptions:
+        """Choices of the reader of subtitles, with what is known besides: the language of the words, and their film."""
+        return SubtitleOptions(
             language=language,
             keep=self.keep,
             speakers=self.speakers,
-            fps=self.subtitle_fps,
+            fps=self.subtitle_fps or (None if film is None else film.fps),
             track=self.track,
             shift=self.shift,
-            film_s=film_s,
+            film_s=None if film is None else film.seconds,
         )
 
     def _check_formats(self) -> None:

@@ -14,7 +14,7 @@ from lexicon.values.checks import check_limits
 from lexicon.values.toml_text import parse_toml
 from tts2face.interchange.subtitles.formats import SUFFIXES
 from tts2face.interchange.subtitles.frames import RATE_LIMITS
-from tts2face.interchange.subtitles.reading import MAX_SHIFT_S
+from tts2face.interchange.subtitles.options import MAX_SHIFT_S
 from tts2face.interchange.subtitles.unspoken import KINDS
 from tts2face.picture.options import Picture
 from tts2face.request import Request

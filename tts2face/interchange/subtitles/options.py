@@ -12,7 +12,7 @@ MAX_SHIFT_S = 360_000.0  # 100 hours; the time code of a tape begins at up to 24
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reading:
+class SubtitleOptions:
     """Choices of the reader of subtitles.
 
     Parameters
@@ -60,6 +60,3 @@ def check_kinds(kinds: tuple[str, ...]) -> None:
     for kind in kinds:
         if kind not in KINDS:
             raise InputError(f"keep must be of {', '.join(KINDS)}, not {kind!r}")
-
-
-AS_IS = Reading()
