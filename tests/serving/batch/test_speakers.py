@@ -143,7 +143,7 @@ def test_a_sign_that_is_left_out_changes_no_face(plan_of: Planner) -> None:
 
 def test_speakers_can_be_read_as_words(plan_of: Planner) -> None:
     plan = plan_of(speakers=False)
-    assert [(line.speaker, line.text) for line in plan.lines][0] == ("", "ANN: Hello there.")
+    assert next((line.speaker, line.text) for line in plan.lines) == ("", "ANN: Hello there.")
     assert [note.message.partition(",")[0] for note in plan_of().notes][-1].startswith(
         "speakers by names before a colon: ANN"
     )
