@@ -69,9 +69,13 @@ def check(
     if text is not None and recordings.is_dir():
         raise InputError("--text belongs to one video, not to a folder; write transcripts beside the videos")
     from corpus_tools.recordings.observe import RecordingChecker, recordings_to_check
+    from corpus_tools.recordings.subtitle_cues import subtitle_notes
     from corpus_tools.run_options import RunOptions
 
     found = recordings_to_check(recordings, text)
+    for video in dict.fromkeys(recording.video for recording in found) if text is None else ():
+        for note in subtitle_notes(video):
+            print(f"{video.name}: note: {note}")  # noqa: T201 - the result
     checker = RecordingChecker(RunOptions(cache, None, model))
     for recording in found:
         findings = checker.check(recording)

@@ -1,12 +1,19 @@
 """Subtitles of videos as cues with margins."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from lexicon.errors import DataError
+from tts2face.interchange.subtitles.cues import Cue, Subtitles
+from tts2face.interchange.subtitles.film_track import Film, film_facts
+from tts2face.interchange.subtitles.formats import FILM_SUFFIXES, SUFFIXES
+from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.interchange.subtitles.reader import read_subtitles
 
-SUBTITLE_SUFFIXES = (".srt", ".vtt", ".ass", ".ssa", ".ttml")  # in order of preference
+SUBTITLE_SUFFIXES = tuple(suffix for suffix in SUFFIXES if suffix != ".xml")  # in order of preference
+OTHER_FILM_SUFFIXES = (".avi", ".mpg", ".mpeg", ".ts")  # beside which subtitles lie
+MAX_JOINED_S = 1.0  # between a word without a length and the next one
 CUE_MARGIN_S = 0.3  # before and after a cue; subtitles are rarely closer to the speech
 
 
@@ -27,10 +34,10 @@ def find_subtitles(video: Path) -> Path | None:
 def read_cues(path: Path) -> tuple[SpokenCue, ...]:
     """Spoken cues in temporal order, each extended by `CUE_MARGIN_S` but not beyond the middle to its neighbour.
 
-    Cues without words and cues whose end is only estimated are left out.
+    Cues without words and cues whose end is only estimated are left out; words without a length, as recognisers of
+    speech write them, belong to the cue after them.
     """
-    read = read_subtitles(path).cues
-    spoken = [(cue.begin_s, cue.end_s, cue.text) for cue in read if cue.text and not cue.has_estimated_end]
+    spoken = _joined(read_beside(path).cues)
     if not spoken:
         raise DataError(f"{path} contains no subtitles; export them again")
     cues = []
@@ -40,3 +47,39 @@ def read_cues(path: Path) -> tuple[SpokenCue, ...]:
         earliest, latest = min((before + start) / 2, start), max((end + behind) / 2, end)
         cues.append(SpokenCue(max(start - CUE_MARGIN_S, earliest, 0.0), min(end + CUE_MARGIN_S, latest), text))
     return tuple(cues)
+
+
+def read_beside(path: Path) -> Subtitles:
+    """Subtitles of the video of the same name, which gives its length and its frames a second."""
+    film = next((film_facts(video) for suffix in (*FILM_SUFFIXES, *OTHER_FILM_SUFFIXES)
+                 if (video := path.with_suffix(suffix)).is_file()), Film())  # fmt: skip
+    return read_subtitles(path, options=SubtitleOptions(fps=film.fps, film_s=film.seconds))
+
+
+def subtitle_notes(video: Path) -> tuple[str, ...]:
+    """Guesses and defects of the subtitles of a video, and what of them is not spoken; none without subtitles."""
+    path = find_subtitles(video)
+    if path is None:
+        return ()
+    try:
+        read = read_beside(path)
+    except DataError as wrong:
+        return (f"{wrong}; the subtitles are not used",)
+    return tuple(f"{path.name}, line {note.line}: {note.message}" for note in (*read.warnings, *read.notes))
+
+
+def _joined(cues: Sequence[Cue]) -> list[tuple[float, float, str]]:
+    """Start, end and text of cues that have them; what has no length comes to the next cue."""
+    spoken: list[tuple[float, float, str]] = []
+    waiting: list[Cue] = []
+    for cue in cues:
+        if not cue.text:
+            continue
+        waiting = [earlier for earlier in waiting if cue.begin_s - earlier.begin_s <= MAX_JOINED_S]
+        if cue.has_estimated_end:
+            waiting.append(cue)
+            continue
+        start = min(cue.begin_s, *(earlier.begin_s for earlier in waiting)) if waiting else cue.begin_s
+        spoken.append((start, cue.end_s, " ".join(part.text for part in (*waiting, cue))))
+        waiting = []
+    return spoken

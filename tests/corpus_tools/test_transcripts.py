@@ -2,11 +2,12 @@
 
 import contextlib
 
+import av
 import numpy as np
 import pytest
 
 from corpus_tools.recordings.folder import find_recordings, pronounce_recording
-from corpus_tools.recordings.subtitle_cues import SpokenCue, read_cues
+from corpus_tools.recordings.subtitle_cues import SpokenCue, find_subtitles, read_cues, subtitle_notes
 from corpus_tools.recordings.transcripts import READERS, find_transcript, read_transcript
 from lexicon.errors import DataError
 from tts2face.interchange.subtitles.decoding import MAX_BYTES, read_text
@@ -121,6 +122,42 @@ def test_all_grid_alignments_agree_with_the_manifest(takes):
     aligned = {path.stem: read_transcript(path) for path in sorted((takes / "align").glob("*.align"))}
     assert aligned
     assert aligned == {name: listed[name] for name in aligned}
+
+
+def test_words_without_a_length_belong_to_the_next_cue(write):
+    content = "".join(
+        f"{number}\n00:00:0{start} --> 00:00:0{end}\n{word}\n\n"
+        for number, (start, end, word) in enumerate(
+            [
+                ("1,000", "1,500", "come"),
+                ("1,500", "1,500", "with"),
+                ("1,500", "2,000", "me"),
+                ("5,000", "5,000", "so"),
+            ],
+            1,
+        )
+    )
+    assert [cue.text for cue in read_cues(write(".srt", content))] == ["come", "with me"]
+
+
+def test_frames_have_the_rate_of_the_video(write, tmp_path):
+    with av.open(str(tmp_path / "take.mp4"), "w") as film:
+        track = film.add_stream("mpeg4", rate=50)
+        track.width, track.height, track.pix_fmt = 32, 32, "yuv420p"
+        for _ in range(200):
+            film.mux(track.encode(av.VideoFrame(32, 32, "yuv420p")))
+        film.mux(track.encode())
+    path = write(".sub", "{50}{100}place blue\n{150}{190}again\n")
+    assert [(cue.start, cue.text) for cue in read_cues(path)] == [(0.7, "place blue"), (2.7, "again")]
+    assert find_subtitles(tmp_path / "take.mp4") == path
+    assert subtitle_notes(tmp_path / "take.mp4") == ()
+
+
+def test_guesses_about_subtitles_are_said(write, tmp_path):
+    (tmp_path / "take.mp4").touch()
+    write(".srt", "1\n00:00:01,000 --> 00:00:02,000\nMůžete přijít\n".encode("cp1250"))
+    (note,) = subtitle_notes(tmp_path / "take.mp4")
+    assert note.startswith("take.srt, line 1: the encoding is not stated and was guessed as cp1250")
 
 
 def test_text_takes_precedence_over_other_transcripts(write, tmp_path):
