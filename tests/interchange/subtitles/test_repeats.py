@@ -76,11 +76,6 @@ SHOWN_AGAIN = {
         ".srt",
         [(0, "so far so good"), (3, "or not")],
     ),
-    "frames of a moving line": (
-        ass(*((1 + n * 0.04, 1.04 + n * 0.04, "Default", f"{{\\pos({n},5)}}Come here now") for n in range(20))),
-        ".ass",
-        [(1, "Come here now")],
-    ),
 }
 
 
@@ -94,6 +89,22 @@ def test_what_a_cue_shows_again_is_spoken_once(
     kept = read(content, suffix, keep=("repeats",))
     assert not kept.notes
     assert len(kept.cues) > len(found.cues) or len(" ".join(cue.text for cue in kept.cues).split()) > len(said)
+
+
+def test_writing_that_moves_frame_by_frame_is_a_sign(read: ReadText) -> None:
+    frames = [(3 + n * 0.04, 3.04 + n * 0.04, "Default", f"{{\\pos({n},5)}}Bakery") for n in range(20)]
+    found = read(ass((1, 2, "Default", "Come here."), *frames), ".ass")
+    assert [(cue.text, cue.kind, round(cue.end_s, 2)) for cue in found.cues] == [
+        ("Come here.", "", 2.0),
+        ("", "signs", 3.8),
+    ]
+    assert found.notes[0].message.startswith("1 sign, such as 'Bakery', is not spoken")
+
+
+def test_a_line_in_frames_is_spoken_once(read: ReadText) -> None:
+    frames = [(3 + n * 0.04, 3.04 + n * 0.04, "Default", f"{{\\alpha&H{n:02x}&}}Come here.") for n in range(20)]
+    found = read(ass(*frames), ".ass")
+    assert [(cue.text, round(cue.end_s, 2)) for cue in found.cues] == [("Come here.", 3.8)]
 
 
 def test_words_begin_at_their_instants_in_a_growing_cue(read: ReadText) -> None:

@@ -13,13 +13,14 @@ from tts2face.interchange.subtitles.clock import parse_clock
 from tts2face.interchange.subtitles.cues import SubtitleWarning, WrittenCue
 from tts2face.interchange.subtitles.markup import plain_text
 from tts2face.interchange.subtitles.spoken_text import spoken_text
-from tts2face.interchange.subtitles.unspoken import as_text
+from tts2face.interchange.subtitles.unspoken import SIGNS, as_text
 
 MAX_GAP_S = 0.2  # between a cue and the one that takes over its lines
 HOLD_S = 0.055  # a cue up to two frames long shows words, but is too short to say any
 SURE_WORDS = 4  # carried by a single cue in a file that does not roll
 SAME_S = 0.1  # within which copies begin
 _INSTANT = re.compile(r"<(\d[\d:.,]*:\d[\d:.,]*)>")
+_PLACED = re.compile(r"\{[^{}]*\\(?:pos|move)\s*\(")  # in SubStation Alpha
 _LYRICS = re.compile("[♪♫♬♩]")
 _MARKS = re.compile(r"[^\w]+")
 
@@ -34,6 +35,7 @@ class _Step:
     n_carried: int = 0
     is_strong: bool = False
     is_sure: bool = False
+    is_hold: bool = False
 
 
 def without_copies(cues: Sequence[WrittenCue], warnings: list[SubtitleWarning]) -> list[WrittenCue]:
@@ -106,6 +108,10 @@ def without_carried(cues: Sequence[WrittenCue], notes: list[SubtitleWarning]) ->
         if not step.n_carried:
             kept.append(cue)
             continue
+        if step.is_hold and kept and all(_PLACED.search(shown.text) for shown in (kept[-1], cue)):
+            # frame by frame writing follows the picture
+            kept[-1] = replace(kept[-1], end_s=cue.end_s, kind=kept[-1].kind or SIGNS)
+            continue
         n_carried += 1
         first = first or cue.line
         text = _after(lines, step.n_carried)
@@ -159,7 +165,7 @@ def _step(before: WrittenCue, cue: WrittenCue, old: Sequence[Sequence[str]], new
     is_sung = any(_LYRICS.search(word) for word in words)
     gap = 0.0 if before.end_s is None else cue.begin_s - before.end_s
     is_sure = is_hold or (is_moved and len(tail) >= SURE_WORDS and abs(gap) <= HOLD_S and not is_sung)
-    return _Step(len(tail), is_hold or is_moved, is_sure)
+    return _Step(len(tail), is_hold or is_moved, is_sure, is_hold)
 
 
 def _accepted(steps: Sequence[_Step]) -> list[_Step]:
