@@ -352,7 +352,7 @@ def test_silence_that_adds_up_over_punctuation_comes_in_parts() -> None:
     assert silence == pytest.approx(16.0 + 190.0, abs=len(pieces) / fps)
     begins = np.cumsum([0, *(len(piece.clip.motion) for piece in pieces)]) / float(prepared.fps)
     assert [piece.begin for piece in pieces] == pytest.approx([*begins[:-1]])
-    for first, piece in zip(begins, pieces, strict=False):  # sound and picture stay together
+    for first, piece in zip(begins, pieces[:-1], strict=False):  # sound and picture stay together
         end = first + len(piece.clip.motion) / float(prepared.fps)
         n_samples = round(end * RATE_HZ) - round(first * RATE_HZ)
         assert len(piece.speech.waveform.samples) == pytest.approx(n_samples, abs=1)

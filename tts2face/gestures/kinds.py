@@ -95,16 +95,17 @@ class ElementKind:
                 kept += [*self.restricted(lane, -1.0, top.start), *self.restricted(lane, top.end, math.inf)]
         return (*kept, *over)
 
-    def shifted(self, elements: Sequence[Any], seconds: float) -> tuple[Any, ...]:
-        """The same elements, so many seconds later."""
+    def shifted(self, elements: Sequence[Any], seconds: float, *, holds_start: bool = False) -> tuple[Any, ...]:
+        """The same elements, so many seconds later; with `holds_start`, spans from 0 s on still begin there."""
         if self.shape == "curve":
             return tuple(
                 replace(element, keys=tuple((at + seconds, to) for at, to in element.keys)) for element in elements
             )
         times = ("start", "end") if self.shape == "span" else ("time",)
-        return tuple(
-            replace(element, **{name: getattr(element, name) + seconds for name in times}) for element in elements
-        )
+        later = [{name: getattr(element, name) + seconds for name in times} for element in elements]
+        if holds_start:
+            later = [given | {"start": 0.0} if given.get("start") == seconds else given for given in later]
+        return tuple(replace(element, **given) for element, given in zip(elements, later, strict=True))
 
     def restricted(self, elements: Sequence[Any], start: float, end: float) -> tuple[Any, ...]:
         """The part of some elements in [start, end): parts of spans, and whole curves."""

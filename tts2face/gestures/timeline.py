@@ -212,9 +212,9 @@ class Timeline:
             **{name: kind.merged(getattr(self, name), getattr(later, name)) for name, kind in KINDS.items()},
         )
 
-    def shift(self, seconds: float) -> "Timeline":
-        """The same timeline, delayed by `seconds`."""
-        return self._changed(lambda kind, elements: kind.shifted(elements, seconds))
+    def shift(self, seconds: float, *, holds_start: bool = False) -> "Timeline":
+        """The same timeline, delayed by `seconds`; with `holds_start`, spans from 0 s on still begin there."""
+        return self._changed(lambda kind, elements: kind.shifted(elements, seconds, holds_start=holds_start))
 
     def restrict(self, start: float, end: float) -> "Timeline":
         """The elements within [start, end), with spans cut to this range and whole curves; times are unchanged."""

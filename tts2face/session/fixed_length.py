@@ -11,10 +11,10 @@ from lexicon.marked_text import MAX_PAUSE_S, PauseMark
 from lexicon.sequence import PhoneSequence
 from tts2face.numeric.arrays import smoothstep
 from tts2face.request import IDLE_LIMITS_S, LEAD_S, Idle, Listening, Recorded, Spoken
-from tts2face.session.joining import silent_frames
+from tts2face.session.joining import silent_frames, with_length
 from tts2face.session.prepared import PreparedRequest, prepare
 from tts2face.session.speech_stream import Piece
-from tts2face.types import Clip, Speech
+from tts2face.types import Clip, Speech, first_sample
 
 EASE_S = 0.25  # from and to rest; a head turns back within a quarter of a second
 OPENING_S = 0.03  # after the lead, within which a face is fully there: its lips speak
@@ -59,7 +59,9 @@ def clips_of_length(
     opening_s = EASE_S if isinstance(source, Idle | Listening) else lead + OPENING_S
     for clip in _eased(clips, n_speech, length.first_channel, opening_s):
         rate = clip.speech.waveform.rate
-        done += len(clip.motion)
+        first, done = done, done + len(clip.motion)
+        n_samples = first_sample(done, rate, fps) - first_sample(first, rate, fps)
+        clip = replace(clip, speech=with_length(clip.speech, n_samples))  # noqa: PLW2901 - idle animation follows
         yield clip
     while done < length.n_frames:
         n_idle = min(length.n_frames - done, int(IDLE_LIMITS_S[1] * fps))

@@ -13,9 +13,9 @@ from lexicon.canonical import canonical_text
 from lexicon.normalize import spoken_form
 from lexicon.sentence_length import n_letters
 from lexicon.sentences import text_prefix
-from lexicon.sequence import SILENCE, PhoneSequence, WordSpan, enforce_increasing
+from lexicon.sequence import MIN_PHONE_S, SILENCE, PhoneSequence, WordSpan, enforce_increasing
 from tts2face.sound.pauses import speech_onset
-from tts2face.types import Speech, Waveform, concatenate_speech, first_sample, frame_count
+from tts2face.types import Speech, Waveform, concatenate_speech, first_sample
 
 CUT_SILENCE_S = 0.05  # after a phrase within a sentence; with the silence before the next one a pause as at a comma
 AUDIBLE_SHARE = 0.01  # of the largest amplitude
@@ -128,10 +128,16 @@ def word_bounds(speech: Speech, start: float, end: float) -> tuple[float, float]
 def trim_end(speech: Speech) -> Speech:
     """Speech with at most `CUT_SILENCE_S` of silence after its last audible sample, whatever its phones."""
     sound = speech.waveform
+    end = last_audible(sound)
+    end = end + round(CUT_SILENCE_S * sound.rate) if end else len(sound.samples)
+    return _part(speech, 0, min(end, len(sound.samples)))
+
+
+def last_audible(sound: Waveform) -> int:
+    """Number of samples up to the last audible one; 0 in silence."""
     level = np.abs(sound.samples)
     audible = np.flatnonzero(level > AUDIBLE_SHARE * level.max(initial=0.0))
-    end = int(audible[-1]) + 1 + round(CUT_SILENCE_S * sound.rate) if len(audible) else len(level)
-    return _part(speech, 0, min(end, len(level)))
+    return int(audible[-1]) + 1 if len(audible) else 0
 
 
 def _part(speech: Speech, start: int, end: int) -> Speech:
@@ -157,24 +163,19 @@ def silent_frames(first: int, last: int, rate: int, fps: Fraction) -> Speech:
     return silent_speech((first_sample(last, rate, fps) - first_sample(first, rate, fps)) / rate, rate)
 
 
-def pad_to_frame(speech: Speech, first_frame: int, fps: Fraction) -> Speech:
-    """Speech padded with silence up to the end of its last frame.
-
-    Parameters
-    ----------
-    first_frame
-        Index of the speech's first frame within the whole clip, from which sample positions are rounded.
-    """
-    rate = speech.waveform.rate
-    n_frames = frame_count(speech.waveform.duration, float(fps))
-    n_samples = first_sample(first_frame + n_frames, rate, fps) - first_sample(first_frame, rate, fps)
-    sound = speech.waveform.padded(n_samples)
-    phones, edges = list(speech.phones.phones), list(speech.phones.edges)
-    # silence that fills the last frame would belong to a phone
-    if phones[-1] != SILENCE and len(sound.samples) > len(speech.waveform.samples):
+def with_length(speech: Speech, n_samples: int) -> Speech:
+    """Speech that is cut, or followed by silence, to a number of samples; it keeps all its phones and words."""
+    if n_samples == len(speech.waveform.samples):
+        return speech
+    sound = speech.waveform.padded(n_samples).part(0, n_samples)
+    phones, edges = list(speech.phones.phones), speech.phones.edges
+    # silence behind speech would belong to a phone
+    if phones[-1] != SILENCE and n_samples > len(speech.waveform.samples):
         phones.append(SILENCE)
-        edges.append(edges[-1])
-    edges[-1] = sound.duration
+        edges = np.append(edges, edges[-1])
+    edges = np.append(edges[:-1], sound.duration)
+    if np.diff(edges).min() < MIN_PHONE_S:
+        edges = enforce_increasing(np.minimum(edges, sound.duration))
     return Speech(sound, PhoneSequence(phones, edges), speech.words)
 
 

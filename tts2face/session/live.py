@@ -312,6 +312,7 @@ class LiveSpeech:
     def _append(self, request: Request, listening: Timeline | None = None) -> Iterator[Piece]:
         prepared = prepare(request)
         prepared = prepared if listening is None else replace(prepared, listening=listening)
-        for piece in pieces_from(prepared, self._models.for_request(prepared), self._layer, self._n_frames):
+        models = self._models.for_request(prepared)
+        for piece in pieces_from(prepared, models, self._layer, self._n_frames, ends_on_frame=True):
             self._n_frames += len(piece.clip.motion)
             yield piece

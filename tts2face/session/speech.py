@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from functools import lru_cache
 from itertools import pairwise
 from types import MappingProxyType
@@ -28,7 +27,6 @@ from tts2face.session.joining import (
     join_utterances,
     lead_in,
     resampled_speech,
-    silent_frames,
     silent_speech,
     trim_end,
 )
@@ -36,7 +34,7 @@ from tts2face.session.prepared import innermost_styles
 from tts2face.sound.level import level_speech
 from tts2face.sound.voice import SpeechInput, SpokenWord, Voice, apply_volume
 from tts2face.sound.voice_pool import has_voice, speaks
-from tts2face.types import Speech, Waveform, YieldTurn, concatenate_speech, frame_count, keep_on
+from tts2face.types import Speech, Waveform, YieldTurn, concatenate_speech, keep_on
 
 Deliveries = Mapping[str, Delivery]  # of a palette's styles, by name
 NO_DELIVERIES: Deliveries = MappingProxyType({})
@@ -122,6 +120,7 @@ class SpokenPart(NamedTuple):
     spoken: SpokenSentence
     n_steps: int
     text: str = ""
+    is_last: bool = False  # of a clip, as far as is known before it is spoken
 
 
 class Shortened(NamedTuple):
@@ -261,22 +260,19 @@ def _join_sentence(speeches: Sequence[Speech], sentence: Sentence, rate: int) ->
     return speech, starts
 
 
-def silent_sentences(
-    seconds: float, fps: Fraction, n_steps: int, timeline: Timeline, rate: int = IDLE_RATE
-) -> Iterator[SpokenPart]:
-    """Yield silence in parts of up to `IDLE_PART_S` that end on frames.
+def silent_sentences(seconds: float, n_steps: int, timeline: Timeline, rate: int = IDLE_RATE) -> Iterator[SpokenPart]:
+    """Yield silence in parts of up to `IDLE_PART_S`; the last one is the last of a clip.
 
     `timeline` is that of the whole silence, `rate` that of the sound in Hz.
     """
-    n_frames = frame_count(seconds, float(fps))
-    bounds = [*range(0, n_frames, max(round(IDLE_PART_S * fps), 1)), n_frames]
+    n_samples = max(round(seconds * rate), 1)
+    bounds = [*range(0, n_samples, round(IDLE_PART_S * rate)), n_samples]
     for first, last in pairwise(bounds):
-        steps = n_steps * last // n_frames - n_steps * first // n_frames
-        silence = silent_frames(first, last, rate, fps)
-        start = float(first / fps)
-        end = float(last / fps)
+        steps = n_steps * last // n_samples - n_steps * first // n_samples
+        start, end = first / rate, last / rate
+        silence = silent_speech(end - start, rate)
         spoken = SpokenSentence(silence, timeline.restrict(start, end).shift(-start), (), silence.waveform)
-        yield SpokenPart(spoken, steps)
+        yield SpokenPart(spoken, steps, is_last=last == n_samples)
 
 
 def without_long_silence(sentence: Sentence) -> Shortened:
@@ -294,16 +290,13 @@ def without_long_silence(sentence: Sentence) -> Shortened:
     return Shortened(shorter, before, after)
 
 
-def long_silence(seconds: float, fps: Fraction, timeline: Timeline, rate: int) -> Iterator[SpokenPart]:
+def long_silence(seconds: float, timeline: Timeline, rate: int) -> Iterator[SpokenPart]:
     """`silent_sentences` of some seconds within a text, if there are any, without progress of their own.
 
     The styles without an end in the `timeline` of the sentence before it go on.
     """
     timeline = Timeline(spans=tuple(replace(span, start=0.0) for span in timeline.spans if span.end == math.inf))
-    for part in silent_sentences(seconds, fps, 0, timeline, rate) if seconds > 0.0 else ():
-        silence = part.spoken.sound
-        sound = silence.part(0, len(silence.samples) - 1)  # padded: its frames may have one sample less here
-        yield part._replace(spoken=replace(part.spoken, speech=Speech.without_phones(sound), sound=sound))
+    yield from silent_sentences(seconds, 0, timeline, rate) if seconds > 0.0 else ()
 
 
 def resolve_marks(

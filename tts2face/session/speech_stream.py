@@ -3,7 +3,9 @@
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import cache
+from itertools import chain
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +18,7 @@ from lexicon.sentences import Sentence, text_prefix
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.gestures.timeline import Timeline
 from tts2face.request import CONVERSATION, TURN_S, Idle, Listening, Recorded, Spoken
-from tts2face.session.joining import Excerpt, excerpt_of_speech, pad_to_frame, shift_start, silent_speech, word_bounds
+from tts2face.session.joining import Excerpt, excerpt_of_speech, shift_start, silent_speech, word_bounds
 from tts2face.session.prepared import IDLE_STEPS, PreparedRequest
 from tts2face.session.speech import (
     NO_DELIVERIES,
@@ -33,6 +35,7 @@ from tts2face.session.speech import (
     text_of,
     without_long_silence,
 )
+from tts2face.session.whole_frames import WholeFrames, end_in_silence
 from tts2face.sound.pauses import speech_onset
 from tts2face.sound.voice_pool import require_installed
 from tts2face.storage.memory import NO_MEMORY, ResultMemory
@@ -42,7 +45,6 @@ from tts2face.types import (
     Waveform,
     YieldTurn,
     concatenate_speech,
-    frame_count,
     keep_on,
 )
 
@@ -140,29 +142,31 @@ class SpeechSpan:
 
 def measure_speech(prepared: PreparedRequest, models: SpeechModels) -> SpeechSpan:
     """Span of the speech of a text in its clip, without synthesis of motion."""
-    fps = float(prepared.fps)
-    first_frame = 0
     start = 0.0
     end = 0.0
     total = 0.0
     for part in speak_sentences(prepared, models):
-        spoken = part.spoken
-        at, phones = first_frame / fps, spoken.speech.phones
+        speech = part.spoken.speech
+        phones = speech.phones
         voiced = [number for number, phone in enumerate(phones.phones) if phone != SILENCE]
         if voiced:
-            start = start if end else at + float(phones.edges[voiced[0]])
-            end = at + float(phones.edges[voiced[-1] + 1])
-        total = at + spoken.speech.waveform.duration
-        first_frame += frame_count(spoken.speech.waveform.duration, fps)
+            start = start if end else total + float(phones.edges[voiced[0]])
+            end = total + float(phones.edges[voiced[-1] + 1])
+        total += speech.waveform.duration
     return SpeechSpan(start, end, total)
 
 
 def spoken_pieces(
-    prepared: PreparedRequest, models: SpeechModels, first_frame: int = 0, *, has_phones: bool = True
+    prepared: PreparedRequest,
+    models: SpeechModels,
+    first_frame: int = 0,
+    *,
+    has_phones: bool = True,
+    ends_on_frame: bool = False,
 ) -> Iterator[Piece]:
     """Pieces of a text or of idle animation with their speech and marks; the face is at rest and has no channels.
 
-    Each piece ends on a frame boundary, so that sound and picture stay synchronous at any length.
+    All but the last end on a frame boundary, so that sound and picture stay synchronous at any length.
 
     Parameters
     ----------
@@ -170,22 +174,33 @@ def spoken_pieces(
         Frame of a longer clip at which the first piece begins.
     has_phones
         Whether more than the sound is wanted; otherwise it is not aligned with its phones, and marks have no time.
+    ends_on_frame
+        Whether the last one does so, too.
     """
-    fps = prepared.fps
-    for spoken, n_steps, text in speak_sentences(prepared, models, has_phones=has_phones):
-        speech, start = pad_to_frame(spoken.speech, first_frame, fps), float(first_frame / fps)
-        n_frames = frame_count(speech.waveform.duration, float(fps))
-        sound = spoken.sound.padded(len(speech.waveform.samples))
-        yield Piece(
-            Clip.at_rest(n_frames, float(fps), replace(speech, waveform=sound)),
-            start,
-            n_steps,
-            spoken.timeline.restrict(0.0, speech.waveform.duration).shift(start),
-            tuple(replace(mark, seconds=mark.seconds + start) for mark in spoken.marks),
-            text=text,
-            voice_sound=speech.waveform,
-        )
-        first_frame += n_frames
+    frames = WholeFrames(first_frame, prepared.fps, ends_on_frame=ends_on_frame)
+    for spoken, n_steps, text, is_last in speak_sentences(prepared, models, has_phones=has_phones):
+        start = frames.frame
+        whole, n_frames = frames.add(spoken, is_last=is_last)
+        yield _piece(whole, (start, n_frames), prepared.fps, n_steps, text)
+    if (rest := frames.finish()) is not None:  # the sentences after it were silent
+        start = frames.frame
+        whole, n_frames = frames.add(rest, is_last=True)
+        yield _piece(whole, (start, n_frames), prepared.fps)
+
+
+def _piece(spoken: SpokenSentence, frames: tuple[int, int], fps: Fraction, n_steps: int = 0, text: str = "") -> Piece:
+    """Piece of a spoken part, with its first frame and its number of frames."""
+    first, n_frames = frames
+    start, speech = float(first / fps), spoken.speech
+    return Piece(
+        Clip.at_rest(n_frames, float(fps), replace(speech, waveform=spoken.sound)),
+        start,
+        n_steps,
+        spoken.timeline.restrict(0.0, speech.waveform.duration).shift(start),
+        tuple(replace(mark, seconds=mark.seconds + start) for mark in spoken.marks),
+        text=text,
+        voice_sound=speech.waveform,
+    )
 
 
 def spoken_ahead(pieces: Iterator[Piece], timeline: Timeline, yield_turn: YieldTurn) -> Iterator[Piece]:
@@ -241,10 +256,10 @@ def speak_sentences(
     if prepared.excerpt is not None:
         yield _speak_excerpt(prepared, prepared.excerpt, models)
         return
-    request, fps = prepared.request, prepared.fps
+    request = prepared.request
     source = request.source
     if isinstance(source, Idle) or (isinstance(source, Listening) and source.then is None):
-        yield from silent_sentences(source.seconds, fps, IDLE_STEPS, prepared.listening)
+        yield from silent_sentences(source.seconds, IDLE_STEPS, prepared.listening)
         return
     _require_voices(prepared)
     voices, said = cache(models.voice), Counter[str]()
@@ -252,7 +267,7 @@ def speak_sentences(
     voice = voices(first.voice, request.language)
     if isinstance(source, Listening):
         rate = voice.sample_rate
-        yield from silent_sentences(source.seconds, fps, IDLE_STEPS, prepared.listening, rate)
+        yield from _ending(silent_sentences(source.seconds, IDLE_STEPS, prepared.listening, rate), is_last=False)
         first = after_listening(first)
     request = replace(request, source=first)
     unspoken = cache(lambda: replace(request, source=replace(first, text=""), **NOT_SPOKEN))
@@ -271,16 +286,26 @@ def speak_sentences(
             lambda made: made.sound.samples.nbytes + made.speech.waveform.samples.nbytes,
         )
 
-    for (sentence, before_s, after_s), found in _spoken(map(without_long_silence, prepared.sentences()), speak):
+    shortened = map(without_long_silence, prepared.sentences())
+    for (sentence, before_s, after_s), found, is_last in _spoken(shortened, speak):
         text = " ".join(phrase.source for phrase in sentence.utterances)
-        yield from long_silence(before_s, fps, Timeline(), voice.sample_rate)
-        spoken = found
+        spoken = end_in_silence(found)
         if has_phones:
             phones = prepared.corrected(spoken.speech.phones, text, said[text])
             spoken = replace(spoken, speech=replace(spoken.speech, phones=phones))
         said[text] += 1
-        yield SpokenPart(spoken, sentence.n_characters, text)
-        yield from long_silence(after_s, fps, spoken.timeline, voice.sample_rate)
+        before = long_silence(before_s, Timeline(), voice.sample_rate)
+        after = long_silence(after_s, spoken.timeline, voice.sample_rate)
+        yield from _ending(chain(before, [SpokenPart(spoken, sentence.n_characters, text)], after), is_last=is_last)
+
+
+def _ending(parts: Iterator[SpokenPart], *, is_last: bool) -> Iterator[SpokenPart]:
+    """Parts of which the last is, or is not, that of a clip."""
+    part = next(parts)
+    for following in parts:
+        yield part._replace(is_last=False)
+        part = following
+    yield part._replace(is_last=is_last)
 
 
 def _require_voices(prepared: PreparedRequest) -> None:
@@ -315,7 +340,7 @@ def _speak_excerpt(prepared: PreparedRequest, excerpt: Excerpt, models: SpeechMo
     silence = [silent_speech(excerpt.silence, kept.waveform.rate)] if excerpt.silence > 0.0 else []
     kept, sound = (concatenate_speech([shift_start(part, cut), *silence]) for part in (kept, sound))
     written = text.text[places[0] : places[1]].strip()
-    return SpokenPart(SpokenSentence(kept, Timeline(), (), sound.waveform), len(written), written)
+    return SpokenPart(SpokenSentence(kept, Timeline(), (), sound.waveform), len(written), written, is_last=True)
 
 
 def _with_sound(spoken: SpokenSentence) -> Speech:
@@ -325,17 +350,19 @@ def _with_sound(spoken: SpokenSentence) -> Speech:
 
 def _spoken(
     sentences: Iterator[Shortened], speak: Callable[[Sentence], SpokenSentence]
-) -> Iterator[tuple[Shortened, SpokenSentence]]:
-    """Sentences with their speech, but those in which the voice has nothing to say, unless these are all."""
+) -> Iterator[tuple[Shortened, SpokenSentence, bool]]:
+    """Sentences with their speech and whether one is the last, but silent ones, unless these are all."""
     silent, n_spoken = None, 0
-    for shortened in sentences:
+    following = next(sentences, None)
+    while following is not None:
+        shortened, following = following, next(sentences, None)
         try:
             spoken = speak(shortened.sentence)
         except SilentTextError as error:
             silent = error
             continue
         n_spoken += 1
-        yield shortened, spoken
+        yield shortened, spoken, following is None
     # single signs are left out; a text of signs alone is an error
     if silent is not None and not n_spoken:
         raise silent

@@ -46,8 +46,10 @@ def pieces_from(
     gestures: GestureLayer | None,
     first_frame: int = 0,
     on_heard: Progress = ignore_progress,
+    *,
+    ends_on_frame: bool = False,
 ) -> Iterator[Piece]:
-    """Pieces of a recording, or of a text or of idle animation that begins at a frame of a longer clip."""
+    """Pieces of a recording, or of a text or idle animation, which begins, and may end, on a frame of a longer clip."""
     source = prepared.request.source
     speech = models.speech
     lips: Step = Lips(prepared, models)
@@ -55,7 +57,7 @@ def pieces_from(
         heard = hear(prepared, source, models.talker, speech.memory, on_heard)
         started, lips = recorded_pieces(prepared, source, heard), RecordedLips(Lips(prepared, models), source, heard)
     else:
-        started = spoken_pieces(prepared, speech, first_frame)
+        started = spoken_pieces(prepared, speech, first_frame, ends_on_frame=ends_on_frame)
         if gestures is not None:
             started = spoken_ahead(started, prepared.timeline, speech.yield_turn)
     steps: list[Step] = [lips] if gestures is None else [gestures.draw, lips, gestures, gestures.edits, gestures.body]

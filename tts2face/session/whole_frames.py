@@ -1,0 +1,100 @@
+"""Spoken parts of a clip in whole frames: their sound goes on as it is spoken, and frames follow it.
+
+A part is cut at its last whole frame, and what is behind it begins the next part. So the sound of a text is the same at
+any frame rate at which a frame is no longer than the silence at the end of a sentence (`TAIL_S`).
+"""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+
+from tts2face.gestures.timeline import Timeline
+from tts2face.session.joining import last_audible, with_length
+from tts2face.session.speech import SpokenSentence
+from tts2face.types import Speech, Waveform, concatenate_speech, first_sample, frame_count
+
+TAIL_S = 0.05  # of silence at least at the end of a sentence: a frame from 20 a second on, so that no sound is cut
+
+
+class WholeFrames:
+    """Cuts consecutive spoken parts at frames.
+
+    Parameters
+    ----------
+    frame
+        Frame of a longer clip at which the first part begins.
+    ends_on_frame
+        More may follow the last part: it is padded with silence up to the end of its last frame.
+
+    Attributes
+    ----------
+    frame
+        Frame at which the next part begins.
+    """
+
+    def __init__(self, frame: int, fps: Fraction, *, ends_on_frame: bool) -> None:
+        self.frame = frame
+        self._fps = fps
+        self._ends_on_frame = ends_on_frame
+        self._rest: SpokenSentence | None = None
+
+    def add(self, spoken: SpokenSentence, *, is_last: bool) -> tuple[SpokenSentence, int]:
+        """A part with what is left of the part before it, and its number of frames."""
+        whole = spoken if self._rest is None else _joined(self._rest, spoken)
+        self._rest = None
+        sound = whole.sound
+        if is_last:
+            n_frames = frame_count(sound.duration, float(self._fps))
+            n_samples = self._n_samples(n_frames, sound.rate) if self._ends_on_frame else len(sound.samples)
+        else:
+            n_frames = self._n_whole(len(sound.samples), sound.rate)
+            n_samples = self._n_samples(n_frames, sound.rate)
+            if n_frames == 0 or n_samples < last_audible(sound):  # a frame longer than the silence at the end
+                n_frames += 1
+                n_samples = self._n_samples(n_frames, sound.rate)
+        self.frame += n_frames
+        if n_samples < len(sound.samples):
+            voice, rest = (one.part(n_samples, len(one.samples)) for one in (whole.speech.waveform, sound))
+            self._rest = SpokenSentence(Speech.without_phones(voice), Timeline(), (), rest)
+        return _with_length(whole, n_samples), n_frames
+
+    def finish(self) -> SpokenSentence | None:
+        """What is left of the last part, where it was not known to be the last."""
+        rest, self._rest = self._rest, None
+        return rest
+
+    def _n_samples(self, n_frames: int, rate: int) -> int:
+        """Samples of frames from the present one on."""
+        return first_sample(self.frame + n_frames, rate, self._fps) - first_sample(self.frame, rate, self._fps)
+
+    def _n_whole(self, n_samples: int, rate: int) -> int:
+        """Frames of which all samples are there."""
+        n_frames = int(n_samples * self._fps / rate)
+        while self._n_samples(n_frames + 1, rate) <= n_samples:  # bounds of frames are rounded to samples
+            n_frames += 1
+        while self._n_samples(n_frames, rate) > n_samples:
+            n_frames -= 1
+        return n_frames
+
+
+def end_in_silence(spoken: SpokenSentence) -> SpokenSentence:
+    """A part with `TAIL_S` of silence at least at its end."""
+    n_samples = last_audible(spoken.sound) + round(TAIL_S * spoken.sound.rate)
+    return spoken if n_samples <= len(spoken.sound.samples) else _with_length(spoken, n_samples)
+
+
+def _joined(rest: SpokenSentence, spoken: SpokenSentence) -> SpokenSentence:
+    """A part that begins with the rest of another one."""
+    seconds = rest.sound.duration
+    return SpokenSentence(
+        concatenate_speech([rest.speech, spoken.speech]),
+        spoken.timeline.shift(seconds, holds_start=True),
+        tuple(replace(mark, seconds=mark.seconds + seconds) for mark in spoken.marks),
+        Waveform(np.concatenate([rest.sound.samples, spoken.sound.samples]), spoken.sound.rate),
+    )
+
+
+def _with_length(spoken: SpokenSentence, n_samples: int) -> SpokenSentence:
+    speech, sound = with_length(spoken.speech, n_samples), spoken.sound.padded(n_samples).part(0, n_samples)
+    return replace(spoken, speech=speech, sound=sound)
