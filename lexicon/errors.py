@@ -4,7 +4,9 @@ Every message states what is wrong, which value, and what to do. Values of any l
 than 1,000 characters, the first 60 remain.
 """
 
+import contextlib
 import re
+from collections.abc import Iterator
 
 _LONG_WORD = re.compile(r"(\S{60})\S{940,}")
 
@@ -30,3 +32,12 @@ class DataError(Tts2faceError, ValueError):
 
 class BackendError(Tts2faceError, RuntimeError):
     """A required library, model or device is missing on this machine: install it."""
+
+
+@contextlib.contextmanager
+def import_of_extra(advice: str) -> Iterator[None]:
+    """Translate the failed import of a package that not every installation has into a `BackendError` with advice."""
+    try:
+        yield
+    except ImportError as missing:
+        raise BackendError(advice) from missing

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from lexicon.chunks import split_chunks
-from lexicon.errors import BackendError
+from lexicon.errors import import_of_extra
 
 _KANJI = re.compile("[㐀-䶿一-鿿豈-﫿々〆〇𠀀-𪛟]")
 _KANA = re.compile("[ァ-ヺー]+")
@@ -27,13 +27,11 @@ def has_kanji(text: str) -> bool:
 def load_reader() -> Any:
     """The library that reads Chinese characters."""
     os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")  # it imports onnxruntime, which would send telemetry
-    try:
+    with import_of_extra(
+        "Japanese with Chinese characters needs pyopenjtalk-plus; run: pip install 'tts2face[japanese]', or write "
+        "the text in kana"
+    ):
         import pyopenjtalk
-    except ImportError as missing:
-        raise BackendError(
-            "Japanese with Chinese characters needs pyopenjtalk-plus; run: pip install 'tts2face[japanese]', or write "
-            "the text in kana"
-        ) from missing
     return pyopenjtalk
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import BackendError
+from lexicon.errors import import_of_extra
 from lexicon.phones import PHONES, nearest_phones
 from lexicon.pronounce import PAUSES_S, Word
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
@@ -139,11 +139,9 @@ class NeuralVoice:
     def __init__(self, own_words: PronunciationMap, run: NativeRun | None = None) -> None:
         self._own_words = own_words
         disable_telemetry()
-        try:
+        with import_of_extra("the voice heart needs hibari-tts; run: pip install hibari-tts"):
             hibari = import_hibari()
             from hibari.voices import voice_path
-        except ImportError as missing:
-            raise BackendError("the voice heart needs hibari-tts; run: pip install hibari-tts") from missing
         # with other numbers of threads ONNX Runtime's convolutions give other bits
         self._model: Any = hibari.Hibari(voice="heart", model=IDENTITY_NETWORK, threads=1)
         self._network = _Network(open_network(Path(voice_path("heart")).read_bytes()), run)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import BackendError, DataError, InputError, SilentTextError
+from lexicon.errors import DataError, InputError, SilentTextError, import_of_extra
 from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word, phonemize
 from lexicon.ipa import IpaPhone
 from lexicon.languages import language_code
@@ -102,13 +102,11 @@ class PiperTextReader:
     """piper-tts as reader of a text in the language of a voice: text to letters of each sentence."""
 
     def __init__(self, network: PiperNetwork, settings: Mapping[str, Any]) -> None:
-        try:
+        with import_of_extra(
+            "a Piper voice of another language than English needs piper-tts; run: pip install 'tts2face[piper]'"
+        ):
             from piper.config import PiperConfig
             from piper.voice import PiperVoice as Loaded
-        except ImportError as missing:
-            raise BackendError(
-                "a Piper voice of another language than English needs piper-tts; run: pip install 'tts2face[piper]'"
-            ) from missing
         try:
             self._reader: Any = Loaded(session=network.session, config=PiperConfig.from_dict(dict(settings)))
         except (TypeError, ValueError, KeyError, AttributeError) as broken:

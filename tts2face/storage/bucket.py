@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from lexicon.errors import BackendError, InputError
+from lexicon.errors import BackendError, InputError, import_of_extra
 from tts2face.storage.temporary import Temporary
 
 PROBE = "tts2face-store"  # object that shows that the store can be written
@@ -61,11 +61,9 @@ class BucketStore:
     """A folder of a bucket, or of a local folder by ``file://``; puts are atomic, and a file that was added stays."""
 
     def __init__(self, url: str, folder: str = "") -> None:
-        try:
+        with import_of_extra("stores by URL need the package obstore; pip install 'tts2face[batch]'"):
             import obstore
             import obstore.store
-        except ImportError as missing:
-            raise BackendError("stores by URL need the package obstore; pip install 'tts2face[batch]'") from missing
         self._obstore, self.place = obstore, url
         self._prefix = f"{folder}/" if folder else ""
         parts = urlsplit(url)

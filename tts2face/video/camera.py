@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from types import TracebackType
 from typing import Any
 
-from lexicon.errors import BackendError, InputError
+from lexicon.errors import InputError, import_of_extra
 from tts2face.video.media import TimedFrame
 
 FRAME_TIMEOUT_S = 10.0  # longest time without a picture, after which the capture ends
@@ -24,10 +24,8 @@ class CaptureDevice:
     """
 
     def __init__(self, source: str) -> None:
-        try:
+        with import_of_extra("a camera needs opencv-python-headless: pip install 'tts2face[capture]'"):
             import cv2
-        except ImportError as missing:
-            raise BackendError("a camera needs opencv-python-headless: pip install 'tts2face[capture]'") from missing
         cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # OpenCV's warnings repeat our message
         self._device: Any = cv2.VideoCapture(int(source) if source.isdecimal() else source)
         if not self._device.isOpened():

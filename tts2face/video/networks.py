@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import BackendError, DataError, InputError
+from lexicon.errors import BackendError, DataError, InputError, import_of_extra
 from tts2face.storage.user_folders import user_cache
 
 MODEL_NAME = "face_landmarker.task"
@@ -127,12 +127,8 @@ def load_network(bundle: Path, name: str) -> LandmarkNetwork:
 
 
 def _interpreter_class() -> Any:
-    try:
+    with import_of_extra("face tracking needs the package ai-edge-litert: run `pip install 'tts2face[capture]'`"):
         from ai_edge_litert.interpreter import Interpreter
-    except ImportError as missing:
-        raise BackendError(
-            "face tracking needs the package ai-edge-litert: run `pip install 'tts2face[capture]'`"
-        ) from missing
     return Interpreter
 
 

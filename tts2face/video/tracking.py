@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import BackendError, DataError
+from lexicon.errors import DataError, import_of_extra
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.numeric.arrays import true_runs
 from tts2face.video.networks import find_bundle, load_network
@@ -246,11 +246,9 @@ def _anchors() -> NDArray[np.float64]:
 
 
 def _opencv() -> Any:
-    try:
+    with import_of_extra(
+        "face tracking needs the package opencv-python-headless: run `pip install 'tts2face[capture]'`"
+    ):
         import cv2
-    except ImportError as missing:
-        raise BackendError(
-            "face tracking needs the package opencv-python-headless: run `pip install 'tts2face[capture]'`"
-        ) from missing
     cv2.setNumThreads(1)  # recordings are tracked in parallel, one process each
     return cv2

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import BackendError, InputError
+from lexicon.errors import InputError, import_of_extra
 from lexicon.phones import PHONES, look_up_phone
 from lexicon.sequence import SILENCE
 from tts2face.lips.similarity import phone_similarity, token_samples
@@ -197,10 +197,8 @@ def silhouettes(distance: NDArray[np.floating], labels: NDArray[np.integer]) -> 
         raise InputError(f"a silhouette needs two classes and a square matrix; got {n_classes} and {distance.shape}")
     if n_classes == len(labels):
         return np.zeros(len(labels))  # scikit-learn rejects classes of one item each
-    try:
+    with import_of_extra("silhouettes need scikit-learn; run: pip install 'tts2face[report]'"):
         from sklearn.metrics import silhouette_samples
-    except ImportError as missing:
-        raise BackendError("silhouettes need scikit-learn; run: pip install 'tts2face[report]'") from missing
     return np.asarray(silhouette_samples(distance, labels, metric="precomputed"), np.float64)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import BackendError, InputError
+from lexicon.errors import InputError, import_of_extra
 from tts2face.interchange.exports.parts import Part, Target
 from tts2face.interchange.exports.skeleton import HEAD, Skeleton, build_skeleton
 from tts2face.interchange.exports.surfaces import (
@@ -144,11 +144,9 @@ class _UsdModules:
     """Modules of usd-core."""
 
     def __init__(self) -> None:
-        try:
+        with import_of_extra("USD files need usd-core; install it with: pip install 'tts2face[usd]'"):
             for name in ("Gf", "Sdf", "Usd", "UsdGeom", "UsdSkel", "Vt"):
                 setattr(self, name, importlib.import_module(f"pxr.{name}"))
-        except ImportError as missing:
-            raise BackendError("USD files need usd-core; install it with: pip install 'tts2face[usd]'") from missing
 
     def __getattr__(self, name: str) -> Any:
         raise AttributeError(name)

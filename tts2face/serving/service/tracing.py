@@ -4,7 +4,7 @@ import time
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from lexicon.errors import BackendError, InputError
+from lexicon.errors import InputError, import_of_extra
 from tts2face import __version__
 
 if TYPE_CHECKING:
@@ -38,14 +38,12 @@ def tracing_from_environment(environment: Mapping[str, str]) -> "Tracing | None"
     """Tracing as the variables of OpenTelemetry say; None if they do not ask for it."""
     if not is_tracing_requested(environment):
         return None
-    try:
+    with import_of_extra(
+        "traces need OpenTelemetry's libraries; install them with `pip install 'tts2face[otel]'`, or unset "
+        "OTEL_EXPORTER_OTLP_ENDPOINT"
+    ):
         from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter
         from opentelemetry.sdk.trace.export import BatchSpanProcessor
-    except ImportError as missing:
-        raise BackendError(
-            "traces need OpenTelemetry's libraries; install them with `pip install 'tts2face[otel]'`, or unset "
-            "OTEL_EXPORTER_OTLP_ENDPOINT"
-        ) from missing
     return Tracing(BatchSpanProcessor(OTLPSpanExporter()))
 
 
