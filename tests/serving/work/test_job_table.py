@@ -13,6 +13,8 @@ from tests.packages import needs, reason
 
 pytest.importorskip("dbos", reason=reason("dbos"))
 
+import sqlalchemy
+
 from tts2face.serving.batch.store import open_store
 from tts2face.serving.work import changes as job_changes
 from tts2face.serving.work.blobs import open_blobs
@@ -20,7 +22,16 @@ from tts2face.serving.work.changes import Ending, JobChanges
 from tts2face.serving.work.client import JobClient
 from tts2face.serving.work.database import database_url, prepare_database
 from tts2face.serving.work.engine import _enqueue_options, open_client
-from tts2face.serving.work.jobs import JobFile, NewJob, OtherBodyError, QueueFullError, Webhook
+from tts2face.serving.work.jobs import (
+    RUNNING,
+    STATES,
+    JobFile,
+    JobTable,
+    NewJob,
+    OtherBodyError,
+    QueueFullError,
+    Webhook,
+)
 from tts2face.serving.work.queues import WORKFLOWS
 from tts2face.serving.work.run import JobRunner, job_blobs
 from tts2face.storage.sql import Database, DatabaseAwayError
@@ -125,6 +136,26 @@ def test_pages_follow_each_other(client: JobClient, changes: JobChanges) -> None
     assert [name for page in pages for name in page] == names[::-1]
     assert [one.id for one in client.table.page("ann", "running", None, 9)] == names[:1]
     assert len(client.table.page(None, None, None, 9)) == 6
+
+
+@pytest.mark.parametrize("owner", [None, "ann"])
+@pytest.mark.parametrize("state", [None, *STATES])
+def test_a_page_is_read_by_an_index(tmp_path: Path, state: str | None, owner: str | None) -> None:
+    """Neither all jobs nor all that wait are read for it; `tests/bench/bench_job_list.py` measures it."""
+    url = database_url(tmp_path / "jobs.sqlite")
+    prepare_database(url)
+    database = JobDatabase(url)
+    asked: list[tuple[str, Any]] = []
+    sqlalchemy.event.listen(
+        database._engine, "before_cursor_execute", lambda *given: asked.append((given[2], given[3]))
+    )
+    JobTable(database).page(owner, state, "0" * 32, 9)
+    (query,) = asked
+    with database.connect() as connection:
+        plan = [row[-1] for row in connection.exec_driver_sql(f"EXPLAIN QUERY PLAN {query[0]}", query[1])]
+    database.close()
+    assert [step for step in plan if step.startswith("SCAN tts2face_jobs") and "USING INDEX" not in step] == []
+    assert ("USE TEMP B-TREE FOR ORDER BY" in plan) == (state == RUNNING)
 
 
 def test_a_job_ends_once(client: JobClient, changes: JobChanges) -> None:

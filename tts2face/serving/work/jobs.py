@@ -21,10 +21,10 @@ INPUT, OUTPUT = "input", "output"  # roles of files
 # ever (workers of earlier versions write another): whether it waits or runs is what DBOS says, and a begun job whose
 # workflow has ended without it counts as running until `JobRunner.end_abandoned`.
 IS_OPEN = "finished IS NULL"  # condition of a query
-# Of thousands that wait, those that run are few, and found by indexes; that of an expression has PostgreSQL count them.
-_HAS_BEGUN = "coalesce(started, 0.0)"
+# Of thousands that wait, those that run are few, and found by indexes: PostgreSQL expects few rows of an expression.
+_HAS_BEGUN = "(CASE WHEN started IS NULL THEN 0 ELSE 1 END)"
 _RUNNING = f"""SELECT workflow_uuid AS running FROM {{workflows}} WHERE status = 'PENDING' AND name = '{JOB_WORKFLOW}'
-    UNION SELECT id FROM tts2face_jobs WHERE {IS_OPEN} AND {_HAS_BEGUN} > 0.0
+    UNION SELECT id FROM tts2face_jobs WHERE {IS_OPEN} AND {_HAS_BEGUN} = 1
     AND (SELECT status FROM {{workflows}} WHERE workflow_uuid = id) NOT IN ('ENQUEUED', 'DELAYED')"""
 _TABLES = (
     """CREATE TABLE IF NOT EXISTS tts2face_jobs (
