@@ -55,6 +55,8 @@ EXAMPLES: Mapping[str, Any] = MappingProxyType({
     "talker": "grid_s1", "face": "ada", "identity": "kofi", "hair": "long01", "hair_color": "brown",
     "palette": "starter", "size": "512x512", "background": "#204060", "quality": "draft", "expression": "happy=0.6",
     "idle": 2.5, "listen": 2.5, "gaze": "camera", "context": 3, "exemplars": 10, "audio_map": "network",
+    "language": "en-us", "rate": 1.0, "lead": 0.1, "plain_delivery": False, "volume": 1.0, "seed": 0, "fps": 30.0,
+    "pitch": False, "camera": "front", "supersampling": 2, "visible_mark": False, "dictionary": None,
 })  # fmt: skip
 # Options that a door does not take, with the reason.
 NOT_IN_CLIPS: Mapping[str, str] = MappingProxyType({
@@ -86,12 +88,11 @@ def described(name: str, description: str = "", **more: Any) -> Any:
     """Limits, examples and text of an option, for a field that may have another name, another text, and more limits."""
     option = OPTIONS[name]
     low, high = LIMITS.get(name) or option.metadata.get("limits") or (None, None)
-    has_example = name in EXAMPLES or option.default is None
     return Field(
         ge=low,
         le=high,
         description=description or DESCRIPTIONS.get(name) or option.metadata["help"],
-        **{"examples": [EXAMPLES.get(name)] if has_example else None} | more,
+        **{"examples": [EXAMPLES[name]] if name in EXAMPLES else None} | more,
     )
 
 

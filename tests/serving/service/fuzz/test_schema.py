@@ -91,12 +91,29 @@ def fields_of(name: str, schema: dict[str, Any]) -> Iterator[tuple[str, dict[str
 
 
 def has_example(content: dict[str, Any]) -> bool:
-    """Whether a field shows a value; objects and lists show those of their parts, files have none."""
-    if {"example", "examples", "default", "enum", "const", "$ref", "items"} & content.keys():
+    """Whether a field shows a value, whatever its type; objects show those of their parts, files have none.
+
+    A default is no example: a field with one alone would pass, as those of switches did.
+    """
+    if {"example", "examples", "enum", "const", "$ref"} & content.keys():
         return True
-    return content.get("type") == "object" or content.get("format") == "binary" or "properties" in content or any(
-        map(has_example, content.get("anyOf", ()))
-    )  # fmt: skip
+    if content.get("type") == "object" or content.get("format") == "binary" or "properties" in content:
+        return True
+    return ("items" in content and has_example(content["items"])) or any(map(has_example, content.get("anyOf", ())))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {"type": "boolean", "default": False},
+        {"type": "integer", "default": 3},
+        {"type": "array", "items": {"type": "string"}},
+        {"anyOf": [{"type": "number"}, {"type": "null"}], "default": None},
+    ],
+)
+def test_a_default_is_no_example(content: dict[str, Any]) -> None:
+    assert not has_example(content)
+    assert has_example({**content, "examples": [content.get("default")]})
 
 
 def test_every_field_has_a_description_and_an_example(tmp_path: Path) -> None:

@@ -58,12 +58,19 @@ class SubtitlesRequest(SubtitleFields):
     overflow: Annotated[
         Literal["extend", "cut-pauses", "report"], Field(description="For speech that is longer than its cue.")
     ] = "extend"
-    max_rate: Annotated[float, Field(ge=1, le=2, description="Largest rate by which speech is fitted.")] = 1.4
-    min_rate: Annotated[float, Field(ge=0.5, le=1, description="Smallest rate to which short speech is slowed.")] = 1.0
+    max_rate: Annotated[
+        float, Field(ge=1, le=2, description="Largest rate by which speech is fitted.", examples=[1.4])
+    ] = 1.4
+    min_rate: Annotated[
+        float, Field(ge=0.5, le=1, description="Smallest rate to which short speech is slowed.", examples=[1.0])
+    ] = 1.0
     max_overlap: Annotated[
-        float, Field(ge=0, le=2, description="Seconds by which last words may sound on into the next cue.")
+        float,
+        Field(ge=0, le=2, description="Seconds by which last words may sound on into the next cue.", examples=[0.3]),
     ] = 0.3
-    scene_gap: Annotated[float, Field(gt=0, le=3600, description="Seconds without a cue that divide scenes.")] = 4.0
+    scene_gap: Annotated[
+        float, Field(gt=0, le=3600, description="Seconds without a cue that divide scenes.", examples=[4.0])
+    ] = 4.0
     format: Annotated[Literal["mp4", "webm", "mov", "none"], Field(description="Videos; none: only exports.")] = "mp4"
     exports: Annotated[
         tuple[str, ...],

@@ -37,7 +37,9 @@ class TalkerRequest(BaseModel):
     attribution: Annotated[
         str, Field(max_length=200, description="Whom to name with the talker.", examples=["Anna Example"])
     ] = "not stated"
-    appearance: Annotated[bool, Field(description="Also learn the person's own face, for `face: self`.")] = False
+    appearance: Annotated[
+        bool, Field(description="Also learn the person's own face, for `face: self`.", examples=[False])
+    ] = False
     consent: Annotated[
         str | None,
         Field(

@@ -41,9 +41,13 @@ class HeadTtsRequest(BaseModel):
             examples=["Hello there."],
         ),
     ]
-    voice: Annotated[str, Field(description="A voice of GET /v1/voices; for one of Kokoro, the nearest.")] = "af_bella"
+    voice: Annotated[
+        str, Field(description="A voice of GET /v1/voices; for one of Kokoro, the nearest.", examples=["af_bella"])
+    ] = "af_bella"
     language: Annotated[str, described("language")] = "en-us"
-    speed: Annotated[float, Field(ge=0.25, le=4.0, description="Speaking rate; limited to 0.5 to 2.")] = 1.0
+    speed: Annotated[
+        float, Field(ge=0.25, le=4.0, description="Speaking rate; limited to 0.5 to 2.", examples=[1.0])
+    ] = 1.0
     dictionary: Annotated[
         str | None, described("dictionary", "A dictionary of GET /v1/dictionaries; not part of HeadTTS.")
     ] = None
@@ -75,13 +79,16 @@ class HeadTtsAudio(BaseModel):
         str, Field(description="Base64 of a .wav file or of 16-bit samples.", examples=["UklGRiQAAABXQVZF"])
     ]
     audioEncoding: Annotated[str, Field(description="wav or pcm.", examples=["wav"])]  # noqa: N815
-    words: Annotated[list[str], Field(description="Words, each but the last with a space behind it.")]
-    wtimes: Annotated[list[int], Field(description="Start of each word.")]
-    wdurations: Annotated[list[int], Field(description="Duration of each word.")]
-    visemes: Annotated[list[str], Field(description="Oculus visemes.")]
-    vtimes: Annotated[list[int], Field(description="Start of each viseme.")]
-    vdurations: Annotated[list[int], Field(description="Duration of each viseme.")]
-    phonemes: Annotated[list[str], Field(description="Phone of each viseme.")]
+    words: Annotated[
+        list[str],
+        Field(description="Words, each but the last with a space behind it.", examples=[["Hello ", "there."]]),
+    ]
+    wtimes: Annotated[list[int], Field(description="Start of each word.", examples=[[100, 480]])]
+    wdurations: Annotated[list[int], Field(description="Duration of each word.", examples=[[380, 350]])]
+    visemes: Annotated[list[str], Field(description="Oculus visemes.", examples=[["E", "nn", "O"]])]
+    vtimes: Annotated[list[int], Field(description="Start of each viseme.", examples=[[160, 230, 290]])]
+    vdurations: Annotated[list[int], Field(description="Duration of each viseme.", examples=[[70, 60, 190]])]
+    phonemes: Annotated[list[str], Field(description="Phone of each viseme.", examples=[["ə", "l", "oʊ"]])]
 
 
 OWN_ERRORS: dict[int | str, dict[str, Any]] = {

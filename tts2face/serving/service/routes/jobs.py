@@ -124,7 +124,7 @@ async def list_jobs(
     before: Annotated[
         str | None, Query(pattern="^[0-9a-f]{32}$", description="`next` of the page before.", examples=[EXAMPLE_ID])
     ] = None,
-    limit: Annotated[int, Query(ge=1, le=100, description="Largest number of jobs.")] = 50,
+    limit: Annotated[int, Query(ge=1, le=100, description="Largest number of jobs.", examples=[50])] = 50,
 ) -> JobPage:
     """Jobs of the key, the newest first; those of all keys for the scope admin."""
     owner = _owner(request.state.key)

@@ -27,11 +27,17 @@ FileName = Annotated[str, Path(description="Name of the file.", examples=["01234
 class CaptionedSpeech(SpokenText):
     """A text to speak with the times of its words."""
 
-    model: Annotated[str, Field(description="A talker; any other name is the default talker.")] = "kokoro"
-    voice: Annotated[str, Field(description="A voice of GET /v1/voices; for one of Kokoro, the nearest.")] = "af_heart"
+    model: Annotated[str, Field(description="A talker; any other name is the default talker.", examples=["kokoro"])] = (
+        "kokoro"
+    )
+    voice: Annotated[
+        str, Field(description="A voice of GET /v1/voices; for one of Kokoro, the nearest.", examples=["af_heart"])
+    ] = "af_heart"
     response_format: Annotated[SoundFormat, Field(description="Sound.")] = "mp3"
-    stream: Annotated[bool, Field(description="A JSON object on a line for each part, else one object.")] = True
-    return_timestamps: Annotated[bool, Field(description="With times of words.")] = True
+    stream: Annotated[
+        bool, Field(description="A JSON object on a line for each part, else one object.", examples=[True])
+    ] = True
+    return_timestamps: Annotated[bool, Field(description="With times of words.", examples=[True])] = True
 
 
 def _timestamps(words: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -100,7 +106,7 @@ class Phones(BaseModel):
     phonemes: Annotated[
         str, Field(description="Words in IPA, with stress marks and punctuation.", examples=["həˈloʊ."])
     ]
-    tokens: Annotated[list[int], Field(description="Empty: the service has no tokens of Kokoro.")]
+    tokens: Annotated[list[int], Field(description="Empty: the service has no tokens of Kokoro.", examples=[[]])]
 
 
 @router.post("/dev/phonemize", summary="Phones of a text", response_model=Phones)
@@ -125,7 +131,9 @@ class PhonesToSpeak(BaseModel):
             "text", "Words in IPA or in Kokoro's alphabet, with punctuation.", min_length=1, examples=["həlˈO wˈɜɹld."]
         ),
     ]
-    voice: Annotated[str, Field(description="A voice of GET /v1/voices; for one of Kokoro, the nearest.")] = "af_heart"
+    voice: Annotated[
+        str, Field(description="A voice of GET /v1/voices; for one of Kokoro, the nearest.", examples=["af_heart"])
+    ] = "af_heart"
 
 
 @router.post("/dev/generate_from_phonemes", response_class=StreamingResponse, summary="Speak phones")

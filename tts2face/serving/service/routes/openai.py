@@ -51,12 +51,19 @@ class SpokenText(BaseModel):
     model_config = ConfigDict(extra="ignore", strict=True)
 
     input: Annotated[str, described("text", "Text, with marks or SSML.", min_length=1)]
-    model: Annotated[str, Field(description="A talker; any other name is the default talker.")] = "tts-1"
+    model: Annotated[str, Field(description="A talker; any other name is the default talker.", examples=["tts-1"])] = (
+        "tts-1"
+    )
     voice: Annotated[
         str | dict[str, Any],
-        Field(description="A voice of GET /v1/voices; for one of OpenAI or Kokoro (af_bella+af_sky), the nearest."),
+        Field(
+            description="A voice of GET /v1/voices; for one of OpenAI or Kokoro (af_bella+af_sky), the nearest.",
+            examples=["alloy"],
+        ),
     ] = "alloy"
-    speed: Annotated[float, Field(ge=0.25, le=4.0, description="Speaking rate; limited to 0.5 to 2.")] = 1.0
+    speed: Annotated[
+        float, Field(ge=0.25, le=4.0, description="Speaking rate; limited to 0.5 to 2.", examples=[1.0])
+    ] = 1.0
     language: Annotated[
         str | None,
         described(
@@ -71,7 +78,7 @@ class SpokenText(BaseModel):
         Field(ge=VOLUME_LIMITS[0], le=VOLUME_LIMITS[1], description="Factor of the loudness.", examples=[1.0]),
     ] = None
     return_download_link: Annotated[
-        bool, Field(description="`X-Download-Path` of the answer names a complete file, below /v1.")
+        bool, Field(description="`X-Download-Path` of the answer names a complete file, below /v1.", examples=[False])
     ] = False
     download_format: Annotated[
         SoundFormat | None, Field(description="Format of this file; by default that of the answer.", examples=["flac"])
@@ -91,7 +98,8 @@ class Speech(SpokenText):
         Literal["audio", "sse"], Field(description="Bytes, or server-sent events with base64 (sound only).")
     ] = "audio"
     stream: Annotated[
-        bool, Field(description="Sent while it is made; else a complete file, whose header has its length.")
+        bool,
+        Field(description="Sent while it is made; else a complete file, whose header has its length.", examples=[True]),
     ] = True
     timestamps: Annotated[
         list[TimeName] | None,
@@ -273,7 +281,9 @@ def voices() -> dict[str, Any]:
 
 
 @router.get("/audio/voices", summary="Voices, for Open WebUI and clients of Kokoro-FastAPI")
-def audio_voices(*, legacy: Annotated[bool, Query(description="Names only.")] = False) -> dict[str, Any]:
+def audio_voices(
+    *, legacy: Annotated[bool, Query(description="Names only.", examples=[False])] = False
+) -> dict[str, Any]:
     """The service's voices, and names of OpenAI and Kokoro that stand for them."""
     own = [voice.name for voice in catalogue.voices() if voice.is_installed and voice.languages]
     names = [*own, *OPENAI_VOICES, *KOKORO_EXAMPLES]

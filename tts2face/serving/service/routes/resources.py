@@ -149,7 +149,8 @@ def _form(kind: str) -> dict[str, Any]:
             "description": f"With a head: {', '.join(EYE_COLOURS)} or #rrggbb; that of the photo if left out.",
         }  # fmt: skip
         parts["age_keep"] = {
-            "type": "boolean", "default": False, "description": "With a head: keep the wrinkles of the skin."
+            "type": "boolean", "default": False, "example": False,
+            "description": "With a head: keep the wrinkles of the skin.",
         }  # fmt: skip
     schema = {"type": "object", "properties": parts, "required": ["file", "name"]}
     return {"required": True, "content": {"multipart/form-data": {"schema": schema}}}
