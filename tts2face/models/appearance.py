@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.models.codec import Part, Stored, StoredModel, half
+from tts2face.models.codec import Stored, StoredModel, Submodel, half
 from tts2face.models.landmarks import FACE_OVAL, N_MESH_LANDMARKS
 from tts2face.storage.schema import Contents, Tensor, millimetres
 
@@ -140,11 +140,11 @@ class Appearance(StoredModel):
         Background video.
     """
 
-    face: Annotated[TextureModel, Part(TextureModel)]
-    mouth: Annotated[TextureModel, Part(TextureModel)]
+    face: Annotated[TextureModel, Submodel(TextureModel)]
+    mouth: Annotated[TextureModel, Submodel(TextureModel)]
     mouth_points: Annotated[NDArray[np.int32], Tensor("int32", ("points of mouth",))]
     moved_by_speech: Annotated[NDArray[np.float32], half("pixels of face", low=0.0, high=1.0)]
-    plate: Annotated[Plate, Part(Plate)]
+    plate: Annotated[Plate, Submodel(Plate)]
 
     @classmethod
     def prepare_check(cls, contents: Contents, prefix: str) -> None:

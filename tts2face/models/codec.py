@@ -4,7 +4,8 @@ The recipe for a model:
 
 1. derive its dataclass from `StoredModel`, and annotate each array with its `Tensor`, or with `Stored` where the file
    holds another form of it: ``mean: Annotated[NDArray[np.float32], Tensor("float32", ("features",))]``;
-2. annotate what is in the metadata with `InHeader`, a tuple of arrays with `Numbered`, a model within it with `Part`;
+2. annotate what is in the metadata with `InHeader`, a tuple of arrays with `Numbered`, a model within it with
+   `Submodel`;
 3. name sizes that several arrays share. ``{prefix}`` in such a name is that of all arrays of the model, ``{own}`` the
    prefix after its first word, ``{around}`` and ``{name}`` all of this but its last word, and that word; ``{last}``,
    ``{at}`` and ``{next}`` are numbers of `Numbered` arrays;
@@ -102,7 +103,7 @@ class Numbered:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class Submodel:
     """Model within a model; the name of the field stands before the names of its arrays."""
 
     model: type[StoredModel]
@@ -115,7 +116,7 @@ def half(*shape: int | str, low: float | None = None, high: float | None = None)
 
 def _stored_fields(model: Any) -> Mapping[str, Any]:
     """How each field lies in a file; without those that do not."""
-    kinds = Stored, InHeader, Numbered, Part
+    kinds = Stored, InHeader, Numbered, Submodel
     found: dict[str, Any] = {}
     for field in fields(model):
         for note in getattr(field.type, "__metadata__", ()):
@@ -206,7 +207,7 @@ def check_model(model: type[StoredModel], contents: Contents, prefix: str = "") 
     contents.tensors(stored_tensors(model, prefix, contents.arrays))
     model.check_stored(contents, prefix)
     for field, note in _stored_fields(model).items():
-        if isinstance(note, Part):
+        if isinstance(note, Submodel):
             check_model(note.model, contents, _joined(prefix, field))
 
 

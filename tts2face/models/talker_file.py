@@ -57,7 +57,7 @@ _TALKERS: Shared[Talker] = Shared()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Recordings(StoredModel):
+class StoredUtterances(StoredModel):
     """All utterances as a file holds them, one after the other: N frames and P phones of U utterances.
 
     Parameters
@@ -81,7 +81,7 @@ class Recordings(StoredModel):
     edges: Annotated[NDArray[np.float64], Tensor("float64", ("edges",), -ROUNDING_S, 1e6)]
 
     @classmethod
-    def of(cls, utterances: Sequence[Utterance], spread: Float32Array, inventory: Sequence[str]) -> "Recordings":
+    def of(cls, utterances: Sequence[Utterance], spread: Float32Array, inventory: Sequence[str]) -> "StoredUtterances":
         """Utterances of a talker with parameters of this spread (M,)."""
         numbers = {phone: number for number, phone in enumerate(inventory)}
         spoken = [numbers[phone] for utterance in utterances for phone in utterance.phones.phones]
@@ -152,7 +152,7 @@ def write_talker(path: Path, talker: Talker) -> None:
     """Write a ``.talker`` file."""
     utterances, model = talker.utterances, talker.model
     inventory = sorted({phone for utterance in utterances for phone in utterance.phones.phones})
-    arrays = stored_arrays(model) | stored_arrays(Recordings.of(utterances, model.spread, inventory))
+    arrays = stored_arrays(model) | stored_arrays(StoredUtterances.of(utterances, model.spread, inventory))
     if talker.appearance is not None:
         parameters = [utterance.appearance_parameters for utterance in utterances]
         step = talker.appearance.spread / STEPS_PER_PARAMETER
@@ -206,7 +206,7 @@ def load_talker(name: str) -> Talker:
 def _check(contents: Contents) -> None:
     _check_metadata(contents)
     check_model(ShapeModel, contents)
-    check_model(Recordings, contents)
+    check_model(StoredUtterances, contents)
     if has_part(contents, APPEARANCE):
         check_model(Appearance, contents, APPEARANCE)
         n_parameters = contents.sizes["face parameters"] + contents.sizes["mouth parameters"]
@@ -220,7 +220,7 @@ def _check(contents: Contents) -> None:
 
 def _talker_of(contents: Contents) -> Talker:
     arrays, header = contents.arrays, contents.header
-    model, recordings = model_of(ShapeModel, contents), model_of(Recordings, contents)
+    model, recordings = model_of(ShapeModel, contents), model_of(StoredUtterances, contents)
     appearance = model_of(Appearance, contents, APPEARANCE) if has_part(contents, APPEARANCE) else None
     appearances = None if appearance is None else arrays["looks"] * (appearance.spread / STEPS_PER_PARAMETER)
     fps = float(header["fps"])

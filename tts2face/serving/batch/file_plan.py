@@ -21,8 +21,8 @@ from tts2face.serving.batch.export import check_faces
 from tts2face.serving.batch.lines import Lines
 from tts2face.serving.batch.options import REPORT, BatchOptions, non_defaults
 from tts2face.serving.batch.output import Output, PlannedCue, PlannedLine, PlanWarning, Sound
-from tts2face.serving.batch.recordings import Recordings, find_recordings
-from tts2face.serving.batch.segment import ALPHA_MOVIE, MOVIE, Part, Segment
+from tts2face.serving.batch.recordings import SubtitleRecordings, find_recordings
+from tts2face.serving.batch.segment import ALPHA_MOVIE, MOVIE, CuePart, Segment
 from tts2face.serving.batch.speakers import Speakers
 from tts2face.serving.batch.windows import Window, cue_lines, cue_windows, scenes
 from tts2face.session.named_models import Models
@@ -75,7 +75,7 @@ class FilePlan:
     name: str
     warnings: list[PlanWarning] = field(default_factory=list)
     notes: list[PlanWarning] = field(default_factory=list)
-    recordings: Recordings = field(default_factory=Recordings)
+    recordings: SubtitleRecordings = field(default_factory=SubtitleRecordings)
     n_cues: int = 0
     n_silent: int = 0
     segments: dict[tuple[int, int], Segment] = field(default_factory=dict)  # by cue and part
@@ -331,7 +331,7 @@ class FilePlan:
         if sentence is None:
             return segment
         parts = tuple(
-            Part(n_letters(text), own.end - own.begin, self._slot(own), own.margin_begin)
+            CuePart(n_letters(text), own.end - own.begin, self._slot(own), own.margin_begin)
             for own, text in zip(sentence.windows, sentence.texts, strict=True)
         )
         return replace(segment, parts=parts, part=sentence.windows.index(window))

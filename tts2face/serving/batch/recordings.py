@@ -13,14 +13,14 @@ _NUMBERED = re.compile(r"(?:(?P<name>.*)[-_ .])?0*(?P<number>\d{1,9})")
 
 
 @dataclass(frozen=True, slots=True)
-class Recordings:
+class SubtitleRecordings:
     """Recordings of one subtitle file: `track` is one of the whole file, else `cues` are those of cues by number."""
 
     track: Path | None = None
     cues: Mapping[int, Path] = field(default_factory=dict)
 
 
-def find_recordings(folder: Path, subtitles: Path, names: Sequence[str]) -> Recordings:
+def find_recordings(folder: Path, subtitles: Path, names: Sequence[str]) -> SubtitleRecordings:
     """Recordings of a subtitle file.
 
     Parameters
@@ -58,4 +58,4 @@ def find_recordings(folder: Path, subtitles: Path, names: Sequence[str]) -> Reco
             f"{tracks[0]} is a recording of the whole of {subtitles}, and {min(cues.values())} one of a cue; keep one "
             "kind"
         )
-    return Recordings(tracks[0] if tracks else None, cues)
+    return SubtitleRecordings(tracks[0] if tracks else None, cues)

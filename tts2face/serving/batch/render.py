@@ -25,7 +25,7 @@ from tts2face.serving.batch.fit import EASY_S, RELEASE_S, Fit, Limits, Room, fit
 from tts2face.serving.batch.options import REPORT
 from tts2face.serving.batch.recorded_segment import excerpt_of, fit_recording
 from tts2face.serving.batch.render_process import RENDER
-from tts2face.serving.batch.segment import ALPHA_MOVIE, FILE_PREFIX, TRACK, Part, Segment, segment_from_json
+from tts2face.serving.batch.segment import ALPHA_MOVIE, FILE_PREFIX, TRACK, CuePart, Segment, segment_from_json
 from tts2face.serving.batch.segment_result import SegmentResult
 from tts2face.session.joining import Excerpt, fade_out
 from tts2face.session.prepared import PreparedRequest, prepare
@@ -213,7 +213,7 @@ class SegmentSpeech:
         self.fps = float(exact_rate(request.fps))
         self._session, self._segment = session, segment
         self._request, self._spoken = request, spoken
-        own = Part(n_letters(spoken.text), segment.window_frames, segment.slot_frames, segment.lead_frames or 0)
+        own = CuePart(n_letters(spoken.text), segment.window_frames, segment.slot_frames, segment.lead_frames or 0)
         self._parts = segment.parts or (own,)
 
     @property

@@ -24,7 +24,7 @@ HAIR = ("hair", "hair_color")  # of models; not part of the addresses of segment
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class CuePart:
     """One cue of a sentence that runs over several: letters of its words, and frames as those of `Segment`."""
 
     n_letters: int
@@ -84,7 +84,7 @@ class Segment:
     min_rate: float = 1.0
     max_overlap: float = 0.0
     is_shared: bool = False
-    parts: tuple[Part, ...] = ()
+    parts: tuple[CuePart, ...] = ()
     part: int = 0
     silence_s: float = 0.0
 
@@ -154,7 +154,7 @@ class Segment:
 
 def segment_from_json(content: Mapping[str, Any]) -> Segment:
     """The segment of `Segment.as_json`."""
-    parts = tuple(Part(**part) for part in content.get("parts", ()))
+    parts = tuple(CuePart(**part) for part in content.get("parts", ()))
     return Segment(**{**content, "models": Models(**content["models"]), "parts": parts})
 
 

@@ -26,8 +26,8 @@ from tts2face.serving.studio.recordings import (
     FOLDERS,
     REFUSED,
     UNCHECKED_FOLDER,
+    PromptTake,
     RecordingStore,
-    Take,
     judge,
 )
 from tts2face.serving.studio.work import BackgroundWork, WorkKind, WorkList
@@ -84,7 +84,7 @@ class Recordings:
             with suppress(InputError):  # its work goes on
                 self.check(number, at, take)
 
-    def check(self, number: str, at: int, take: Take) -> None:
+    def check(self, number: str, at: int, take: PromptTake) -> None:
         """Check a new take in its turn."""
         order = self.store.at(number) / UNCHECKED_FOLDER / f"{take.file}.json"
         self._work.add(CHECK, self.store.owner(number), order, {"at": at})
@@ -172,7 +172,7 @@ class Recordings:
 
     def _end_check(self, work: BackgroundWork) -> None:
         if work.state == FAILED:
-            number, refused = work.order.parents[1].name, Take(work.id, REFUSED, work.message)
+            number, refused = work.order.parents[1].name, PromptTake(work.id, REFUSED, work.message)
             self.store.judge(number, work.content.get("at", -1), refused)
 
     async def _ask(self, kind: str, order: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -62,7 +62,7 @@ async def receive_take(parts: AsyncIterator[bytes], target: Path) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Take:
+class PromptTake:
     """A recorded prompt: its file, one of the states, what to do better, and the beginning of names in the cache."""
 
     file: str
@@ -135,11 +135,11 @@ class RecordingStore:
         """Prompts of a recording with their units, and the counts of running text."""
         return dict(self._read_json(number, PROMPTS))
 
-    def takes(self, number: str) -> dict[int, Take]:
+    def takes(self, number: str) -> dict[int, PromptTake]:
         """The take of each recorded prompt, by its index."""
-        return {int(at): Take(**take) for at, take in sorted(self._read(number)["takes"].items())}
+        return {int(at): PromptTake(**take) for at, take in sorted(self._read(number)["takes"].items())}
 
-    def add_take(self, number: str, at: int, content: Path, media_type: str) -> Take:
+    def add_take(self, number: str, at: int, content: Path, media_type: str) -> PromptTake:
         """Take of a prompt, which replaces an earlier one; the file `content` is moved."""
         prompts = self.prompts(number)["prompts"]
         if not 0 <= at < len(prompts):
@@ -147,7 +147,7 @@ class RecordingStore:
         suffix = SUFFIXES.get(media_type.partition(";")[0].strip().lower())
         if suffix is None:
             raise InputError(f"a take must be {' or '.join(SUFFIXES)}, not {media_type[:40]!r}; use another browser")
-        take = Take(f"take-{at + 1:04d}-{secrets.token_hex(3)}{suffix}", CHECKING)
+        take = PromptTake(f"take-{at + 1:04d}-{secrets.token_hex(3)}{suffix}", CHECKING)
         with self._lock, translate_disk_errors(content):
             manifest = self._read(number)
             os.replace(content, self.at(number) / UNCHECKED_FOLDER / take.file)
@@ -155,10 +155,10 @@ class RecordingStore:
             manifest["takes"][str(at)] = asdict(take)
             self._write(number, manifest)
             if earlier is not None:
-                self._remove_files(number, Take(**earlier))
+                self._remove_files(number, PromptTake(**earlier))
         return take
 
-    def judge(self, number: str, at: int, judged: Take) -> None:
+    def judge(self, number: str, at: int, judged: PromptTake) -> None:
         """Set the state of a take after its check; if it was recorded again or deleted meanwhile, forget it."""
         folder = self.at(number)
         with self._lock:
@@ -186,18 +186,18 @@ class RecordingStore:
             take = manifest["takes"].pop(str(at), None)
             if take is not None:
                 self._write(number, manifest)
-                self._remove_files(number, Take(**take))
+                self._remove_files(number, PromptTake(**take))
 
     def delete(self, number: str) -> None:
         """Delete a recording with all that was made of it."""
         with self._lock:
             self._recordings.remove(number)
 
-    def path(self, number: str, take: Take) -> Path:
+    def path(self, number: str, take: PromptTake) -> Path:
         """File of a take."""
         return self.at(number) / FOLDERS[take.state] / take.file
 
-    def unchecked(self) -> Sequence[tuple[str, int, Take]]:
+    def unchecked(self) -> Sequence[tuple[str, int, PromptTake]]:
         """Takes whose check did not end, of all recordings: id, index of the prompt, take."""
         return [
             (folder.name, at, take)
@@ -212,7 +212,7 @@ class RecordingStore:
         is_english = str(prompts.get("language", ENGLISH)).partition("-")[0] == ENGLISH
         return str(prompts["prompts"][at]["text"]) if is_english else None
 
-    def _remove_files(self, number: str, take: Take) -> None:
+    def _remove_files(self, number: str, take: PromptTake) -> None:
         """Remove a take, its transcript, and what its check cached."""
         for folder in set(FOLDERS.values()):
             file = self.at(number) / folder / take.file
