@@ -144,7 +144,7 @@ def test_a_page_is_read_by_an_index(tmp_path: Path, state: str | None, owner: st
     """Neither all jobs nor all that wait are read for it; `tests/bench/bench_job_list.py` measures it."""
     url = database_url(tmp_path / "jobs.sqlite")
     prepare_database(url)
-    database = JobDatabase(url)
+    database = Database(url)
     asked: list[tuple[str, Any]] = []
     sqlalchemy.event.listen(
         database._engine, "before_cursor_execute", lambda *given: asked.append((given[2], given[3]))
