@@ -49,7 +49,7 @@ class Stage:
     """A part of the time of a request, such as waiting for a process; its bounds in seconds of the monotonic clock."""
 
     name: str
-    begin: float
+    start: float
     end: float | None = None
 
 
@@ -396,5 +396,5 @@ def durations(stages: Sequence[Stage], now: float) -> dict[str, float]:
     """Seconds of each name; a stage that has not ended counts up to `now`."""
     found: dict[str, float] = {}
     for spent in stages:
-        found[spent.name] = found.get(spent.name, 0.0) + (now if spent.end is None else spent.end) - spent.begin
+        found[spent.name] = found.get(spent.name, 0.0) + (now if spent.end is None else spent.end) - spent.start
     return found

@@ -98,7 +98,7 @@ class _Waiting:
     """A task that waits for a place."""
 
     cost: float
-    begin: float
+    since_s: float
     place: "asyncio.Future[Place]"
 
 
@@ -155,8 +155,8 @@ class Pool:
     @property
     def oldest_waiting_s(self) -> float:
         """Age of the work that waits longest."""
-        begins = [waiting.begin for queue in self._waiting.values() for waiting in queue]
-        return time.monotonic() - min(begins) if begins else 0.0
+        since_s = [waiting.since_s for queue in self._waiting.values() for waiting in queue]
+        return time.monotonic() - min(since_s) if since_s else 0.0
 
     @property
     def load(self) -> float:

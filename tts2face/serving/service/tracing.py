@@ -87,11 +87,11 @@ class Tracing:
         if request.status >= 500 or request.status == 0:
             root.set_status(StatusCode.ERROR)
         now, context = time.monotonic(), set_span_in_context(root)
-        spans = [(stage.name, stage.begin, now if stage.end is None else stage.end) for stage in request.stages]
+        spans = [(stage.name, stage.start, now if stage.end is None else stage.end) for stage in request.stages]
         if request.first_byte_s is not None:
             spans.append(("first_byte", request.began, request.began + request.first_byte_s))
-        for name, begin, end in spans:
-            self._tracer.start_span(name, context=context, start_time=_nanoseconds(begin, offset)).end(
+        for name, start, end in spans:
+            self._tracer.start_span(name, context=context, start_time=_nanoseconds(start, offset)).end(
                 _nanoseconds(end, offset)
             )
         root.end(_nanoseconds(now, offset))

@@ -235,9 +235,9 @@ def audio_fields(events: Sequence[dict[str, Any]], subtitles: dict[str, str]) ->
     words: list[Label] = []
     spoken = [Label(*word) for event in events for word in event["words"]]
     ends = [seconds for _, seconds in marks[1:]] + [float("inf")]
-    for (name, begin), end in zip(marks, ends, strict=True):
+    for (name, start), end in zip(marks, ends, strict=True):
         # times are rounded to microseconds
-        own = [word for word in spoken if begin - 1e-6 <= word.start < end - 1e-6]
+        own = [word for word in spoken if start - 1e-6 <= word.start < end - 1e-6]
         if name in subtitles and own:
             own = [Label(subtitles[name].strip(), own[0].start, own[-1].end)]
         words += own
