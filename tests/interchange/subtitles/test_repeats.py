@@ -51,6 +51,27 @@ SHOWN_AGAIN = {
         ".srt",
         [(0, "Now"), (0.4, "we"), (0.8, "go"), (1.2, "home.")],
     ),
+    "words marked one by one": (
+        srt(
+            (0, 0.4, "<u>Here</u> we go."),
+            (0.4, 0.8, "Here <u>we</u> go."),
+            (0.8, 1.2, "Here we <u>go.</u>"),
+            (1.2, 1.5, "Here we go."),
+            (1.5, 2, "<u>So</u> long."),
+            (2, 3, "So <u>long.</u>"),
+        ),
+        ".srt",
+        [(0, "Here we go."), (1.5, "So long.")],
+    ),
+    "words marked one by one in SubStation Alpha": (
+        ass(
+            (0, 0.4, "Default", "{\\c&H00FF&}Here{\\c} we"),
+            (0.4, 0.8, "Default", "Here {\\c&H00FF&}we{\\c}"),
+            (2, 3, "Default", "Bye."),
+        ),
+        ".ass",
+        [(0, "Here we"), (2, "Bye.")],
+    ),
     "painted on in the second line": (
         srt(
             (0, 1, "It rains."),
@@ -101,6 +122,14 @@ def test_writing_that_moves_frame_by_frame_is_a_sign(read: ReadText) -> None:
     assert found.notes[0].message.startswith("1 sign, such as 'Bakery', is not spoken")
 
 
+def test_placed_words_that_are_marked_one_by_one_are_no_sign(read: ReadText) -> None:
+    lines = [
+        (1, 1.4, "Default", "{\\pos(9,9)}{\\b1}Come{\\b0} here"),
+        (1.4, 2, "Default", "{\\pos(9,9)}Come {\\b1}here"),
+    ]
+    assert [(cue.begin_s, cue.end_s, cue.text) for cue in read(ass(*lines), ".ass").cues] == [(1, 2, "Come here")]
+
+
 def test_a_line_in_frames_is_spoken_once(read: ReadText) -> None:
     frames = [(3 + n * 0.04, 3.04 + n * 0.04, "Default", f"{{\\alpha&H{n:02x}&}}Come here.") for n in range(20)]
     found = read(ass(*frames), ".ass")
@@ -122,6 +151,7 @@ def test_words_begin_at_their_instants_in_a_growing_cue(read: ReadText) -> None:
         [(0, 1, "No."), (1, 2, "No."), (2, 3, "No.")],
         [(0, 1, "No."), (1, 2, "No. No."), (2, 3, "No. No. No.")],
         [(0, 2, "Row, row, row your boat"), (2, 4, "Row, row, row your boat"), (4, 6, "gently down the stream")],
+        [(0, 1, "I know."), (1, 2, "<i>I know.</i>")],
         [(0, 2, "- What happened?"), (2, 4, "- What happened?\n- Nothing.")],
         [(0, 2, "I love you."), (2, 4, "I love you too.")],
         [(0, 2, "He is late."), (5, 7, "He is late.\nAgain.")],

@@ -21,6 +21,8 @@ SURE_WORDS = 4  # carried by a single cue in a file that does not roll
 SAME_S = 0.1  # within which copies begin
 _INSTANT = re.compile(r"<(\d[\d:.,]*:\d[\d:.,]*)>")
 _PLACED = re.compile(r"\{[^{}]*\\(?:pos|move)\s*\(")  # in SubStation Alpha
+_MARK = re.compile(r"</?[A-Za-z][^<>]*>|\{\\[^{}]*\}")
+_OUTER_MARKS = re.compile(rf"^(?:{_MARK.pattern}|\s)+|(?:{_MARK.pattern}|\s)+$")
 _LYRICS = re.compile("[♪♫♬♩]")
 _MARKS = re.compile(r"[^\w]+")
 
@@ -35,7 +37,7 @@ class _Step:
     n_carried: int = 0
     is_strong: bool = False
     is_sure: bool = False
-    is_hold: bool = False
+    is_frame: bool = False
 
 
 def without_copies(cues: Sequence[WrittenCue], warnings: list[SubtitleWarning]) -> list[WrittenCue]:
@@ -108,7 +110,7 @@ def without_carried(cues: Sequence[WrittenCue], notes: list[SubtitleWarning]) ->
         if not step.n_carried:
             kept.append(cue)
             continue
-        if step.is_hold and kept and all(_PLACED.search(shown.text) for shown in (kept[-1], cue)):
+        if step.is_frame and kept and all(_PLACED.search(shown.text) for shown in (kept[-1], cue)):
             # frame by frame writing follows the picture
             kept[-1] = replace(kept[-1], end_s=cue.end_s, kind=kept[-1].kind or SIGNS)
             continue
@@ -160,12 +162,19 @@ def _step(before: WrittenCue, cue: WrittenCue, old: Sequence[Sequence[str]], new
         return _Step()
     n_new = len(words) - len(tail)
     length = None if cue.end_s is None else cue.end_s - cue.begin_s
-    is_hold = not n_new and length is not None and 0.0 < length <= HOLD_S
+    is_frame = not n_new and length is not None and 0.0 < length <= HOLD_S
+    is_marked = not n_new and first == 0 and len(words) > 1 and _is_highlight(before.text, cue.text)
+    is_hold = is_frame or is_marked
     is_moved = (n_new > 0 or first > 0) and len(set(words)) > 1
     is_sung = any(_LYRICS.search(word) for word in words)
     gap = 0.0 if before.end_s is None else cue.begin_s - before.end_s
     is_sure = is_hold or (is_moved and len(tail) >= SURE_WORDS and abs(gap) <= HOLD_S and not is_sung)
-    return _Step(len(tail), is_hold or is_moved, is_sure, is_hold)
+    return _Step(len(tail), is_hold or is_moved, is_sure, is_frame)
+
+
+def _is_highlight(former: str, text: str) -> bool:
+    """Whether texts of the same words mark different ones: word by word, as recognisers of speech and karaoke do."""
+    return former != text and any(_MARK.search(_OUTER_MARKS.sub("", written)) for written in (former, text))
 
 
 def _accepted(steps: Sequence[_Step]) -> list[_Step]:
