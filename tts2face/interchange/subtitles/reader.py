@@ -26,7 +26,7 @@ from tts2face.interchange.subtitles.markup import plain_text
 from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.interchange.subtitles.repeats import without_carried, without_copies
 from tts2face.interchange.subtitles.spoken_text import SpokenText, spoken_lines, spoken_text
-from tts2face.interchange.subtitles.timing import MAX_S, estimated_end, placed
+from tts2face.interchange.subtitles.timing import MAX_S, estimated_end, latest_ends, placed
 from tts2face.interchange.subtitles.unspoken import LYRICS, REPEATS, SIGNS, notes_of, with_credits
 
 DEFAULTS = SubtitleOptions()
@@ -142,6 +142,7 @@ def _timed(
     # Only a text with a colon is divided, as most have none.
     labels = find_speakers(["\n".join(spoken_lines(text)) if ":" in text or "：" in text else text for text in plain])
     speakers: Collection[str] = labels.keys() if options.speakers else ()
+    latest = latest_ends(written)
     cues: list[Cue] = []
     left_out: list[tuple[str, int, str]] = []
     for number, (cue, is_said) in enumerate(zip(written, said, strict=True)):
@@ -151,14 +152,16 @@ def _timed(
         else:
             left_out.append((cue.kind, cue.line, text.shown))
             text = SpokenText("", text.shown, ())
-        made = _cue(number, written, text, warnings)
+        made = _cue(number, written, text, latest[number], warnings)
         cues.append(made if is_said else replace(made, kind=cue.kind))
     notes += notes_of(left_out)
     notes += _note_of_speakers(cues, labels if options.speakers else {})
     return tuple(cues)
 
 
-def _cue(number: int, written: Sequence[WrittenCue], text: SpokenText, warnings: list[SubtitleWarning]) -> Cue:
+def _cue(
+    number: int, written: Sequence[WrittenCue], text: SpokenText, latest: float, warnings: list[SubtitleWarning]
+) -> Cue:
     cue = written[number]
     following = written[number + 1].begin_s if number + 1 < len(written) else None
     end = cue.end_s
@@ -167,7 +170,7 @@ def _cue(number: int, written: Sequence[WrittenCue], text: SpokenText, warnings:
         if end is not None:
             reason = "has no length" if end == cue.begin_s else "ends before it begins"
             warnings.append(SubtitleWarning(cue.line, f"the cue {reason}; its end is estimated"))
-        end = estimated_end(number, written, text.spoken or text.shown)
+        end = estimated_end(cue.begin_s, latest, text.spoken or text.shown)
     elif following is not None and end is not None and end > following + OVERLAP_S:
         warnings.append(SubtitleWarning(cue.line, f"this cue overlaps the next one by {end - following:.2f} s"))
     parts = text.parts if len(text.parts) > 1 else ()

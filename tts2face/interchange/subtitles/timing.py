@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import inf
 from statistics import median
 
 from lexicon.errors import DataError
@@ -129,25 +130,29 @@ def _within_film(cues: Sequence[WrittenCue], film_s: float | None, warnings: lis
     return [cue for cue in cues if cue.begin_s <= film_s + FILM_MARGIN_S]
 
 
-def estimated_end(number: int, cues: Sequence[WrittenCue], text: str) -> float:
-    """End of a cue by the length of its text, which overrules no time of the file.
+def latest_ends(cues: Sequence[WrittenCue]) -> list[float]:
+    """For each cue in order of time the latest end that an estimate may give it, so that it overrules no written time.
 
-    It lies at most at the start of the next cue, and at the end of cues that begin at the same instant: words of no
-    length share the time up to the next instant that is written.
+    It is the start of the next cue, or the end of one that begins at the same instant: words of no length share the
+    time up to the next instant that is written. Without either it is infinite.
     """
-    start = cues[number].begin_s
-    end = start + max(MIN_ESTIMATED_S, len(text) / CHARACTERS_PER_S)
-    first, after = number, number + 1
-    while first > 0 and cues[first - 1].begin_s > start - SAME_INSTANT_S:
-        first -= 1
-    while after < len(cues) and cues[after].begin_s <= start + SAME_INSTANT_S:
-        after += 1
-    if after < len(cues):
-        end = min(end, cues[after].begin_s)
-    for cue in cues[first:after]:
-        if cue.end_s is not None and cue.end_s > start + SAME_INSTANT_S:
-            end = min(end, cue.end_s)
-    return end
+    ends: list[float] = []
+    first = 0
+    while first < len(cues):
+        start = cues[first].begin_s
+        after = first + 1
+        while after < len(cues) and cues[after].begin_s <= start + SAME_INSTANT_S:
+            after += 1
+        written = [cue.end_s for cue in cues[first:after] if cue.end_s is not None and cue.end_s > start]
+        following = [cues[after].begin_s] if after < len(cues) else []
+        ends += [min([*written, *following], default=inf)] * (after - first)
+        first = after
+    return ends
+
+
+def estimated_end(start: float, latest: float, text: str) -> float:
+    """End of a cue by the length of its text, at most the latest one that it may have."""
+    return min(start + max(MIN_ESTIMATED_S, len(text) / CHARACTERS_PER_S), latest)
 
 
 def median_speed(cues: Sequence[WrittenCue]) -> float | None:

@@ -132,7 +132,7 @@ async def add_subtitles(order: JobOrder, part: str, file: UploadFile, number: in
     order.upload.n_cues += int(numbers["cues"])
     if order.upload.n_cues > settings.job_cues:
         raise RefusedError(413, "too_large", f"the files have more than {settings.job_cues} cues; divide them")
-    if numbers["seconds"] > settings.job_s:
+    if numbers["seconds"] + order.options.shift > settings.job_s:
         raise RefusedError(413, "too_large", f"{name} is longer than {settings.job_s:g} s; divide it")
     order.upload.files[f"{name}{path.suffix}"] = path
 
