@@ -116,6 +116,23 @@ def test_wrong_files_are_refused_and_leave_no_project(
     assert {one["id"] for one in studio.get("/api/projects").json()} == before
 
 
+def test_imported_subtitles_say_what_was_guessed_and_is_not_spoken(studio: TestClient) -> None:
+    content = "1\n00:00:01,000 --> 00:00:03,000\n[bouchnutí] ANNA: Můžete přijít?\n".encode("cp1250")
+    answer = studio.post("/api/imports", files={"file": ("x.srt", content)}).json()
+    assert [note.partition(",")[0].partition(";")[0] for note in answer["notes"]] == [
+        "line 1: the encoding is not stated and was guessed as cp1250",
+        "line 2: 1 annotation",
+        "line 2: speakers by names before a colon: ANNA (1)",
+    ]
+    choices = {"encoding": "cp1250", "keep": "annotations", "speakers": "false"}
+    kept = studio.post("/api/imports", files={"file": ("x.srt", content)}, data=choices).json()
+    assert kept["notes"] == []
+    project = studio.get(f"/api/projects/{kept['id']}/project.json").json()
+    assert project["request"]["text"] == "bouchnutí ANNA: Můžete přijít?"
+    refused = studio.post("/api/imports", files={"file": ("x.srt", content)}, data={"keep": "noises"})
+    assert "keep must be of annotations" in refused.json()["error"]["message"]
+
+
 def test_what_cannot_be_compared_is_refused(studio: TestClient) -> None:
     number = create(studio, TEXT)
     for reference, reason in (

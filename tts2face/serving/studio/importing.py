@@ -4,7 +4,7 @@ import asyncio
 import tempfile
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from lexicon.errors import InputError
@@ -12,6 +12,7 @@ from lexicon.values.json_text import parse_json
 from tts2face.gestures.elements import StyleSpan
 from tts2face.gestures.timeline import Timeline
 from tts2face.interchange.subtitles.formats import SUFFIXES
+from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.interchange.subtitles.reader import read_subtitles
 from tts2face.request import Request
 from tts2face.serving.service.errors import RefusedError
@@ -50,8 +51,30 @@ async def import_sample(studio: StudioHost, key: ApiKey) -> str:
     )
 
 
-async def import_file(studio: StudioHost, key: ApiKey, path: Path, name: str, transcript: str = "") -> str:
-    """Id of a new project from an uploaded file, whose ending says what it is.
+@dataclass(frozen=True, slots=True)
+class Imported:
+    """Id of a new project, and what was guessed of its file and is not spoken."""
+
+    project: str
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ImportChoices:
+    """How a file is read: words of a recording if they are known; encoding and other choices of subtitles."""
+
+    transcript: str = ""
+    encoding: str | None = None
+    subtitles: SubtitleOptions = field(default_factory=SubtitleOptions)
+
+
+NO_CHOICES = ImportChoices()
+
+
+async def import_file(
+    studio: StudioHost, key: ApiKey, path: Path, name: str, choices: ImportChoices = NO_CHOICES
+) -> Imported:
+    """A new project from an uploaded file, whose ending says what it is.
 
     Parameters
     ----------
@@ -59,21 +82,21 @@ async def import_file(studio: StudioHost, key: ApiKey, path: Path, name: str, tr
         The file as it came.
     name
         Its name at the client.
-    transcript
-        Words of a recording, if they are known.
     """
     suffix, title = Path(name).suffix.lower(), _title(Path(name).stem)
     if suffix == ".json":
-        return await _import_project(studio, key, path)
+        return Imported(await _import_project(studio, key, path))
     if suffix in TEXT_SUFFIXES:
-        return await import_text(studio, key, _read_text(path, name), title)
+        return Imported(await import_text(studio, key, _read_text(path, name), title))
     if suffix in SUFFIXES:
-        async with _decoded(studio.state, key, (SUBTITLES, path, suffix)) as checked:
-            text = await asyncio.to_thread(_spoken_text, checked)
-        return await import_text(studio, key, text, title)
+        async with _decoded(studio.state, key, (SUBTITLES, path, suffix), choices.encoding) as checked:
+            read = await asyncio.to_thread(read_subtitles, checked, choices.encoding, choices.subtitles)
+        text = "\n".join(cue.text for cue in read.cues if cue.text)
+        notes = tuple(f"line {note.line}: {note.message}" for note in (*read.warnings, *read.notes))
+        return Imported(await import_text(studio, key, text, title), notes)
     if suffix in SOUND_SUFFIXES:
         async with _decoded(studio.state, key, (SOUND, path, ".wav")) as checked:
-            return await add_recording(studio, key, checked, title, transcript)
+            return Imported(await add_recording(studio, key, checked, title, choices.transcript))
     kinds = (*TEXT_SUFFIXES, *SUFFIXES, *SOUND_SUFFIXES, ".json")
     raise InputError(f"a file {name[-40:]!r} cannot be imported; give one that ends in {', '.join(kinds)}")
 
@@ -96,19 +119,18 @@ async def add_recording(studio: StudioHost, key: ApiKey, sound: Path, title: str
     return number
 
 
-def _spoken_text(path: Path) -> str:
-    return "\n".join(cue.text for cue in read_subtitles(path).cues if cue.text)
-
-
 @asynccontextmanager
-async def _decoded(state: ServiceState, key: ApiKey, given: tuple[str, Path, str]) -> AsyncIterator[Path]:
+async def _decoded(
+    state: ServiceState, key: ApiKey, given: tuple[str, Path, str], encoding: str | None = None
+) -> AsyncIterator[Path]:
     """A file of a kind after its check in a process with limits, with a suffix."""
     settings, (kind, path, suffix) = state.settings, given
     limit = settings.sound_s if kind == SOUND else settings.job_cues
     with tempfile.TemporaryDirectory(prefix="tts2face-upload-") as folder:
         target = Path(folder, f"checked{suffix}")
+        order = FileOrder(kind, path, target, limit, encoding)
         try:
-            await state.decoders.decode(key.name, FileOrder(kind, path, target, limit), "the file", settings.decode_s)
+            await state.decoders.decode(key.name, order, "the file", settings.decode_s)
         except RefusedError as refused:
             raise InputError(refused.message) from refused
         yield target

@@ -9,7 +9,14 @@ from nicegui import events, ui
 
 from tts2face.interchange.subtitles.formats import SUFFIXES
 from tts2face.serving.service.keys import ApiKey
-from tts2face.serving.studio.importing import SOUND_SUFFIXES, TEXT_SUFFIXES, import_file, import_sample, import_text
+from tts2face.serving.studio.importing import (
+    SOUND_SUFFIXES,
+    TEXT_SUFFIXES,
+    ImportChoices,
+    import_file,
+    import_sample,
+    import_text,
+)
 from tts2face.serving.studio.pages.frame import begin_page, confirm, heading, icon_button, page_bar, shown_errors
 from tts2face.serving.studio.pages.login import LOGOUT_PATH
 from tts2face.serving.studio.project_archive import has_files
@@ -17,6 +24,7 @@ from tts2face.serving.studio.project_store import ProjectEntry
 from tts2face.serving.studio.studio import Studio
 
 MB = 1_000_000
+MAX_NOTES = 12  # of a file, that a dialog shows
 ANY_FILE = ",".join((*TEXT_SUFFIXES, *SUFFIXES, *SOUND_SUFFIXES, ".json"))
 
 
@@ -91,7 +99,23 @@ class ProjectsPage:
         with shown_errors(), tempfile.TemporaryDirectory(prefix="tts2face-upload-") as folder:
             path = Path(folder, "upload")
             await event.file.save(path)
-            self._open(await import_file(self._studio, self._key, path, event.file.name, self._words.value or ""))
+            choices = ImportChoices(self._words.value or "")
+            made = await import_file(self._studio, self._key, path, event.file.name, choices)
+            if made.notes:
+                await self._show_notes(made.notes)
+            self._open(made.project)
+
+    async def _show_notes(self, notes: tuple[str, ...]) -> None:
+        """Show what was guessed of a file and is not spoken, before its project opens."""
+        with ui.dialog() as dialog, ui.card():
+            ui.label("What was found in the file")
+            for note in notes[:MAX_NOTES]:
+                ui.label(note).classes("quiet")
+            if len(notes) > MAX_NOTES:
+                ui.label(f"and {len(notes) - MAX_NOTES} more").classes("quiet")
+            ui.button("Open the project", on_click=lambda: dialog.submit(None)).props("autofocus")
+        await dialog
+        dialog.delete()
 
     def _open(self, number: str) -> None:
         ui.navigate.to(f"/animate/{number}")

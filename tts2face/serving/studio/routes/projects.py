@@ -13,11 +13,12 @@ from fastapi import Request as HttpRequest
 from fastapi.responses import FileResponse, JSONResponse, Response
 
 from lexicon.errors import InputError
+from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.page_addresses import PAGES
 from tts2face.serving.service.uploads import BLOCK_BYTES
 from tts2face.serving.studio.face_answer import face_answer
-from tts2face.serving.studio.importing import import_file, import_text
+from tts2face.serving.studio.importing import ImportChoices, import_file, import_text
 from tts2face.serving.studio.project_archive import archive
 from tts2face.serving.studio.requests import data_of, events_of
 from tts2face.serving.studio.studio import Studio
@@ -62,16 +63,26 @@ async def create_project(
 
 
 @router.post("/imports", status_code=201)
-async def import_upload(
-    request: HttpRequest, file: Annotated[UploadFile, File()], transcript: Annotated[str, Form()] = ""
-) -> dict[str, str]:
-    """A new project from a file."""
+async def import_upload(  # noqa: PLR0913 - one parameter a field of the form
+    request: HttpRequest,
+    file: Annotated[UploadFile, File()],
+    transcript: Annotated[str, Form()] = "",
+    *,
+    encoding: Annotated[str | None, Form(max_length=40)] = None,
+    language: Annotated[str | None, Form(max_length=40)] = None,
+    keep: Annotated[list[str] | None, Form()] = None,
+    speakers: Annotated[bool, Form()] = True,
+) -> dict[str, Any]:
+    """A new project from a file; the last four fields are of subtitles, as the options of ``tts2face batch``."""
+    subtitles = SubtitleOptions(language=language, keep=tuple(keep or ()), speakers=speakers)
+    choices = ImportChoices(transcript, encoding, subtitles)
     with tempfile.TemporaryDirectory(prefix="tts2face-upload-") as folder:
         path = Path(folder, "upload")
         with path.open("wb") as saved:
             while block := await file.read(BLOCK_BYTES):
                 saved.write(block)
-        return await _made(import_file(_studio(request), request.state.key, path, file.filename or "", transcript))
+        made = await import_file(_studio(request), request.state.key, path, file.filename or "", choices)
+        return {"id": made.project, "notes": made.notes}
 
 
 @router.get("/projects/{project}/project.json")
