@@ -13,7 +13,7 @@ from cli.flags import Cache, Model, switch, whole_number
 from cli.photo import Yes
 from cli.process import ask, write_message
 from cli.progress import progress_bar, stage_bar
-from cli.tool_flags import DEFAULTS, ToolFlags
+from cli.tool_flags import READING_DEFAULTS, ReadingFlags, Tier
 from lexicon.errors import InputError
 from tts2face.storage.files import write_atomically
 from tts2face.storage.output_paths import check_file_name, refuse_overwriting
@@ -61,6 +61,7 @@ def check(
     /,
     *,
     text: Annotated[str | None, Parameter(help="What is said in one video, in place of a transcript.")] = None,
+    tier: Tier = None,
     cache: Cache = None,
     model: Model = None,
     yes: Yes = False,
@@ -68,14 +69,13 @@ def check(
     """Check recordings for `corpus build`, one by one: light, sharpness, sound, words, and what to do better."""
     if text is not None and recordings.is_dir():
         raise InputError("--text belongs to one video, not to a folder; write transcripts beside the videos")
+    from corpus_tools.recordings.folder import recording_notes
     from corpus_tools.recordings.observe import RecordingChecker, recordings_to_check
-    from corpus_tools.recordings.subtitle_cues import subtitle_notes
     from corpus_tools.run_options import RunOptions
 
-    found = recordings_to_check(recordings, text)
-    for video in dict.fromkeys(recording.video for recording in found) if text is None else ():
-        for note in subtitle_notes(video):
-            print(f"{video.name}: note: {note}")  # noqa: T201 - the result
+    found = recordings_to_check(recordings, text, tier)
+    for note in recording_notes(found):
+        print(f"note: {note}")  # noqa: T201 - the result
     checker = RecordingChecker(RunOptions(cache, None, model))
     for recording in found:
         findings = checker.check(recording)
@@ -119,7 +119,7 @@ def build(  # noqa: PLR0913 - one parameter a flag
         ),
     ] = "grid_s1",
     strict: Annotated[bool, switch("Reject recordings with warnings, too.")] = False,
-    tool: ToolFlags = DEFAULTS,
+    tool: ReadingFlags = READING_DEFAULTS,
 ) -> None:
     """Build a talker from recordings. After an interruption, the same command resumes the build."""
     check_suffix(out, "talker")
@@ -250,7 +250,7 @@ def audio_maps(
     *,
     talker: TalkerName,
     out: OutTalker,
-    tool: ToolFlags = DEFAULTS,
+    tool: ReadingFlags = READING_DEFAULTS,
 ) -> None:
     """Train the audio maps of a talker that was built without them: speech motion from sound alone (`--audio`)."""
     check_suffix(out, "talker")

@@ -10,7 +10,7 @@ from cli.learning_curve import run_learning_curve
 from cli.people import DEFAULT_TALKER, run_people_evaluation
 from cli.process import write_message
 from cli.progress import progress_bar
-from cli.tool_flags import DEFAULTS, ToolFlags
+from cli.tool_flags import READING_DEFAULTS, ReadingFlags, ToolFlags
 from lexicon.errors import InputError
 from tts2face.storage.output_paths import check_file_name, refuse_overwriting
 
@@ -52,7 +52,7 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
             alias="-o",
         ),
     ] = None,
-    tool: ToolFlags = DEFAULTS,
+    tool: ReadingFlags = READING_DEFAULTS,
 ) -> None:
     """Compare synthesised lip motion with held-out recordings."""
     inputs = {"--recordings": split.recordings, "--train": split.train, "--test": split.test}
@@ -163,4 +163,6 @@ def _read_observations(folder: Path, run_options: "RunOptions") -> "tuple[Observ
         found = observe(folder, run_options=run_options, on_progress=on_progress)
     for refusal in found.refused:
         write_message(f"rejected {refusal.name}: {refusal.reason}")
+    for note in found.notes:
+        write_message(f"note: {note}")
     return found.kept

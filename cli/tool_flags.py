@@ -1,7 +1,7 @@
 """Flags that commands on recordings have in common: processes, folder of results, landmark model."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -10,6 +10,13 @@ from cli.photo import Yes
 
 if TYPE_CHECKING:
     from corpus_tools.run_options import RunOptions
+
+Tier = Annotated[
+    str | None,
+    Parameter(
+        help="Tier of the words in TextGrids and other files of tiers; by default the likely one, which is said."
+    ),
+]
 
 
 @Parameter(name="*")
@@ -29,4 +36,18 @@ class ToolFlags:
         return RunOptions(self.cache, self.jobs, self.model)
 
 
-DEFAULTS = ToolFlags()
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadingFlags(ToolFlags):
+    """Flags of a run that reads transcripts, too."""
+
+    tier: Tier = None
+
+    def run_options(self) -> "RunOptions":
+        """The options of the run."""
+        from corpus_tools.run_options import RunOptions
+
+        return RunOptions(self.cache, self.jobs, self.model, self.tier)
+
+
+DEFAULTS, READING_DEFAULTS = ToolFlags(), ReadingFlags()

@@ -53,7 +53,8 @@ CONTENT = "motion only: landmark shapes, head pose, phones and loudness; no imag
 class BuiltTalker:
     """Result of a build: number and minutes of kept recordings, refusals, and warnings about kept ones.
 
-    ``notes`` state what to expect of a talker with a base, and what to record next.
+    ``notes`` state what was chosen of transcripts and not read, what to expect of a talker with a base, and what to
+    record next.
     """
 
     n_kept: int
@@ -120,7 +121,7 @@ def build_talker(  # noqa: PLR0913 - run options and the date change no motion
         **dict.fromkeys(PROVENANCE_FIELDS, NOT_STATED),
         **stated,
         "name": talker_name,
-        "command": _command_line(recordings, out, name, provenance),
+        "command": _command_line(recordings, out, name, provenance, run_options),
         "created": created or datetime.now(UTC).date().isoformat(),
         "content": CONTENT if consent is None else CONTENT_WITH_PICTURES,
         **({} if consent is None else {"consent": dict(consent)}),
@@ -140,6 +141,7 @@ def build_talker(  # noqa: PLR0913 - run options and the date change no motion
     write_talker(out, talker)
     minutes = sum(len(item.landmarks) / item.fps for item in steady) / 60.0
     notes = (*short.notes, *recording_advice(steady)) if short else ()
+    notes = (*observations.notes, *notes)
     return BuiltTalker(len(steady), minutes, observations.refused, observations.warnings, notes)
 
 
@@ -249,8 +251,11 @@ def _reading_metadata(kept: Sequence[Observation]) -> dict[str, Any]:
     }
 
 
-def _command_line(recordings: Path, out: Path, name: str | None, provenance: Path | None) -> str:
+def _command_line(
+    recordings: Path, out: Path, name: str | None, provenance: Path | None, run_options: RunOptions | None
+) -> str:
     words = ["tts2face", "corpus", "build", recordings.name]
     words += ["--name", name] if name else []
     words += ["--provenance", provenance.name] if provenance else []
+    words += ["--tier", run_options.tier] if run_options and run_options.tier else []
     return shlex.join([*words, "--out", out.name])

@@ -1,4 +1,4 @@
-"""Options of long computations that do not affect results: cache folder, processes, model files."""
+"""Options of long computations: cache folder, processes, model files, and which tier of transcripts is read."""
 
 import os
 from dataclasses import dataclass
@@ -11,15 +11,17 @@ from tts2face.storage.user_folders import user_cache
 
 @dataclass(frozen=True, slots=True)
 class RunOptions:
-    """Options of a run that do not change its result.
+    """Options of a run over recordings; all but ``tier`` leave its result as it is.
 
     ``cache`` is the folder for intermediate results (the user's cache when None), ``jobs`` the number of processes (one
     per core when None), ``model`` the bundle of landmark models (found when None).
+    ``tier`` is the name of the tier of the words in TextGrids and other files of tiers (the likely one when None).
     """
 
     cache: Path | None = None
     jobs: int | None = None
     model: Path | None = None
+    tier: str | None = None
 
     def __post_init__(self) -> None:
         """Refuse values of other types (`InputError`)."""

@@ -1,12 +1,12 @@
 """Folders of recordings: their videos and transcripts."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from corpus_tools.recordings.subtitle_cues import find_subtitles, read_cues
-from corpus_tools.recordings.transcripts import find_transcript, read_transcript
+from corpus_tools.recordings.subtitle_cues import find_subtitles, read_cues, subtitle_notes
+from corpus_tools.recordings.transcripts import WrittenWords, find_transcript, passed_over, read_transcript
 from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import DataError, InputError
 from lexicon.normalize import normalize
@@ -15,6 +15,7 @@ from tts2face.sound.word_lattice import PronouncedWords, Pronunciations
 
 VIDEO_SUFFIXES = frozenset({".mkv", ".mp4", ".mov", ".webm", ".avi", ".mpg", ".mpeg", ".m4v", ".ts", ".mts"})
 MANIFEST = "manifest.csv"
+MAX_NOTES = 12  # about transcripts of a folder
 # Names of letters in ARPABET, in southern British and in American English.
 LETTER_NAMES = {
     "a": ("EY1",), "b": ("B IY1",), "c": ("S IY1",), "d": ("D IY1",), "e": ("IY1",), "f": ("EH1 F",),
@@ -32,7 +33,8 @@ class Recording:
     """A recording: a video, or a part of one, and its transcript.
 
     If `is_spelling`, words of one letter are names of letters. ``transcript`` is a text or its file, None without one.
-    ``span`` are the seconds of the video, None for all. ``words`` are its pronounced words if already known.
+    ``span`` are the seconds of the video, None for all. ``words`` are its pronounced words if already known. ``tier``
+    names the tier of the words in files that have several, None: the likely one.
     """
 
     name: str
@@ -41,14 +43,20 @@ class Recording:
     is_spelling: bool = False
     span: tuple[float, float] | None = None
     words: PronouncedWords | None = None
+    tier: str | None = None
 
 
-def find_recordings(folder: Path) -> tuple[Recording, ...]:
+def find_recordings(folder: Path, tier: str | None = None) -> tuple[Recording, ...]:
     """Recordings of a folder sorted by name, or those of one video.
 
     Two layouts are supported: ``manifest.csv`` (columns clip, transcript) beside a folder ``clips``, as for the GRID
     corpus, where single letters are names of letters; and videos with subtitles (.srt, .vtt; each cue is a recording)
-    or a transcript (.txt, .TextGrid, .align) of the same name.
+    or a transcript (`corpus_tools.recordings.transcripts.SUFFIXES`) of the same name.
+
+    Parameters
+    ----------
+    tier
+        Name of the tier of the words in TextGrids and other files of tiers; None: the likely one of each.
 
     Raises
     ------
@@ -58,14 +66,14 @@ def find_recordings(folder: Path) -> tuple[Recording, ...]:
         The manifest cannot be read.
     """
     if folder.is_file() and folder.suffix.lower() in VIDEO_SUFFIXES:
-        return tuple(_recordings_in_video(folder))
+        return tuple(_recordings_in_video(folder, tier))
     if not folder.is_dir():
         raise InputError(f"there is no folder {folder}; give the folder of recordings")
     manifest = folder / MANIFEST
     found = (
         _recordings_from_manifest(folder, manifest)
         if manifest.is_file()
-        else tuple(recording for video in _list_videos(folder) for recording in _recordings_in_video(video))
+        else tuple(recording for video in _list_videos(folder) for recording in _recordings_in_video(video, tier))
     )
     if not found:
         raise InputError(
@@ -78,7 +86,7 @@ def pronounce_recording(recording: Recording) -> PronouncedWords | None:
     """The words of a transcript with their pronunciations; None without a transcript."""
     if recording.words is not None or recording.transcript is None:
         return recording.words
-    content = read_transcript(recording.transcript) if isinstance(recording.transcript, Path) else recording.transcript
+    content = _written(recording).text
     text = content if recording.is_spelling else normalize(content)
     words = re.findall(r"[^\W_]+(?:['’][^\W_]+)*", text)
     if not words:
@@ -86,6 +94,32 @@ def pronounce_recording(recording: Recording) -> PronouncedWords | None:
     return tuple(
         (word, look_up_pronunciations(word, is_letter=recording.is_spelling and len(word) == 1)) for word in words
     )
+
+
+def recording_notes(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """Sentences about what is read of the recordings' transcripts, and about files beside them that are not read."""
+    # a text in place of a file has no span
+    with_files = {one.video: None for one in recordings if not isinstance(one.transcript, str) or one.span is not None}
+    notes: dict[str, None] = dict.fromkeys(note for video in with_files for note in subtitle_notes(video))
+    for recording in recordings:
+        try:
+            notes.update(dict.fromkeys(_written(recording).notes))
+        except DataError:
+            continue  # said where the recording is read
+    transcripts = [
+        recording.transcript if isinstance(recording.transcript, Path) else find_subtitles(recording.video)
+        for recording in recordings
+    ]
+    over = passed_over({recording.video for recording in recordings}, [path for path in transcripts if path])
+    left = len(notes) - MAX_NOTES
+    more = (f"the same of {left} more",) if left > 0 else ()
+    return (*[*notes][:MAX_NOTES], *more, *([over] if over else []))
+
+
+def _written(recording: Recording) -> WrittenWords:
+    if isinstance(recording.transcript, Path):
+        return read_transcript(recording.transcript, recording.tier)
+    return WrittenWords(recording.transcript or "")
 
 
 def look_up_pronunciations(word: str, *, is_letter: bool) -> Pronunciations:
@@ -133,7 +167,7 @@ def _recordings_from_manifest(folder: Path, manifest: Path) -> tuple[Recording, 
     )
 
 
-def _recordings_in_video(video: Path) -> Iterator[Recording]:
+def _recordings_in_video(video: Path, tier: str | None) -> Iterator[Recording]:
     """Recordings of a video: one for each cue of its subtitles, or the whole; damaged files are reported on reading."""
     subtitles = find_subtitles(video)
     try:
@@ -143,7 +177,7 @@ def _recordings_in_video(video: Path) -> Iterator[Recording]:
     for number, cue in enumerate(cues, start=1):
         yield Recording(f"{video.stem}-{number:04d}", video, cue.text, span=(cue.start, cue.end))
     if not cues:
-        yield Recording(video.stem, video, subtitles or find_transcript(video))
+        yield Recording(video.stem, video, subtitles or find_transcript(video), tier=tier)
 
 
 def _list_videos(folder: Path) -> list[Path]:

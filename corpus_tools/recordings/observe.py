@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from corpus_tools.parallel import map_unordered
-from corpus_tools.recordings.folder import Recording, find_recordings, pronounce_recording
+from corpus_tools.recordings.folder import Recording, find_recordings, pronounce_recording, recording_notes
 from corpus_tools.recordings.limits import OUT_OF_SYNC, REFUSAL, UNUSABLE, WARNING, Finding, limit_findings
 from corpus_tools.recordings.observation import Observation, Timing, observe_recording
 from corpus_tools.recordings.sound import MAX_UTTERANCE_S, CachedAligner
@@ -44,11 +44,15 @@ class QualityWarning:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observations:
-    """Observations and refusals of a folder of recordings, and warnings about kept ones, sorted by name."""
+    """Observations and refusals of a folder of recordings, and warnings about kept ones, sorted by name.
+
+    ``notes`` say what was chosen of transcripts, and which files are not read.
+    """
 
     kept: tuple[Observation, ...]
     refused: tuple[Refusal, ...]
     warnings: tuple[QualityWarning, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +99,8 @@ def observe(
     """
     run_options = run_options or RunOptions()
     processes, cache = run_options.n_processes(), run_options.folder()
-    tasks = group_by_video(find_recordings(recordings))
+    listed = find_recordings(recordings, run_options.tier)
+    tasks = group_by_video(listed)
     model = find_bundle(run_options.model)
     found: dict[Path, RecordingOutcomes] = {}
     for task, outcomes in _observe_tasks(tasks, cache, model, min(processes, len(tasks)), on_progress):
@@ -127,6 +132,7 @@ def observe(
         # workers end in any order
         tuple(sorted((item for item in every if isinstance(item, Refusal)), key=lambda refusal: refusal.name)),
         tuple(sorted(warnings, key=lambda warning: warning.name)),
+        recording_notes(listed),
     )
 
 
@@ -270,12 +276,14 @@ def check_recording(
 
     For several recordings, `RecordingChecker` loads the networks once.
     """
-    recordings = recordings_to_check(video, transcript)
+    recordings = recordings_to_check(video, transcript, (run_options or RunOptions()).tier)
     checker = RecordingChecker(run_options)
     return _worst(finding for recording in recordings for finding in checker.check(recording))
 
 
-def recordings_to_check(recordings: Path, transcript: str | Path | None = None) -> tuple[Recording, ...]:
+def recordings_to_check(
+    recordings: Path, transcript: str | Path | None = None, tier: str | None = None
+) -> tuple[Recording, ...]:
     """The recordings of a folder or a video; with a transcript, the whole video as one.
 
     Raises
@@ -283,7 +291,7 @@ def recordings_to_check(recordings: Path, transcript: str | Path | None = None) 
     InputError
         There is no such folder or video.
     """
-    found = find_recordings(recordings)
+    found = find_recordings(recordings, tier)
     if transcript is None:
         return found
     return (replace(found[0], name=found[0].video.stem, transcript=transcript, span=None),)

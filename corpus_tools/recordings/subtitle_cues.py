@@ -1,7 +1,6 @@
 """Subtitles of videos as cues with margins."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from lexicon.errors import DataError
@@ -10,20 +9,12 @@ from tts2face.interchange.subtitles.film_track import Film, film_facts
 from tts2face.interchange.subtitles.formats import FILM_SUFFIXES, SUFFIXES
 from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.interchange.subtitles.reader import read_subtitles
+from tts2face.interchange.transcripts.spoken import SpokenCue
 
 SUBTITLE_SUFFIXES = tuple(suffix for suffix in SUFFIXES if suffix != ".xml")  # in order of preference
 OTHER_FILM_SUFFIXES = (".avi", ".mpg", ".mpeg", ".ts")  # beside which subtitles lie
 MAX_JOINED_S = 1.0  # between a word without a length and the next one
 CUE_MARGIN_S = 0.3  # before and after a cue; subtitles are rarely closer to the speech
-
-
-@dataclass(frozen=True, slots=True)
-class SpokenCue:
-    """Words spoken between two instants in seconds."""
-
-    start: float
-    end: float
-    text: str
 
 
 def find_subtitles(video: Path) -> Path | None:

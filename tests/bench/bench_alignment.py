@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 from sentences import sentences
 
-from corpus_tools.recordings.transcripts import read_word_times
 from corpus_tools.shipped.training.damage import babble, coded, speech_power, stationary_noise, with_echo
 from corpus_tools.shipped.training.spoken_material import resampled
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from tts2face.interchange.transcripts.reader import read_transcript
 from tts2face.sound.alignment import LEAST_FIT, Aligner
 from tts2face.sound.segments import RATE
 from tts2face.sound.transcript import pronounce_transcript
@@ -72,7 +72,7 @@ def hand_edges(folder: Path) -> Iterator[Case]:
 def grid(folder: Path) -> Iterator[Case]:
     """Sentences of GRID's talker s1 that the classifier has not learnt."""
     for path in sorted((folder / "align").glob("*.align"))[1::39][:N_GRID]:
-        cues = read_word_times(path)
+        cues = read_transcript(path).words
         words = pronounce_transcript(" ".join(cue.text for cue in cues), "en-us")
         edges = tuple(np.array([cue.start, cue.end]) for cue in cues)
         yield Case(read_sound(folder / "clips" / f"{path.stem}.mkv", RATE), words, edges, is_of_words=True)

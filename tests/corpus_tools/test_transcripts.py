@@ -6,11 +6,14 @@ import av
 import numpy as np
 import pytest
 
-from corpus_tools.recordings.folder import find_recordings, pronounce_recording
-from corpus_tools.recordings.subtitle_cues import SpokenCue, find_subtitles, read_cues, subtitle_notes
-from corpus_tools.recordings.transcripts import READERS, find_transcript, read_transcript
+from corpus_tools.recordings.folder import find_recordings, pronounce_recording, recording_notes
+from corpus_tools.recordings.subtitle_cues import find_subtitles, read_cues, subtitle_notes
+from corpus_tools.recordings.transcripts import find_transcript, read_transcript
 from lexicon.errors import DataError
 from tts2face.interchange.subtitles.decoding import MAX_BYTES, read_text
+from tts2face.interchange.transcripts.reader import READERS
+from tts2face.interchange.transcripts.reader import read_transcript as read_timed
+from tts2face.interchange.transcripts.spoken import SpokenCue
 
 SRT = """1
 00:00:01,000 --> 00:00:02,500
@@ -89,7 +92,7 @@ def write(tmp_path):
 
 
 def cues_of(path):
-    return READERS[path.suffix.lower()](path)
+    return read_timed(path).words if path.suffix.lower() in READERS else read_cues(path)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-32", "cp1252"])
@@ -106,7 +109,10 @@ def test_vtt_keeps_its_first_cue_with_and_without_header(write, header):
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
 def test_a_long_textgrid_gives_its_tier_of_words(write, encoding):
-    assert cues_of(write(".TextGrid", LONG_GRID, encoding)) == (SpokenCue(0.5, 1.25, 'say "hi" [2]'),)
+    assert cues_of(write(".TextGrid", LONG_GRID, encoding)) == (
+        SpokenCue(0.5, pytest.approx(0.875, abs=1e-3), "say"),
+        SpokenCue(pytest.approx(0.875, abs=1e-3), 1.25, '"hi"'),
+    )
 
 
 def test_a_short_textgrid_without_a_tier_of_words_gives_its_first_intervals(write):
@@ -119,7 +125,7 @@ def test_word_times_are_samples_of_25_khz(write):
 
 def test_all_grid_alignments_agree_with_the_manifest(takes):
     listed = {one.name: one.transcript for one in find_recordings(takes)}
-    aligned = {path.stem: read_transcript(path) for path in sorted((takes / "align").glob("*.align"))}
+    aligned = {path.stem: read_transcript(path).text for path in sorted((takes / "align").glob("*.align"))}
     assert aligned
     assert aligned == {name: listed[name] for name in aligned}
 
@@ -167,13 +173,41 @@ def test_text_takes_precedence_over_other_transcripts(write, tmp_path):
     assert find_transcript(tmp_path / "take.mp4") == tmp_path / "take.TXT"
 
 
+def test_what_lies_beside_a_video_and_is_not_read_is_named(write, tmp_path):
+    for name in ("take.mp4", "other.mp4", "take.xyz", "take.en.srt", "alone.eaf", "other.TextGrid"):
+        (tmp_path / name).touch()
+    write(".txt", "bin blue")
+    (tmp_path / "other.TextGrid").write_text(LONG_GRID)
+    first, *_, second = recording_notes(find_recordings(tmp_path))
+    assert first.startswith("the words of other.TextGrid are those of its tier 'words'")
+    assert second.startswith("take.en.srt, take.xyz lie beside videos and are not read; transcripts are read from one")
+    (tmp_path / "take.xyz").unlink()
+    (tmp_path / "take.en.srt").unlink()
+    assert recording_notes(find_recordings(tmp_path))[0] == first
+    assert not any("not read" in note for note in recording_notes(find_recordings(tmp_path)))
+
+
+def test_a_tier_is_named_for_all_recordings(tmp_path):
+    (tmp_path / "take.mp4").touch()
+    (tmp_path / "take.TextGrid").write_text(LONG_GRID)
+    (recording,) = find_recordings(tmp_path, "phones")
+    assert [word for word, _ in pronounce_recording(recording)] == ["b"]
+
+
+def test_a_table_of_labels_is_not_read_aloud(write, tmp_path):
+    (tmp_path / "take.mp4").touch()
+    write(".txt", "0.350000\t0.620000\tbin\n0.620000\t0.840000\tred\n")
+    (recording,) = find_recordings(tmp_path)
+    assert [word for word, _ in pronounce_recording(recording)] == ["bin", "red"]
+
+
 def test_damaged_subtitles_refuse_their_video_alone(write, tmp_path):
     write(".srt", "Nothing here")
     (tmp_path / "take.mp4").touch()
     (tmp_path / "whole.mp4").touch()
     (tmp_path / "whole.TextGrid").write_text(LONG_GRID)
     broken, whole = find_recordings(tmp_path)
-    assert [word for word, _ in pronounce_recording(whole)] == ["say", "hi", "two"]
+    assert [word for word, _ in pronounce_recording(whole)] == ["say", "hi"]
     with pytest.raises(DataError, match="contains no subtitles"):
         pronounce_recording(broken)
 
@@ -187,7 +221,7 @@ def test_damaged_subtitles_refuse_their_video_alone(write, tmp_path):
         (".srt", "Nothing here", "contains no subtitles"),
         (".TextGrid", "hello", "is not a TextGrid"),
         (".TextGrid", LONG_GRID[:-30], "is a damaged TextGrid"),
-        (".TextGrid", LONG_GRID.replace('say ""hi"" [2]', ""), "has no interval with a word"),
+        (".TextGrid", LONG_GRID.replace('say ""hi"" [2]', ""), "has no tier with words; 'phones' seems"),
         (".align", "0 x bin", "line 1: '0 x bin' is not start, end and word"),
         (".align", "0 100 sil", "contains no word"),
     ],

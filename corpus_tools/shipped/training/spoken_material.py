@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from corpus_tools.prompts.prompts import shipped_sentences
-from corpus_tools.recordings.transcripts import read_word_times
 from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence
+from tts2face.interchange.transcripts.reader import read_transcript
 from tts2face.sound.alignment import Aligner
 from tts2face.sound.pauses import Span
 from tts2face.sound.segments import RATE
@@ -95,7 +95,7 @@ def _spoken_by_another(texts: Sequence[str], rng: np.random.Generator) -> Iterat
 def _recorded(folder: Path) -> Iterator[WordedSpeech]:
     """Recorded sentences with known times of their words."""
     for path in sorted((folder / "align").glob("*.align"))[::RECORDED_STEP]:
-        cues = read_word_times(path)
+        cues = read_transcript(path).words
         words = pronounce_transcript(" ".join(cue.text for cue in cues), "en-us")
         if len(words) == len(cues):
             sound = read_sound(folder / "clips" / f"{path.stem}.mkv", RATE)

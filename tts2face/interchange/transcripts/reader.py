@@ -1,0 +1,128 @@
+"""Reading of transcripts with times: the words of one tier, without silences, in the order of time.
+
+How the next format is made:
+
+1. A function from the path of a file to its `Tier` objects, with seconds, in a module of its own here, as
+   `tts2face.interchange.transcripts.label_table` does; a DataError only where nothing can be read.
+2. Its row in `READERS`, by its ending; beside videos, files are preferred in the order of the rows.
+3. Its name in docs/recordings.md, its row in docs/compatibility.md, and its file in tests/interchange/transcripts.
+
+The choice of the tier, silences, overlaps and the times of words in utterances are the same for all formats.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from itertools import pairwise
+from pathlib import Path
+from types import MappingProxyType
+
+from lexicon.errors import DataError
+from tts2face.interchange.subtitles.decoding import read_text
+from tts2face.interchange.transcripts.grid_align import read_align
+from tts2face.interchange.transcripts.label_table import is_label_table, read_label_table
+from tts2face.interchange.transcripts.silence import spoken_part
+from tts2face.interchange.transcripts.spoken import SpokenCue, Tier, Transcript
+from tts2face.interchange.transcripts.textgrid import is_textgrid, read_textgrid
+from tts2face.interchange.transcripts.tiers import choose_tier, name_tiers
+from tts2face.interchange.transcripts.utterances import shared_words
+
+TEXT_SUFFIX = ".txt"
+OVERLAP_S = 1e-3  # edges that differ by less are one edge, rounded twice
+MAX_NAMED = 6  # labels in a note
+ReadTiers = Callable[[Path], list[Tier]]
+READERS: Mapping[str, ReadTiers] = MappingProxyType({
+    ".textgrid": read_textgrid,
+    ".align": read_align,
+})  # fmt: skip
+
+
+def read_transcript(path: Path, tier: str | None = None) -> Transcript:
+    """Words of a transcript with their times, by its content where that is unmistakable, else by its ending.
+
+    Parameters
+    ----------
+    tier
+        Name of the tier of the words; None: it is chosen by names and content, and a note says which.
+
+    Raises
+    ------
+    InputError
+        There is no such tier.
+    DataError
+        The file cannot be read, or has no word.
+    """
+    read = find_reader(path)
+    if read is None:
+        raise DataError(f"{path} is no transcript with times; give one of {', '.join(READERS)}")
+    tiers = read(path)
+    chosen, choice = choose_tier(path.name, tiers, tier)
+    if chosen is None:
+        raise DataError(_no_words(path, tiers))
+    spoken, left_out = _spoken_labels(chosen)
+    if not spoken:
+        raise DataError(f"{path} contains no word; check the file")
+    words, shared = shared_words(spoken)
+    notes = (choice, _overlap_note(path, spoken), _left_out_note(path, left_out), shared and f"{path.name}: {shared}")
+    return Transcript(words, tuple(note for note in notes if note))
+
+
+def find_reader(path: Path) -> ReadTiers | None:
+    """The reader of a file; None for plain text and other files."""
+    suffix = path.suffix.lower()
+    if suffix in READERS:
+        return READERS[suffix]
+    return find_reader_of_text(read_text(path)) if suffix == TEXT_SUFFIX else None
+
+
+def find_reader_of_text(text: str) -> ReadTiers | None:
+    """The reader of a text that is a table of labels or a TextGrid, whatever its name; None for plain text."""
+    if is_textgrid(text):
+        return read_textgrid
+    return read_label_table if is_label_table(text) else None
+
+
+def _spoken_labels(tier: Tier) -> tuple[list[SpokenCue], Counter[str]]:
+    """Labels with words in the order of time, and how often other labels than the empty one occur."""
+    spoken, left_out = [], Counter[str]()
+    for label in tier.labels:
+        words = spoken_part(label.text)
+        if words:
+            spoken.append(SpokenCue(label.start, label.end, words))
+        elif label.text:
+            left_out[label.text] += 1
+    return sorted(spoken, key=lambda cue: cue.start), left_out
+
+
+def _no_words(path: Path, tiers: list[Tier]) -> str:
+    full = [tier for tier in tiers if any(spoken_part(label.text) for label in tier.labels)]
+    if not full:
+        return f"{path} contains no word; check the file"
+    if any(tier.name for tier in tiers):
+        return f"{path} has no tier with words; {name_tiers(full)} seems to hold phones or notes, --tier takes it yet"
+    return f"{path} seems to hold phones and no words; write the words into a .txt beside it"
+
+
+def _left_out_note(path: Path, left_out: Counter[str]) -> str:
+    if not left_out:
+        return ""
+    named = [f"{label} ({count})" for label, count in left_out.most_common(MAX_NAMED)]
+    more = f" and {len(left_out) - MAX_NAMED} more" if len(left_out) > MAX_NAMED else ""
+    return f"silence and noise in {path.name}, not words: {', '.join(named)}{more}"
+
+
+def _overlap_note(path: Path, spoken: list[SpokenCue]) -> str:
+    overlaps = list(_overlaps(spoken))
+    if not overlaps:
+        return ""
+    first, second = overlaps[0]
+    return (
+        f"{len(overlaps)} labels of {path.name} begin before the one before them ends, the first {second.text[:40]!r} "
+        f"at {second.start:.2f} s before the end of {first.text[:40]!r} at {first.end:.2f} s; words are taken in the "
+        "order of their starts"
+    )
+
+
+def _overlaps(spoken: list[SpokenCue]) -> Iterator[tuple[SpokenCue, SpokenCue]]:
+    for first, second in pairwise(spoken):
+        if second.start < first.end - OVERLAP_S:
+            yield first, second
