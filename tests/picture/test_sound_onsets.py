@@ -14,6 +14,8 @@ from tests.packages import package
 from tests.picture.bursts import BURSTS_S, MOVIES, SECONDS, STREAMED, TOLERANCE_S, encoded, encoded_movie, onsets
 from tts2face.picture.sound_stream import PCM_RATE, SOUND_KINDS
 
+pytestmark = pytest.mark.formats
+
 RATES = (16_000, 22_050, 24_000, 44_100, 48_000)
 
 

@@ -13,6 +13,8 @@ from corpus_tools.decomposition.marker_files import read_c3d, read_markers
 from lexicon.errors import DataError
 from tests.corpus_tools.decomposition.made_markers import FPS, write_c3d
 
+pytestmark = pytest.mark.formats
+
 NAMES = tuple(f"M{number}" for number in range(7))
 SCALE = 0.01  # mm, of files with whole numbers
 SOUND = np.sin(np.arange(40 * 100) * 0.1) * 1000.0

@@ -20,6 +20,8 @@ from tts2face.models.face_loading import load_face
 from tts2face.types import Clip, Trajectory
 from tts2face.video.livelink import read_livelink
 
+pytestmark = pytest.mark.formats
+
 STEP = 0.6e-6  # half of the last of six decimals, and rounding to 32 bits
 
 

@@ -13,6 +13,8 @@ from tests.interchange.exports.made import signed_clip, with_gesture
 from tts2face.face.deformation import build_rig
 from tts2face.interchange.exports.surfaces import divide_surface
 
+pytestmark = pytest.mark.formats
+
 FRAME = 12
 SCRIPT = """
 import json, sys

@@ -13,6 +13,8 @@ from tts2face.interchange.exports.captions import MAX_CUE_CHARACTERS, MAX_CUE_S,
 from tts2face.interchange.exports.labels import Label
 from tts2face.types import Clip, Speech, Trajectory, Waveform, resting_head
 
+pytestmark = pytest.mark.formats
+
 pysubs2 = package("pysubs2")
 
 

@@ -25,6 +25,8 @@ from tts2face.numeric.arrays import continuous_quaternions, quaternion_matrix
 from tts2face.storage.spool import Spool
 from tts2face.types import HEAD_CHANNELS, Clip, Trajectory
 
+pytestmark = pytest.mark.formats
+
 DTYPES = {5121: "u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 TOLERANCE_M = 1e-6  # of 32-bit metres

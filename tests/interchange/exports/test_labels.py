@@ -22,6 +22,8 @@ from tts2face.interchange.exports.labels import Label
 from tts2face.interchange.exports.visemes import INVENTORIES, OCULUS, viseme_labels, viseme_table
 from tts2face.types import Clip, Speech, concatenate_clips
 
+pytestmark = pytest.mark.formats
+
 
 def lines(path):
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]

@@ -12,6 +12,8 @@ from tests.packages import package
 from tts2face.face.deformation import head_rotation
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Waveform, concatenate_clips
 
+pytestmark = pytest.mark.formats
+
 
 def bvh_frames(path):
     """Channel names, seconds per frame and values (T, 6) of a BVH file with one joint."""

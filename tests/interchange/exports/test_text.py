@@ -16,6 +16,8 @@ from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.interchange.exports.pronunciation import FORMATS, NOMINAL_NOTE
 from tts2face.interchange.exports.textgrid import textgrid
 
+pytestmark = pytest.mark.formats
+
 PHONES = PhoneSequence(["sil", "p", "ɑ", "sil", "y", "sil"], [0.0, 0.1, 0.25, 0.4, 0.5, 0.75, 1.0])
 WORDS = (WordSpan('pa "x"', 1, 3), WordSpan("ü", 4, 5))
 

@@ -14,6 +14,8 @@ from tts2face.face.deformation import build_rig
 from tts2face.interchange.exports.surfaces import divide_surface
 from tts2face.interchange.exports.usd import _identifiers
 
+pytestmark = pytest.mark.formats
+
 TOLERANCE_MM = 1e-3  # weights and offsets are 32-bit, scales of joints 16-bit
 
 Usd = package("pxr.Usd")

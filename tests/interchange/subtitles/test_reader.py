@@ -9,6 +9,8 @@ import pytest
 from lexicon.errors import DataError, InputError
 from tts2face.interchange.subtitles.reader import read_subtitles
 
+pytestmark = pytest.mark.formats
+
 A, B = "00:00:01,000 --> 00:00:02,000", "00:00:03,000 --> 00:00:04,500"
 HI, BYE = (1.0, 2.0, "Hi."), (3.0, 4.5, "Bye.")
 BOTH = [HI, BYE]

@@ -11,6 +11,8 @@ from tests.picture.bursts import BURSTS_S, MOVIES, STREAMED, TOLERANCE_S, encode
 from tests.serving.studio.chromium import Browser, missing_program
 from tts2face.picture.sound_stream import SOUND_KINDS
 
+pytestmark = pytest.mark.formats
+
 DECODE = """
     const bytes = Uint8Array.from(atob(arguments[0]), (letter) => letter.charCodeAt(0));
     const middle = (samples, rate, from, until) => {  // of the 20 ms that have most energy
