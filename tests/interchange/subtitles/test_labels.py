@@ -17,6 +17,9 @@ SPEAKERS = {
     "[JOHN]: Hello.": ("JOHN", "Hello."),
     "ÉMILE (V.O.): Entrez.": ("ÉMILE", "Entrez."),
     "J.R.: Well.": ("J.R.", "Well."),
+    "FIRST OFFICER: Aye.": ("FIRST OFFICER", "Aye."),
+    "ANNA & BOB: Hurry up!": ("ANNA & BOB", "Hurry up!"),
+    "[a bell] EVE: Hello.": ("EVE", "Hello."),
 }
 WORDS = (
     "NOTE: Mind the gap.",
@@ -35,6 +38,9 @@ WORDS = (
     "My advice: stay.",
     "Hello everyone: welcome.",
     "Anna: once.",
+    "NOTE TO SELF: buy bread.",
+    "A: the first of all.",
+    "BREAKING NEWS: it rains.",
 )
 
 
@@ -61,6 +67,11 @@ def test_a_name_is_a_speaker_where_it_stands_twice(read: ReadText) -> None:
     )
     assert [cue.speaker for cue in found.cues] == ["Anna", "", "Anna", "", ""]
     assert "Anna (2)" in found.notes[0].message
+
+
+def test_letters_of_a_dialogue_are_speakers(read: ReadText) -> None:
+    found = read(srt((1, 2, "A: Hello."), (3, 4, "B: Hi."), (5, 6, "A: Bye."), (7, 8, "B: Bye.")))
+    assert [cue.speaker for cue in found.cues] == ["A", "B", "A", "B"]
 
 
 def test_names_of_a_script_are_speakers(read: ReadText) -> None:

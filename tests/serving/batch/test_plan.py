@@ -2,6 +2,7 @@
 
 import shutil
 import time
+import wave
 from pathlib import Path
 
 import pytest
@@ -267,3 +268,26 @@ def test_a_thousand_cues_are_planned_in_seconds(plan_of: Planner) -> None:
     plan = plan_of("\n".join(lines))
     assert len(plan.segments) == 1000
     assert time.perf_counter() - began < 10.0  # s on a busy machine; below 5 on an idle one
+
+
+def test_cues_after_the_end_of_a_dubbing_track_are_left_out(plan_of: Planner, tmp_path: Path) -> None:
+    (tmp_path / "dub").mkdir()
+    with wave.open(str(tmp_path / "dub" / "one.wav"), "wb") as track:
+        track.setparams((1, 2, 8000, 0, "NONE", ""))
+        track.writeframes(bytes(2 * 8000 * 5))
+    plan = plan_of(audio=tmp_path / "dub")
+    assert [line.number for line in plan.lines] == [1, 2]
+    assert "this cue begins after the end of the film, which has 5.0 s; it is left out" in [
+        warning.message for warning in plan.warnings
+    ]
+    with pytest.raises(DataError, match="3 of 3 cues begin after the end of the film"):
+        plan_of(audio=tmp_path / "dub", shift=100.0)
+    assert [line.number for line in plan_of(audio=tmp_path / "dub", shift=-6.0).lines] == [1]
+
+
+def test_frames_of_subtitles_have_the_rate_that_is_given(plan_of: Planner) -> None:
+    content = "{50}{100}Hello there.\n{150}{200}Good bye.\n"
+    plan = plan_of(content, name="one.sub", subtitle_fps=50.0)
+    assert [(line.begin_s, line.end_s) for line in plan.lines] == [(1.0, 2.0), (3.0, 4.0)]
+    assert not plan.warnings
+    assert "--subtitle-fps" in plan_of(content, name="one.sub").warnings[0].message

@@ -53,11 +53,15 @@ _NO_SPEAKERS = word_set(
     "welcome introducing previously meanwhile therefore however otherwise namely meaning means conversely todo done "
     "pros cons goal goals task tasks day week month year level round case exhibit item point points option options "
     "pin password username id ref re cc bcc fwd subject from to via as at by for is was are were it this that these "
-    "those here there what who why how when where which i you he she we they me him her us them q "
+    "those here there what who why how when where which i you he she we they me him her us them "
     "said says say asked told faq ad ads fun hinweis achtung warnung merke frage antwort beispiel wichtig ergebnis "
     "bemerkung notiz "
     "remarque avertissement réponse exemple nota aviso atención advertencia pregunta respuesta ejemplo "
     "importante recuerda recuerden attenzione avviso domanda risposta esempio uwaga pytanie odpowiedź pozor pozn"
+)
+# Those that introduce a sentence also before other words ("NOTE TO SELF"); "FIRST OFFICER" is a speaker.
+_INTRODUCING = word_set(
+    "note ps warning attention remember reminder step chapter rule fact tip breaking important caution danger hint"
 )
 _BEFORE_NAMES = word_set("dear hi hello hey hallo liebe lieber cher chère chers querido querida caro cara to from re")
 _NEVER_IN_NAMES = word_set(
@@ -162,7 +166,9 @@ def _is_certain(label: str) -> bool:
     if not _is_name(label):
         return False
     words = _words(_NUMBERED.sub("", label))
-    return label == label.upper() or words[0] in _TITLES or words[-1] in _ROLES
+    # a single letter is a speaker only where it recurs: "A: Hello." in a course, "A:" in a list
+    is_in_capitals = label == label.upper() and len("".join(words)) > 1
+    return is_in_capitals or words[0] in _TITLES or words[-1] in _ROLES
 
 
 def _is_name(label: str) -> bool:
@@ -171,7 +177,7 @@ def _is_name(label: str) -> bool:
     written, words = base.split(), _words(base)
     if not words or len(words) > MAX_NAME_WORDS or words[0] in _BEFORE_NAMES or _NEVER_IN_NAMES & set(words):
         return False
-    if "".join(words) in _NO_SPEAKERS or words[-1] in _NO_SPEAKERS or len(written) != len(words):
+    if words[-1] in _NO_SPEAKERS or words[0] in _INTRODUCING or len(written) != len(words):
         return False
     if any(character.isdigit() for character in base):
         return False

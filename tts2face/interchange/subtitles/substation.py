@@ -27,6 +27,7 @@ _DRAWING = re.compile(r"\\p[1-9]")  # coordinates, no words
 _PLACED = re.compile(r"\\(?:pos|move)\s*\(")
 # Text that is turned, bent or cut to fit the picture, or moves: writing in the picture, not dialogue.
 _TYPESET = re.compile(r"\\(?:fr[xyz]?-?[1-9]|fa[xy]-?[\d.]|i?clip\s*\(|org\s*\(|move\s*\(|t\s*\()")
+_SIGN_SPEAKERS = frozenset({"sign", "signs", "title", "ts", "typeset", "typesetting"})
 _EFFECT = re.compile(r"\s*(?:fx|karaoke|template|code)\b", re.IGNORECASE)  # karaoke as Aegisub computes it
 _MOVING = re.compile(r"\s*(?:banner|scroll up|scroll down)\s*;", re.IGNORECASE)
 _LINE_BREAK = re.compile(r"\\[Nn]")
@@ -96,15 +97,19 @@ def packet_cue(written: str, start_s: float, end_s: float | None, number: int) -
 def _cue(found: Mapping[str, str], start: float, end: float | None, number: int) -> WrittenCue:
     style, speaker = found.get("style", "").strip().lstrip("*"), found.get("name", "").strip()
     text = _LINE_BREAK.sub("\n", without_drawings(found["text"]))
-    kind = _kind(found["text"], text, style, found.get("effect", ""))
+    kind = _kind(found["text"], text, found, style, speaker)
     return WrittenCue(start, end, text, number, speaker=speaker, style=style, markup=SUBSTATION_MARKUP, kind=kind)
 
 
-def _kind(line: str, text: str, style: str, effect: str) -> str:
+def _kind(line: str, text: str, found: Mapping[str, str], style: str, speaker: str) -> str:
     """Kind of a line that nobody says, also without its drawings (`text`); empty for dialogue."""
+    effect = found.get("effect", "")
     if _EFFECT.match(effect):
         return EFFECTS
     if _MOVING.match(effect) or (_PLACED.search(line) and _TYPESET.search(line)):
         return SIGNS
     is_drawing = text != line and not any(map(str.isalnum, plain_text(text, SUBSTATION_MARKUP)))
-    return EFFECTS if is_drawing and _DRAWING.search(line) else kind_of_style(style)
+    if is_drawing and _DRAWING.search(line):
+        return EFFECTS
+    # typesetters also write "sign" into the field of the speaker
+    return kind_of_style(style) or (SIGNS if speaker.casefold() in _SIGN_SPEAKERS else "")
