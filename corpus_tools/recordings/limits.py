@@ -18,7 +18,7 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, lip_opening
 from tts2face.numeric.arrays import true_runs
 from tts2face.sound.alignment import LEAST_FIT
-from tts2face.sound.pauses import sound_windows
+from tts2face.sound.pauses import SILENCE_DB, sound_windows
 from tts2face.types import Waveform
 
 WARNING, REFUSAL = "warning", "refusal"  # severities
@@ -208,7 +208,8 @@ def sound_measures(sound: Waveform, phones: PhoneSequence) -> dict[str, float]:
     if not len(quiet) or not len(spoken):
         # without a pause there is no noise to measure
         return {"clipped": clipped, "snr_db": np.inf}
-    noise = max(float(np.quantile(quiet, NOISE_QUANTILE)), 1e-10)
+    room = quiet[quiet > spoken.mean() * 10 ** (-SILENCE_DB / 10)]  # where a stem is muted, the room is not heard
+    noise = max(float(np.quantile(room if len(room) else quiet, NOISE_QUANTILE)), 1e-10)
     return {"clipped": clipped, "snr_db": float(10 * np.log10(max(float(spoken.mean()), 1e-10) / noise))}
 
 

@@ -79,7 +79,7 @@ def learn_audio_maps(
         observations, (AUDIO_MAP_FEATURES, "level"), on_progress=stages("computing sound features")
     )
     utterances = build_training_utterances(observations, talker.model, features[AUDIO_MAP_FEATURES])
-    loudness = speech_level(np.concatenate(list(features["level"].values())))
+    loudness = speech_level(np.concatenate(list(features["level"].values())), 1.0 / talker.fps, is_recording=True)
     on_map = stages("learning audio maps")
     linear = learn_linear_map(utterances, feature=AUDIO_MAP_FEATURES)
     on_map(1, 2)

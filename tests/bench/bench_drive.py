@@ -188,12 +188,12 @@ class Bench:
     def made_as_loud(self, drive: AudioMap, talker: object) -> None:
         """Every utterance made as loud as all together, as recordings of others are."""
         learnt = np.concatenate([self.of("level")[one.name] for one in self.train])
-        drive = replace(drive, loudness=speech_level(learnt))
+        drive = replace(drive, loudness=speech_level(learnt, 1.0 / self.train[0].fps))
         kept = self.heard[AUDIO_MAP_FEATURES]
         louder = {}
         for one in self.test:
             sound = read_sound(one.video, FEATURE_RATE)
-            gain = drive.gain_for(speech_level(self.of("level")[one.name]))
+            gain = drive.gain_for(speech_level(self.of("level")[one.name], 1.0 / self.train[0].fps))
             louder[one.name] = utterance_features(
                 one, Waveform(np.clip(gain * sound.samples, -1, 1), FEATURE_RATE), AUDIO_MAP_FEATURES
             )

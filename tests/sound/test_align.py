@@ -14,6 +14,7 @@ from tests.sound.conftest import HEARD_TOGETHER
 from tests.world import World
 from tts2face.sound.alignment import Aligner, HeardSound
 from tts2face.sound.recogniser import RATE
+from tts2face.sound.segments import STEP_S
 from tts2face.sound.transcript import pronounce_transcript
 from tts2face.sound.voice import Voice
 from tts2face.sound.voice_pool import VoicePool, load_voice
@@ -208,3 +209,21 @@ def test_recordings_agree_with_their_word_times(
         errors += [found.phones.edges[word.first] - starts[word.text] for word in found.words if word.text in starts]
     assert np.median(np.abs(errors)) < 0.02
     assert np.mean(np.array(right) > np.array(wrong)) >= 0.9
+
+
+@pytest.mark.parametrize(("seconds", "level"), [(1.0, 0.0), (8.0, 0.0), (20.0, 0.0), (8.0, 10 ** (-81 / 20))])
+def test_edges_are_those_of_the_recording_without_silence_around_it(
+    aligner: Aligner, heart: Voice, seconds: float, level: float
+) -> None:
+    """Of a stem, which is muted where nobody speaks: zeros, or the noise of a converter, around a room."""
+    words = pronounce_transcript("Many silver spoons can often be found here.", "en-us")
+    spoken = heart.speak("Many silver spoons can often be found here.").waveform.resampled(RATE).samples
+    random = np.random.default_rng(0)
+    room = random.normal(0.0, 0.0012, len(spoken) + round(0.6 * RATE)).astype(np.float32)
+    room[round(0.3 * RATE) : round(0.3 * RATE) + len(spoken)] += spoken
+    quiet = random.normal(0.0, 1.0, round(seconds * RATE)).astype(np.float32) * np.float32(level)
+    plain = aligner.align(Waveform(room, RATE), words, may_lack=True)
+    muted = aligner.align(Waveform(np.concatenate([quiet, room, quiet]), RATE), words, may_lack=True)
+    ends = [[found.phones.edges[[word.first, word.last]] for word in found.words] for found in (plain, muted)]
+    assert np.array(ends[1]) - seconds == pytest.approx(np.array(ends[0]), abs=2.1 * STEP_S)
+    assert min(word.confidence for word in muted.words) > 0.95

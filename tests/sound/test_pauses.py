@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.sound.pauses import cut_at_pauses, find_pauses
+from tts2face.sound.pauses import (
+    LEVEL_WINDOW_S,
+    _window_levels,
+    cut_at_pauses,
+    find_pauses,
+    speech_level,
+    speech_onset,
+)
 from tts2face.types import Waveform
 
 RATE = 16_000
@@ -66,3 +73,38 @@ def test_a_short_sound_is_one_stretch() -> None:
 def test_no_length() -> None:
     with pytest.raises(InputError, match="must be above 0 s"):
         cut_at_pauses(speech_with_pauses(1.0), longest=0)
+
+
+def in_silence(sound: Waveform, seconds: float, noise: float = 0.0) -> Waveform:
+    drawn = np.random.default_rng(9).normal(0.0, 1.0, round(seconds * sound.rate))
+    quiet = np.float32(noise) * drawn.astype(np.float32)
+    return Waveform(np.concatenate([quiet, sound.samples, quiet]), sound.rate)
+
+
+@pytest.mark.parametrize(("seconds", "noise"), [(1.0, 0.0), (20.0, 0.0), (60.0, 0.0), (30.0, 1e-5)])
+def test_the_level_of_speech_is_that_without_silence(seconds: float, noise: float) -> None:
+    sound = speech_with_pauses(1.0, 0.5, 1.0, 0.3, 2.0, noise=0.003)
+    levels, longer = (_window_levels(one)[:, None] for one in (sound, in_silence(sound, seconds, noise)))
+    assert speech_level(longer, LEVEL_WINDOW_S, is_recording=True) == pytest.approx(
+        speech_level(levels, LEVEL_WINDOW_S), abs=1.5
+    )
+
+
+@pytest.mark.parametrize("seconds", [1.0, 10.0, 60.0])
+def test_pauses_of_speech_are_found_within_silence(seconds: float) -> None:
+    sound = speech_with_pauses(1.0, 0.5, 1.0, 0.3, 2.0, noise=0.003)
+    found = np.array(find_pauses(in_silence(sound, seconds)))[1:-1] - seconds
+    assert found == pytest.approx(np.array(find_pauses(sound)), abs=0.03)
+
+
+@pytest.mark.parametrize("seconds", [0.5, 5.0, 60.0])
+def test_noise_after_silence_is_no_onset_of_a_recording(seconds: float) -> None:
+    sound = speech_with_pauses(0.0, 0.5, 1.0, noise=0.003)
+    found = speech_onset(in_silence(sound, seconds), is_recording=True)
+    assert found == pytest.approx(seconds + 0.5, abs=0.03)
+
+
+def test_long_silence_is_cut_beside_the_speech() -> None:
+    sound = in_silence(speech_with_pauses(3.0, 0.3, 3.0), 30.0)
+    spans = cut_at_pauses(sound, 20.0)
+    assert any(start <= 30.0 and end >= 36.3 for start, end in spans)

@@ -13,6 +13,7 @@ AUDIBLE_DB = 30.0  # relative to 20 micropascals; a sound with a lower maximum c
 HIGH_SEMITONES = 12.0
 QUIET_DB, PROSODY_LOUD_DB = -35.0, 10.0  # limits relative to the mean level of speech; values beyond are clipped
 SILENT_PROSODY = np.array([QUIET_DB, 0.0], np.float32)
+LEVEL_STEP_S = 0.02  # between the instants from which the level of speech is taken
 MIN_PITCH_SOUND_S = 0.1  # shorter sounds have no pitch
 
 
@@ -31,11 +32,11 @@ def prosody_features(
     features = np.tile(SILENT_PROSODY[: 2 if with_pitch else 1], (len(times), 1))
     if track is None:
         return features
-    levels = track.at(np.arange(0.0, sound.duration, 0.02))
+    levels = track.at(np.arange(0.0, sound.duration, LEVEL_STEP_S))
     inside = (times >= 0.0) & (times < sound.duration)
     if levels.max() < AUDIBLE_DB:
         return features
-    level = speech_level(levels[:, None])
+    level = speech_level(levels[:, None], LEVEL_STEP_S)
     features[inside, 0] = np.clip(track.at(times[inside]) - level, QUIET_DB, PROSODY_LOUD_DB)
     if with_pitch:
         features[inside, 1] = np.clip(pitch(sound, times[inside]), -HIGH_SEMITONES, HIGH_SEMITONES)

@@ -124,7 +124,9 @@ def measure_recording(path: Path, audio_map: AudioMap) -> TimedTranscript:
     """Duration of a recording and its gain for an audio map; errors as `map_audio_to_motion`."""
     levels, duration = _features(path, "level", audio_map.fps, 1.0)
     silence = PhoneSequence([SILENCE], [0.0, duration])
-    return TimedTranscript(silence, (), gain=audio_map.gain_for(speech_level(levels)))
+    return TimedTranscript(
+        silence, (), gain=audio_map.gain_for(speech_level(levels, 1.0 / audio_map.fps, is_recording=True))
+    )
 
 
 def mapped_motion(path: Path, audio_map: AudioMap, talker: Talker, fps: float, heard: TimedTranscript) -> Trajectory:
@@ -158,11 +160,26 @@ def recording_clips(
 ) -> Iterator[Clip]:
     """Divide a recording into clips of at most `MAX_CLIP_FRAMES` frames, each with its phones and the face at rest."""
     sound = _SampleReader(sound_blocks(path, SOUND_RATE))
-    for first, last, start, end in clip_bounds(n_frames, fps, SOUND_RATE):
+    first = 0
+    while first < n_frames:
+        last = _last_frame(first, n_frames, transcript.phones, fps)
+        start, end = first_sample(first, SOUND_RATE, fps), first_sample(last, SOUND_RATE, fps)
         samples = np.clip(volume * sound.next(end - start), -1.0, 1.0)
         seconds = (float(Fraction(first) / fps), len(samples) / SOUND_RATE)
         phones, words = _phones_within(transcript, *seconds)
         yield Clip.at_rest(last - first, float(fps), Speech(Waveform(samples, SOUND_RATE), phones, words))
+        first = last
+
+
+def _last_frame(first: int, n_frames: int, phones: PhoneSequence, fps: Fraction) -> int:
+    """Frame after the clip that begins at a frame: the last one that is allowed and in a silence, so in no word."""
+    longest = min(first + MAX_CLIP_FRAMES, n_frames)
+    if longest == n_frames:
+        return longest
+    frames = np.arange(longest, first + MAX_CLIP_FRAMES // 2, -1)
+    within = np.searchsorted(phones.edges, frames / float(fps), side="right") - 1
+    labels = [phones.phones[min(at, len(phones) - 1)] for at in within.tolist()]
+    return int(frames[labels.index(SILENCE)]) if SILENCE in labels else longest
 
 
 def _phones_within(

@@ -284,7 +284,7 @@ def _padded(sound: Waveform) -> Waveform:
 
 def recording_features(sound: Waveform, heard: NDArray[np.float32]) -> NDArray[np.float32]:
     """Features (T, K) of frames of `STEP_S`: the spectrum, and what the recogniser hears (T', P + 1) around them."""
-    spectrum = frame_features(sound)
+    spectrum = frame_features(sound, is_recording=True)
     places = np.arange(len(spectrum))[:, None] * (STEP_S / FRAME_S) + np.array(CONTEXT_S) / FRAME_S - 0.5
     lows = np.clip(np.floor(places).astype(np.int64), 0, len(heard) - 1)
     shares = np.clip(places - lows, 0.0, 1.0)[..., None].astype(np.float32)

@@ -45,6 +45,7 @@ BAND_OFFSETS = (-213, 0, 213)  # samples from the frame
 LEAST_BAND_POWER = 1e-8
 FIRST_MEAN = -9.0
 FIRST_LEVEL = -20.0
+SILENT_BANDS = -15.5  # mean of a noise of -76 dB of full scale: digital silence says nothing of a voice
 MEAN_FRAMES, LEAST_FOLLOWED = 4, 0.03  # weight of the first mean, in frames; least share of a frame
 LEVEL_FALL, SPEECH_RANGE = 0.02, 3.5  # of the level a frame; speech is not farther below it
 
@@ -238,8 +239,9 @@ class ChannelMean:
         found = np.empty_like(values)
         for at, frame in enumerate(values.reshape(-1, len(BAND_OFFSETS), N_BANDS)):
             bands = frame.mean(axis=0, dtype=np.float64)
-            self._level = max(float(bands.mean()), self._level - LEVEL_FALL)
-            if bands.mean() > self._level - SPEECH_RANGE:
+            is_sound = bands.mean() > SILENT_BANDS
+            self._level = max(float(bands.mean()), self._level - LEVEL_FALL) if is_sound else self._level
+            if is_sound and bands.mean() > self._level - SPEECH_RANGE:
                 self._n_frames += 1
                 self._mean += (bands - self._mean) * max(LEAST_FOLLOWED, 1.0 / (self._n_frames + MEAN_FRAMES))
             found[at] = (frame - self._mean).ravel()

@@ -22,13 +22,51 @@ ONSET_ABOVE_NOISE_DB = 10.0  # in noise, the onset is where the sound exceeds th
 LATEST_ONSET_DB = -20.0  # of the loudest window: speech without silence has no such twentieth
 MAX_CLOSURE_S = 0.025  # quiet within a sound that begins: between the burst of a stop and its vowel, within a trill
 MIN_SOUND_S, BREATH_DB = 0.02, -25.0  # what is shorter is a click; a weak sound before silence is a breath
+LONG_PAUSE_S = 1.0  # a pause that may be cut outside of its middle
 MIN_STRETCH_SHARE = 0.5  # least length of a part, relative to the largest one; the last part may be shorter
 
+LOUD_S, LOUD_RANGE_DB = 0.5, 30.0  # what is at most so far below the loudest half second is speech; a slam is shorter
+NEAR_SPEECH_S = 1.0  # of speech: the pauses between sentences belong to it
+NEAR_SOUND_S = 0.3  # of silence before and after sound
+SILENCE_DB = 60.0  # below the loudest half second: digital silence and noise of a converter, no room
 Span = tuple[float, float]
 
 
-def speech_level(levels: NDArray[np.floating]) -> float:
-    """Mean in dB of those (T, 1) levels that exceed the midpoint of the noise and speech levels."""
+def is_near_speech(levels: NDArray[np.floating], step_s: float) -> NDArray[np.bool_]:
+    """Whether levels (T,) in dB, `step_s` apart, are of speech or its pauses, not of long silence or noise around it.
+
+    Measures of a whole recording are taken from these, so that they do not depend on how much else it holds.
+    """
+    return _is_near(levels >= loudest_level(levels, step_s) - LOUD_RANGE_DB, round(NEAR_SPEECH_S / step_s))
+
+
+def is_near_sound(levels: NDArray[np.floating], step_s: float) -> NDArray[np.bool_]:
+    """Whether levels (T,) in dB, `step_s` apart, are of any sound or at most `NEAR_SOUND_S` away from one."""
+    return _is_near(levels > loudest_level(levels, step_s) - SILENCE_DB, round(NEAR_SOUND_S / step_s))
+
+
+def _is_near(chosen: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
+    """Whether places (T,) are at most `reach` away from a chosen one."""
+    at = np.flatnonzero(chosen)
+    changes = np.zeros(len(chosen) + 1, np.int64)
+    np.add.at(changes, np.maximum(at - reach, 0), 1)
+    np.add.at(changes, np.minimum(at + reach + 1, len(chosen)), -1)
+    return np.cumsum(changes[:-1]) > 0
+
+
+def loudest_level(levels: NDArray[np.floating], step_s: float) -> float:
+    """Level that levels (T,), `step_s` apart, exceed for `LOUD_S` in all, or half of the loud ones of a short sound."""
+    loud = np.sort(levels[levels >= levels.max() - LOUD_RANGE_DB], axis=None)
+    return float(loud[-min(round(LOUD_S / step_s), (len(loud) + 1) // 2)])
+
+
+def speech_level(levels: NDArray[np.floating], step_s: float, *, is_recording: bool = False) -> float:
+    """Mean in dB of those (T, 1) levels, `step_s` apart, that exceed the midpoint of the noise and speech levels.
+
+    Of a recording silence is no noise; a voice is silent between words.
+    """
+    silence = loudest_level(levels, step_s) - SILENCE_DB if is_recording else -np.inf
+    levels = levels[is_near_speech(levels[:, 0], step_s) & (levels[:, 0] >= silence)]
     noise_db, speech_db = np.quantile(levels, NOISE_QUANTILE), np.quantile(levels, SPEECH_QUANTILE)
     return float(levels[levels >= (noise_db + speech_db) / 2].mean())
 
@@ -38,16 +76,27 @@ def find_pauses(sound: Waveform) -> tuple[Span, ...]:
     levels = _window_levels(sound)
     if not len(levels):
         return ()
-    noise_db, speech_db = np.quantile(levels, NOISE_QUANTILE), np.quantile(levels, SPEECH_QUANTILE)
-    if speech_db - noise_db < MIN_CONTRAST_DB:
+    silence = loudest_level(levels, LEVEL_WINDOW_S) - SILENCE_DB
+    counted = levels[is_near_speech(levels, LEVEL_WINDOW_S) & (levels > silence)]
+    if not len(counted):
         return ()
+    noise_db, speech_db = np.quantile(counted, NOISE_QUANTILE), np.quantile(counted, SPEECH_QUANTILE)
+    if speech_db - noise_db < MIN_CONTRAST_DB:
+        if levels.min() > silence:
+            return ()
+        noise_db = np.float64(silence)  # speech without a noise, between silences
     quiet = levels < noise_db + QUIET_SHARE * (speech_db - noise_db)
     spans = (true_runs(quiet) * LEVEL_WINDOW_S).tolist()
     return tuple((start, end) for start, end in spans if end - start >= MIN_PAUSE_S)
 
 
-def speech_onset(sound: Waveform) -> float:
+def speech_onset(sound: Waveform, *, is_recording: bool = False) -> float:
     """Seconds from the start of a sound to the first speech in it; 0.0 if it is silent.
+
+    Parameters
+    ----------
+    is_recording
+        Whether noise may follow digital silence, as in the stem of a film; a voice has none.
 
     Notes
     -----
@@ -58,7 +107,8 @@ def speech_onset(sound: Waveform) -> float:
     if not len(levels) or levels.max() <= -120.0:
         return 0.0
     relative = levels - levels.max()
-    threshold = np.quantile(relative, NOISE_QUANTILE) + ONSET_ABOVE_NOISE_DB
+    counted = relative[relative > -SILENCE_DB] if is_recording else relative
+    threshold = np.quantile(counted, NOISE_QUANTILE) + ONSET_ABOVE_NOISE_DB
     loud = relative > np.clip(threshold, ONSET_DB, LATEST_ONSET_DB)
     closure, shortest = round(MAX_CLOSURE_S / ONSET_WINDOW_S), round(MIN_SOUND_S / ONSET_WINDOW_S)
     starts, ends = true_runs(loud).T
@@ -87,10 +137,19 @@ def cut_at_pauses(sound: Waveform, longest: float) -> tuple[Span, ...]:
     cuts = [0.0]
     while sound.duration - cuts[-1] > longest:
         earliest, latest = cuts[-1] + MIN_STRETCH_SHARE * longest, cuts[-1] + longest
-        middles = [(end - start, (start + end) / 2) for start, end in found if earliest <= (start + end) / 2 <= latest]
+        middles = [(end - start, _place_in(start, end, earliest, latest)) for start, end in found]
+        middles = [(length, place) for length, place in middles if earliest <= place <= latest]
         cuts.append(max(middles)[1] if middles else _quietest_instant(levels, earliest, latest))
     cuts.append(sound.duration)
     return tuple(pairwise(cuts))
+
+
+def _place_in(start: float, end: float, earliest: float, latest: float) -> float:
+    """Where a pause is cut: in its middle, or in a long one where that is allowed."""
+    middle = (start + end) / 2
+    if end - start < LONG_PAUSE_S:
+        return middle
+    return min(max(middle, min(earliest, end - NEAR_SOUND_S)), max(latest, start + NEAR_SOUND_S))
 
 
 def _quietest_instant(levels: NDArray[np.float64], earliest: float, latest: float) -> float:

@@ -18,11 +18,15 @@ from numpy.typing import NDArray
 from lexicon.errors import BackendError, InputError
 from lexicon.ipa import parse_ipa
 from lexicon.phones import ARPABET, nearest_phones
+from tts2face.sound.pauses import is_near_sound
 from tts2face.types import Waveform
 
 # seconds between frames of the network's output
 FRAME_S = 0.02
 RATE = 16_000  # Hz
+FRAME = round(FRAME_S * RATE)  # samples
+LEAST_SQUARE = 1e-30  # digital silence has no logarithm
+NOTHING = -100.0  # log probability of phones in silence: less than a network ever says
 PART_S, CONTEXT_S = 24.0, 1.0  # of a sound in one call, whose memory grows with its length
 PEAK, LEAST_PEAK = 0.3, 1e-4  # of what the network hears; its output depends on the level
 WORD_BOUNDARY = "<wb>"
@@ -87,11 +91,30 @@ class PhoneRecogniser:
         return Heard(self._output(sound), tuple(self._network.decoder_tokens), self._columns)
 
     def _output(self, sound: Waveform) -> NDArray[np.float32]:
-        """Log probabilities (T, K) of the network's symbols; long sounds are heard in parts that overlap."""
+        """Log probabilities (T, K) of the network's symbols; long sounds are heard in parts that overlap.
+
+        Silence that lasts is left out: with it, the network is less sure of what is said.
+        """
         import soxr
 
         samples = sound.samples if sound.rate == RATE else soxr.resample(sound.samples, sound.rate, RATE)
         samples = levelled(Waveform(samples, RATE)).samples
+        kept = self._sounding_frames(samples)
+        heard = self._hear_parts(samples if kept.all() else samples[np.repeat(kept, FRAME)[: len(samples)]])
+        if kept.all():
+            return heard
+        found = np.full((len(kept), heard.shape[1]), NOTHING, np.float32)
+        found[:, self._network.decoder_tokens.index(BLANKS[0])] = 0.0
+        places = np.flatnonzero(kept)[: len(heard)]
+        found[places] = heard[: len(places)]
+        return found
+
+    def _sounding_frames(self, samples: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """Whether frames are near a sound; the last one has the rest of the samples, or none."""
+        padded = np.pad(samples.astype(np.float64), (0, FRAME - len(samples) % FRAME)).reshape(-1, FRAME)
+        return is_near_sound(10.0 * np.log10(np.square(padded).mean(axis=1) + LEAST_SQUARE), FRAME_S)
+
+    def _hear_parts(self, samples: NDArray[np.float32]) -> NDArray[np.float32]:
         part, context, frame = (round(seconds * RATE) for seconds in (PART_S, CONTEXT_S, FRAME_S))
         found = []
         for start in range(0, max(len(samples), 1), part):

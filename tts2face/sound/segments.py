@@ -19,6 +19,7 @@ from tts2face.models.phone_classifier import PhoneClassifier
 from tts2face.numeric.arrays import FloatArray, IntArray, ordered_product
 from tts2face.numeric.kernels import kernel
 from tts2face.sound.features import mel_bands
+from tts2face.sound.pauses import is_near_sound, is_near_speech
 from tts2face.types import Waveform
 
 RATE = 16_000  # Hz
@@ -268,8 +269,11 @@ def _stated_segments(
     )
 
 
-def frame_features(sound: Waveform) -> NDArray[np.float32]:
-    """Log powers of mel bands (T, K) in a window around each frame of 5 ms, relative to the level of the sound."""
+def frame_features(sound: Waveform, *, is_recording: bool = False) -> NDArray[np.float32]:
+    """Log powers of mel bands (T, K) in a window around each frame of 5 ms, relative to the level of the sound.
+
+    A recording may be silent for most of its time: its level is that of its speech and of its pauses.
+    """
     import soxr
 
     samples = sound.samples if sound.rate == RATE else soxr.resample(sound.samples, sound.rate, RATE)
@@ -277,8 +281,15 @@ def frame_features(sound: Waveform) -> NDArray[np.float32]:
     windows = sliding_window_view(padded, WINDOW)[::STEP][: len(samples) // STEP + 1] * np.hanning(WINDOW)
     powers = np.square(np.abs(np.fft.rfft(windows, TRANSFORM)))
     bands = np.log(ordered_product(powers, mel_bands(N_BANDS, BAND_LIMITS_HZ, TRANSFORM)) + LEAST_POWER)
-    loud = bands.mean(axis=1) >= np.quantile(bands.mean(axis=1), 1.0 - LOUD_SHARE)
+    counted = _is_counted(powers) if is_recording else np.ones(len(bands), bool)
+    loud = counted & (bands.mean(axis=1) >= np.quantile(bands[counted].mean(axis=1), 1.0 - LOUD_SHARE))
     bands = ((bands - bands[loud].mean(axis=0)) / BAND_SPREAD).astype(np.float32)
     rows = np.clip(np.arange(len(bands))[:, None] + np.array(OFFSETS), 0, len(bands) - 1)
     features: NDArray[np.float32] = bands[rows].reshape(len(bands), -1)
     return features
+
+
+def _is_counted(powers: FloatArray) -> NDArray[np.bool_]:
+    """Whether frames with spectra (T, F) are of speech or of its pauses, and not of the silence beyond."""
+    levels: FloatArray = 10.0 * np.log10(powers.sum(axis=1) + np.finfo(np.float64).tiny)
+    return is_near_speech(levels, STEP_S) & is_near_sound(levels, STEP_S)

@@ -16,6 +16,7 @@ from tts2face.numeric.kernels import kernel
 
 # Log probabilities, chosen on voices in noise with right, wrong and incomplete transcripts.
 LEAST = -12.0  # of a phone in a frame
+IMPOSSIBLE = -50.0  # of a phone in silence, which is not heard
 UNWRITTEN = -4.0  # of a frame between words in which something else is heard
 UNSAID = -8.0  # of a word that is left out
 NEVER = -np.inf
@@ -35,7 +36,9 @@ def find_spikes(log_probabilities: NDArray[np.float32], words: Pronounced, unsai
         Log probability of a word that is left out.
     """
     states = _States(words, unsaid, log_probabilities.shape[1] - 1)
-    emitted = np.maximum(log_probabilities.astype(np.float64), LEAST)[:, states.columns]
+    stated = log_probabilities.astype(np.float64)
+    # Phones of minutes of silence, each as probable as the least one, would outweigh a phone that is hardly heard.
+    emitted = np.where(stated > IMPOSSIBLE, np.maximum(stated, LEAST), stated)[:, states.columns]
     between = states.between
     emitted[:, between] = np.maximum(emitted[:, between], UNWRITTEN)
     arcs = np.cumsum([0, *map(len, states.before)]), np.concatenate(states.before), np.concatenate(states.costs)

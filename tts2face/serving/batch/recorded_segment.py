@@ -45,7 +45,8 @@ def excerpt_of(segment: Segment, request: Request) -> Iterator[Request]:
     begin, end = segment.audio_begin, segment.audio_end
     if begin is None:
         heard = Waveform(track.read(0, min(track.n_samples, ONSET_S * SOUND_RATE)) / np.float32(32768), SOUND_RATE)
-        begin = round(speech_onset(heard) * SOUND_RATE) - first_sample(segment.lead_frames or 0, SOUND_RATE, fps)
+        onset = round(speech_onset(heard, is_recording=True) * SOUND_RATE)
+        begin = onset - first_sample(segment.lead_frames or 0, SOUND_RATE, fps)
         end = track.n_samples
         if not heard.samples.any():  # it is refused by its name
             yield request
