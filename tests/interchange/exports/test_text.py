@@ -1,6 +1,7 @@
 """Pronunciations and timed phones as text; Praat itself reads the TextGrids."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +59,16 @@ def test_praat_reads_nominal_times_and_their_note(tmp_path: Path) -> None:
     phones, _ = nominal_phones(spoken)
     assert [label for _, _, label in _tier(grid, 2)] == list(phones.phones)
     assert [label for _, _, label in _tier(grid, 3)] == [NOMINAL_NOTE]
+
+
+@pytest.mark.parametrize("end", [1 - 1e-9, 0.9999994, 1 / 1.00000049, 0.98765432198])
+def test_edges_have_six_decimals_and_none_is_after_the_sound(end: float) -> None:
+    thirds = PhoneSequence(["sil", "p", "ɑ", "sil"], [0.0, 1 / 3, 0.1 + 0.2 + 1 / 3, 0.95, 1.0])
+    written = textgrid(thirds, [WordSpan("pa", 1, 3)], end=end)
+    seconds = re.findall(r"xm(?:in|ax) = (\S+)", written)
+    assert max(len(number.partition(".")[2]) for number in seconds) == 6
+    assert end - 1e-6 <= max(map(float, seconds)) <= end
+    assert seconds.count("0.333333") == 4
 
 
 def test_words_in_disorder_are_refused() -> None:
