@@ -113,9 +113,10 @@ def write_manifest(folder: Path, plan: Plan, entries: Mapping[str, Mapping[str, 
         "warnings": [
             {"file": warning.file, "line": warning.line, "message": warning.message} for warning in plan.warnings
         ],
-        "notes": [{"file": note.file, "line": note.line, "message": note.message} for note in plan.notes],
         "segments": sorted(plan.segments),
     }
+    if plan.notes:
+        content["notes"] = [{"file": note.file, "line": note.line, "message": note.message} for note in plan.notes]
     write_atomically(folder / JSON_NAME, json.dumps(content, ensure_ascii=False, indent=1).encode())
     table = StringIO(newline="")
     rows = csv.writer(table)
