@@ -33,7 +33,7 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
         Path | None, Parameter(help="Table of the marker set (.tsv); by default 68 + 7 markers.")
     ] = None,
     neutral: Annotated[Path | None, Parameter(help="Marker capture of the person at rest.")] = None,
-    marker_rate: Annotated[float | None, Parameter(help="Frames per second of marker tables without times.")] = None,
+    marker_rate: Annotated[float | None, Parameter(help="Frames per second of tables with frame numbers.")] = None,
     estimator: Annotated[
         str, Parameter(help="Estimator of expression weights: least-squares, or samples (as published).")
     ] = "least-squares",

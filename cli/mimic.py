@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 
 
 def mimic(  # noqa: PLR0913 - one parameter a flag
-    take: Annotated[Path | None, Parameter(help="Video of one person, or a .csv file of Live Link Face.")] = None,
+    take: Annotated[
+        Path | None, Parameter(help="Video of one person, or a .csv, .tsv or .txt table of Live Link Face.")
+    ] = None,
     /,
     *,
     out: Out = None,
@@ -45,6 +47,10 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
         float | None, Parameter(help="Frames per second; by default the take's own rate, at most 30 for a capture.")
     ] = None,
     audio: Annotated[Path | None, Parameter(help="Sound of a Live Link capture.")] = None,
+    take_fps: Annotated[
+        float | None,
+        Parameter(help="Frames that a capture counts to a second, where it has frame numbers or less than a second."),
+    ] = None,
     size: Annotated[
         str, Parameter(help="Width x height in pixels; auto: 512x512, or the size of the talker's video.")
     ] = "auto",
@@ -76,7 +82,9 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
         raise InputError("--append-missing needs --face self: a mesh face has a fixed set of shapes; remove it")
     from tts2face.session.performance import Performance
 
-    performance = Performance(take=take, gain=gain, fps=fps, audio=audio, append_missing=append_missing, model=model)
+    performance = Performance(
+        take=take, gain=gain, fps=fps, audio=audio, take_fps=take_fps, append_missing=append_missing, model=model
+    )
     session = models.open_session()
     picture = Picture(size=size, background=background)
     with stage_bar(quiet) as stages:
@@ -87,11 +95,13 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
 
 
 def _report(written: "WrittenClip", performance: "Performance", took: float) -> None:
-    """Say what is written, and what is guessed about the sound."""
+    """Say what is written, and what is missing or guessed about the take and its sound."""
     from tts2face.video.media import channel_notes
 
     for note in channel_notes([performance.audio or performance.take]):
         write_message(f"tts2face: note: {note}")
+    for note in written.notes:
+        write_message(f"tts2face: note: {performance.take.name}: {note}")
     if written.is_silent:
         write_message(f"{performance.take} contains no sound; the clip is silent")
     write_message(

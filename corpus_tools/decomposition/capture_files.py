@@ -15,10 +15,10 @@ from tts2face.face.landmarks import moved_landmarks, rest_landmarks
 from tts2face.lips.performer import match_shapes
 from tts2face.models.face import Face
 from tts2face.types import Trajectory
-from tts2face.video.livelink import FaceCapture, read_livelink
+from tts2face.video.livelink import FaceCapture, is_capture_table, read_livelink
 
-CAPTURE_SUFFIXES = frozenset({".c3d", ".csv"})
-LIVELINK_FIRST_COLUMN = "timecode"  # first column of a Live Link Face table
+CAPTURE_SUFFIXES = frozenset({".c3d", ".csv", ".tsv"})
+LIVELINK_SUFFIXES = frozenset({".csv", ".tsv"})  # in a folder of recordings a .txt is a transcript
 # A feature is missing if no channel with one of these prefixes moves.
 FEATURE_CHANNELS = {"gaze": ("eyeLook",), "blink": ("eyeBlink",), "brows": ("brow",), "cheeks": ("cheek", "nose")}
 
@@ -37,12 +37,8 @@ class MarkerOptions:
 
 
 def is_livelink(path: Path) -> bool:
-    """Whether a file begins like a Live Link Face table."""
-    if path.suffix.lower() != ".csv" or not path.is_file():
-        return False
-    with path.open("rb") as file:
-        # marker tables are .csv, too
-        return file.read(64).decode("utf-8-sig", errors="replace").lower().startswith(LIVELINK_FIRST_COLUMN)
+    """Whether a file is a table of ARKit weights, as Live Link Face writes it; marker tables are .csv, too."""
+    return path.suffix.lower() in LIVELINK_SUFFIXES and is_capture_table(path)
 
 
 def read_capture_file(path: Path, face: Face, *, options: MarkerOptions | None = None) -> FaceRecording:
@@ -51,17 +47,17 @@ def read_capture_file(path: Path, face: Face, *, options: MarkerOptions | None =
         raise InputError(
             f"{path.name} is not a facial capture; supported suffixes are {', '.join(sorted(CAPTURE_SUFFIXES))}"
         )
-    if is_livelink(path):
-        return read_livelink_recording(path, face)
     options = options or MarkerOptions()
+    if is_livelink(path):
+        return read_livelink_recording(path, face, options.fps)
     return read_marker_recording(
         path, face, read_marker_set(options.marker_table), neutral=options.neutral, fps=options.fps
     )
 
 
-def read_livelink_recording(path: Path, face: Face) -> FaceRecording:
-    """A Live Link capture in the size of `face`; sound as in `read_capture_sound`."""
-    capture = read_livelink(path)
+def read_livelink_recording(path: Path, face: Face, fps: float | None = None) -> FaceRecording:
+    """A Live Link capture in the size of `face`; sound as in `read_capture_sound`, `fps` as in `read_livelink`."""
+    capture = read_livelink(path, fps)
     motion = match_shapes(capture.weights, face)
     return FaceRecording(
         name=path.stem,
@@ -72,6 +68,7 @@ def read_livelink_recording(path: Path, face: Face) -> FaceRecording:
         rest=rest_landmarks(face).astype(np.float32),
         eyes=eye_motion(face, motion),
         missing_features=_missing_features(capture),
+        notes=capture.notes,
     )
 
 

@@ -30,6 +30,7 @@ from tts2face.video.resampling import resample_to_grid, trim_and_fill
 LEAST_S = 2.5  # the fields compare 10 preceding frames (0.33 s) and look 6 frames ahead: less leaves no choice
 GOOD_S = 20.0  # chosen, not measured: some eight phrases, so that a clip need not repeat one motion
 LEAST_SEEN = 0.8  # share of frames with a face below which a warning is given
+CAPTURE = "capture"  # code of what is missing in a table, or guessed about it
 LIPS_ONLY = frozenset({"jitter"})  # measures of the lips, which gestures do not use
 
 
@@ -54,8 +55,8 @@ def check_gesture_take(take: Path, run_options: RunOptions, on_share: Callable[[
     suffix = take.suffix.lower()
     try:
         if suffix in CAPTURE_SUFFIXES and is_livelink(take):
-            weights = read_livelink(take).weights
-            seconds, found = weights.duration, list[Finding]()
+            capture = read_livelink(take)
+            seconds, found = capture.weights.duration, [Finding(WARNING, CAPTURE, note) for note in capture.notes]
         elif suffix in VIDEO_SUFFIXES:
             seconds, found = _check_video(
                 take, CachedTracker(run_options.folder(), find_bundle(run_options.model)), on_share

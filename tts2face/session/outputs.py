@@ -151,6 +151,8 @@ class WrittenClip:
         Words of the text that the recording probably does not contain.
     exports
         Files of other formats, those beside them included.
+    notes
+        What is missing in the input, and what is guessed about it, one sentence each.
     """
 
     path: Path
@@ -160,6 +162,7 @@ class WrittenClip:
     is_silent: bool = False
     mismatches: "tuple[TextMismatch, ...]" = ()
     exports: tuple[Path, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def names(self) -> str:

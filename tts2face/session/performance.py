@@ -18,12 +18,11 @@ from tts2face.session.recording import clip_bounds
 from tts2face.session.shared_models import SessionModels
 from tts2face.types import SOUND_RATE, Clip, Speech, StageCallback, Waveform, exact_rate, ignore_progress
 from tts2face.video.blendshapes import BlendshapeReader
-from tts2face.video.livelink import read_livelink
+from tts2face.video.livelink import MAX_CAPTURE_FPS, MIN_CAPTURE_FPS, TABLE_SUFFIXES, read_livelink
 from tts2face.video.media import read_media_info, read_sound
 from tts2face.video.streaming import StreamingTracker
 from tts2face.video.take import Take, read_take
 
-CAPTURE_SUFFIX = ".csv"
 CAPTURE_FPS = 30.0  # default frame rate of captures, whose own is higher than a video needs
 # of a performer's lips and expressions
 GAINS = (0.0, 4.0)
@@ -36,13 +35,15 @@ class Performance:
     Parameters
     ----------
     take
-        A video of one person, or a .csv table of Live Link Face.
+        A video of one person, or a .csv, .tsv or .txt table of Live Link Face.
     gain
         Factor of the motion of lips and brows, 0 to 4.
     fps
         Frames per second; None for the take's own rate, limited to 30 for a capture.
     audio
         Sound file that belongs to a capture.
+    take_fps
+        Frames that the numbers or timecodes of a capture count to a second, where it does not show that itself.
     append_missing
         Whether lip motion that the talker's recordings lack is added to the talker's own face.
     model
@@ -58,6 +59,7 @@ class Performance:
     gain: float = 1.0
     fps: float | None = None
     audio: Path | None = None
+    take_fps: float | None = None
     append_missing: bool = False
     model: Path | None = None
 
@@ -67,15 +69,23 @@ class Performance:
         check_limits("the gain", self.gain, GAINS)
         if self.audio is not None and not is_capture(self.take):
             raise InputError(f"{self.take} has its own sound; --audio belongs to a Live Link Face .csv file")
+        if self.take_fps is not None:
+            check_limits("the frame rate of the take", self.take_fps, (MIN_CAPTURE_FPS, MAX_CAPTURE_FPS))
+            if not is_capture(self.take):
+                raise InputError(f"{self.take} has its own frame rate; --take-fps belongs to a Live Link Face table")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PerformedTake:
-    """A take transferred to a face: the face, its motion, and the sound, which is empty if the take has none."""
+    """A take transferred to a face: the face, its motion, and the sound, which is empty if the take has none.
+
+    `notes` say what is missing in a capture, and what is guessed about it.
+    """
 
     face: AnimatedFace
     motion: FaceMotion
     sound: Waveform
+    notes: tuple[str, ...] = ()
 
     @property
     def seconds(self) -> float:
@@ -105,10 +115,10 @@ def perform(
     take = performance.take
     sound = sound_of_take(take) if performance.audio is None else read_sound(performance.audio, SOUND_RATE)
     if is_capture(take):
-        capture = read_livelink(take)
+        capture = read_livelink(take, performance.take_fps)
         motion = FaceMotion(face.motion_of_capture(capture, gain=performance.gain), capture.head)
         fps = performance.fps or min(motion.face.fps, CAPTURE_FPS)
-        return PerformedTake(face, resample_take(motion, fps), sound)
+        return PerformedTake(face, resample_take(motion, fps), sound, capture.notes)
     tracker, reader = StreamingTracker(performance.model), BlendshapeReader(performance.model)
     tracked = read_take(take, tracker, reader, on_progress=on_progress or ignore_progress)
     if performance.append_missing:
@@ -119,7 +129,7 @@ def perform(
 
 def is_capture(take: Path) -> bool:
     """Whether the suffix of a path is that of a Live Link Face table; other files are read as videos."""
-    return take.suffix.lower() == CAPTURE_SUFFIX
+    return take.suffix.lower() in TABLE_SUFFIXES
 
 
 def retarget_take(take: Take, face: AnimatedFace, *, gain: float = 1.0) -> FaceMotion:
@@ -177,4 +187,6 @@ def write_take(
         for clip in take_clips(take.motion, take.sound):
             files.add(clip)
     is_silent = not len(take.sound.samples)
-    return WrittenClip(outputs.path, take.seconds, n_frames, is_silent=is_silent, exports=outputs.export_paths)
+    return WrittenClip(
+        outputs.path, take.seconds, n_frames, is_silent=is_silent, exports=outputs.export_paths, notes=take.notes
+    )

@@ -1,94 +1,239 @@
-"""Reader of Live Link Face captures: CSV files with 61 ARKit channels for each frame."""
+"""Reader of Live Link Face captures and other tables of ARKit weights: CSV files with a time and channels in each row.
 
+A take cannot be made again: what can be read of it is read, and notes say what is missing or guessed.
+"""
+
+import csv
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from lexicon.values.tables import read_table
-from tts2face.numeric.arrays import interpolate_columns
+from lexicon.values.tables import parse_table, read_table
+from tts2face.numeric.arrays import FloatArray, IntArray, interpolate_columns
 from tts2face.types import HEAD_CHANNELS, Trajectory
+from tts2face.video.blendshapes import BLENDSHAPES
+from tts2face.video.capture_clock import GAP_STEPS, MAX_SHORT_GAP_S, CaptureTimes, order_frames
+from tts2face.video.timecode import DEFAULT_TIMECODE_RATE, parse_times
 
-HEAD_COLUMNS = ("HeadPitch", "HeadYaw", "HeadRoll")
+HEAD_COLUMNS = ("headpitch", "headyaw", "headroll")
+TIME_COLUMNS = ("timecode", "time", "timestamp", "frame")  # how programs name it, in lower case
+NO_SHAPES = ("blendshapecount", "head", "lefteye", "righteye")  # how other columns begin
+ARKIT_NAMES = {name.lower(): name for name in (*BLENDSHAPES[1:], "tongueOut")}
+DELIMITERS = ",;\t"
+TABLE_SUFFIXES = frozenset({".csv", ".tsv", ".txt"})  # of tables: spreadsheets write tabs into .txt
 MIN_CAPTURE_FPS, MAX_CAPTURE_FPS = 10.0, 240.0
-MAX_CAPTURE_GAP_S = 0.5
-TIMECODE_RATES = (24, 25, 30, 50, 60, 120)  # frames in a second of timecode
+RELAX_S = 0.25  # from a pose to the take's usual one in a long gap, and back
+MAX_QUOTED = 4  # gaps quoted in a note
+MAX_HEADER_ROW, MAX_HEADER_BYTES = 20, 1 << 16  # of what stands above the first frame
+LARGEST_TURN_RAD = 2 * np.pi  # turns beyond it are in degrees
+LARGEST_WEIGHT = 10.0  # weights beyond it are per cent
 HEAD_SIGNS = np.array([1.0, -1.0, 1.0])  # as of its eyes: pitch down (EyePitch follows EyeLookDown), yaw to the right
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FaceCapture:
-    """Weights (T, 52) by ARKit name and head pose (T, 6) with zero translation, at a uniform frame rate."""
+    """Weights (T, 52) by ARKit name and head pose (T, 6) with zero translation, at a uniform frame rate.
+
+    `notes` say what is missing in the file and what is guessed about it, one sentence each.
+    """
 
     weights: Trajectory
     head: Trajectory
+    notes: tuple[str, ...] = ()
 
 
-def read_livelink(path: Path) -> FaceCapture:
+def read_livelink(path: Path, fps: float | None = None) -> FaceCapture:
     """Read a Live Link Face file.
+
+    Parameters
+    ----------
+    fps
+        Frames that its numbers or timecodes count to a second, where it does not show that itself.
 
     Raises
     ------
     InputError
         The file does not exist.
     DataError
-        The file has another format or is too large, or a row is damaged.
+        The file has another format or is too large, or holds fewer than two frames.
     """
     if not path.is_file():
         raise InputError(f"there is no capture {path}; check the path")
-    rows = read_table(path)
-    if not rows or rows[0][:1] != ["Timecode"] or "JawOpen" not in rows[0] or len(rows) < 3:
-        raise DataError(f"{path} is not a CSV file of Live Link Face: it needs the columns Timecode, JawOpen, ...")
-    names, times, values = _parse_rows(path, rows)
-    fps = _frame_rate(path, times)
-    n_frames = int(np.floor((times[-1] - times[0]) * fps + 0.5)) + 1
-    even = times[0] + np.arange(n_frames) / fps
-    read = interpolate_columns(values, times, even)
-    shapes = [at for at, name in enumerate(names) if not name.startswith(("Head", "LeftEye", "RightEye"))]
-    channels = tuple(names[at][0].lower() + names[at][1:] for at in shapes)
-    head = np.zeros((n_frames, len(HEAD_CHANNELS)))
-    if all(name in names for name in HEAD_COLUMNS):
-        turns = read[:, [names.index(name) for name in HEAD_COLUMNS]]
+    rows = read_table(path, delimiters=DELIMITERS)
+    first = _header_row(rows)
+    if first is None:
+        raise DataError(
+            f"{path} is not a CSV file of Live Link Face: it needs the columns Timecode, JawOpen, ... ; "
+            "it has no row with a column of times and ARKit's names"
+        )
+    names = [_normal(cell) for cell in rows[first]]
+    labels, values, notes = _parse_rows(names, rows[first + 1 :])
+    clock = order_frames(parse_times(labels, fps), fps or DEFAULT_TIMECODE_RATE)
+    if len(clock.rows) < 2:
+        raise DataError(f"{path} holds fewer than two frames with a time and a face ({len(clock.rows)})")
+    if not MIN_CAPTURE_FPS <= clock.fps <= MAX_CAPTURE_FPS:
+        raise DataError(
+            f"{path} has {clock.fps:g} frames per second by its column {rows[first][_time_column(names)].strip()}; "
+            f"supported are {MIN_CAPTURE_FPS:g} to {MAX_CAPTURE_FPS:g}"
+        )
+    return _build_capture(rows[first], names, values[clock.rows], clock, notes)
+
+
+def is_capture_table(path: Path) -> bool:
+    """Whether a file is a table of ARKit weights, by the names of its columns."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        start = file.read(MAX_HEADER_BYTES).decode("utf-8-sig", errors="replace")
+    try:
+        return _header_row(parse_table(start, DELIMITERS)) is not None
+    except csv.Error:
+        return False
+
+
+def _normal(cell: str) -> str:
+    """Name of a column in lower case, without marks between words; sides as ARKit writes them."""
+    name = "".join(letter for letter in cell.lower() if letter.isalnum())
+    for short, side in (("l", "left"), ("r", "right")):
+        # iFacialMocap and Face Cap write _L and _R
+        if name.endswith(short) and name[:-1] + side in ARKIT_NAMES:
+            return name[:-1] + side
+    return name
+
+
+def _header_row(rows: list[list[str]]) -> int | None:
+    """Number of the row with the names of the columns; None without one."""
+    for number, row in enumerate(rows[:MAX_HEADER_ROW]):
+        names = {_normal(cell) for cell in row}
+        if names & set(TIME_COLUMNS) and names & ARKIT_NAMES.keys():
+            return number
+    return None
+
+
+def _time_column(names: list[str]) -> int:
+    return names.index(next(name for name in TIME_COLUMNS if name in names))
+
+
+def _parse_rows(names: list[str], rows: list[list[str]]) -> tuple[list[str], FloatArray, list[str]]:
+    """Times as written and values (T, C) of all columns, NaN where a cell holds no number; of rows with a face."""
+    at, shapes = _time_column(names), [column for column, name in enumerate(names) if name in ARKIT_NAMES]
+    labels, values = list[str](), list[list[float]]()
+    n_cut = n_empty = 0
+    for row in rows:
+        cells = row[: len(names)]
+        # an empty line of a spreadsheet; a heading that is repeated
+        if not any(cell.strip() for cell in row) or [_normal(cell) for cell in cells[:3]] == names[:3]:
+            continue
+        # a row of a time and a count alone has no face
+        if 2 < len(row) < len(names) or any(cell.strip() for cell in row[len(names) :]):
+            n_cut += 1
+            continue
+        numbers = _parse_numbers(cells + [""] * (len(names) - len(cells)))
+        if np.isnan([numbers[column] for column in shapes]).all():
+            n_empty += 1
+            continue
+        labels.append(cells[at])
+        values.append(numbers)
+    notes = []
+    if n_cut:
+        notes.append(f"rows left out, as they have more or fewer cells than columns: {n_cut}")
+    if n_empty:
+        notes.append(f"rows without a face: {n_empty}")
+    return labels, np.array(values).reshape(len(values), len(names)), notes
+
+
+def _parse_numbers(cells: list[str]) -> list[float]:
+    try:
+        return [float(cell) for cell in cells]
+    except ValueError:
+        return [_number(cell) for cell in cells]
+
+
+def _number(cell: str) -> float:
+    try:
+        value = float(cell.replace(",", "."))
+    except ValueError:
+        return np.nan
+    return value if np.isfinite(value) else np.nan
+
+
+def _build_capture(
+    heading: list[str], names: list[str], values: FloatArray, clock: CaptureTimes, notes: list[str]
+) -> FaceCapture:
+    """The capture at even times."""
+    values = np.where(np.isfinite(values), values, np.nan)
+    shapes = [column for column in _channel_columns(names) if np.isfinite(values[:, column]).any()]
+    turned = [names.index(name) for name in HEAD_COLUMNS if name in names]
+    has_head = len(turned) == len(HEAD_COLUMNS) and bool(np.isfinite(values[:, turned]).any(axis=0).all())
+    columns: IntArray = np.array([*shapes, *(turned if has_head else ())])
+    whole, n_cells = _fill_cells(values[:, columns], clock.times)
+    if n_cells:
+        notes.append(f"cells without a number, which are interpolated: {n_cells}")
+    n_frames = int(np.floor(clock.times[-1] * clock.fps + 0.5)) + 1
+    even = np.arange(n_frames) / clock.fps
+    read = interpolate_columns(*_relax_in_gaps(whole, clock, notes), even)
+    weights, head = read[:, : len(shapes)], np.zeros((n_frames, len(HEAD_CHANNELS)))
+    known = [names[column] in ARKIT_NAMES for column in shapes]
+    if np.abs(weights[:, known]).max() > LARGEST_WEIGHT:
+        weights = weights / 100.0
+        notes.append(f"its weights go beyond {LARGEST_WEIGHT:g}; they are taken for per cent")
+    if has_head:
+        turns = read[:, len(shapes) :]
+        if np.abs(turns).max() > LARGEST_TURN_RAD:
+            turns = np.radians(turns)
+            notes.append("its turns of the head go beyond a whole one in radians; they are taken for degrees")
         # angles from the median: the telephone need not stand straight before the face
         head[:, :3] = HEAD_SIGNS * (turns - np.median(turns, axis=0))
-    return FaceCapture(Trajectory(channels, read[:, shapes], fps), Trajectory(HEAD_CHANNELS, head, fps))
+    channels = tuple(_channel_name(heading[column], names[column]) for column in shapes)
+    return FaceCapture(
+        Trajectory(channels, weights, clock.fps),
+        Trajectory(HEAD_CHANNELS, head, clock.fps),
+        (*clock.notes, *notes),
+    )
 
 
-def _parse_rows(path: Path, rows: list[list[str]]) -> tuple[list[str], NDArray[np.float64], NDArray[np.float64]]:
-    names = rows[0][2:]
-    times, values = [], []
-    for number, row in enumerate(rows[1:], start=2):
-        if len(row) != len(rows[0]):
-            raise DataError(f"line {number} of {path} has {len(row)} columns, not {len(rows[0])}; export it again")
-        try:
-            times.append(_parse_timecode(row[0]))
-            values.append([float(cell) for cell in row[2:]])
-        except ValueError as broken:
-            raise DataError(f"line {number} of {path} cannot be read ({broken}); export it again") from broken
-    if not np.isfinite(values).all():
-        raise DataError(f"{path} contains NaN or infinity; export it again")
-    seconds, frames = np.array(times).T
-    counted = next((rate for rate in TIMECODE_RATES if rate > frames.max()), TIMECODE_RATES[-1])
-    return names, seconds + frames / counted, np.array(values)
+def _channel_columns(names: list[str]) -> list[int]:
+    """Columns of shapes, the first of each name: ARKit's, and those of a character's own."""
+    found = dict[str, int]()
+    for column, name in enumerate(names):
+        if name and name not in TIME_COLUMNS and not name.startswith(NO_SHAPES):
+            found.setdefault(name, column)
+    return list(found.values())
 
 
-def _parse_timecode(text: str) -> tuple[float, float]:
-    """Seconds and frames of ``hours:minutes:seconds:frames``."""
-    hours, minutes, seconds, frames = text.split(":")
-    return int(hours) * 3600.0 + int(minutes) * 60.0 + float(seconds), float(frames)
+def _channel_name(written: str, name: str) -> str:
+    own = written.strip()
+    return ARKIT_NAMES.get(name, own[:1].lower() + own[1:])
 
 
-def _frame_rate(path: Path, times: NDArray[np.float64]) -> float:
-    steps = np.diff(times)
-    if (steps <= 0).any() or steps.max() > MAX_CAPTURE_GAP_S:
-        raise DataError(
-            f"the times of {path} must increase by at most {MAX_CAPTURE_GAP_S:g} s from row to row; export it again"
-        )
-    fps = float(np.round(1.0 / np.mean(steps)))
-    if not MIN_CAPTURE_FPS <= fps <= MAX_CAPTURE_FPS:
-        raise DataError(
-            f"{path} has {fps:g} frames per second, not {MIN_CAPTURE_FPS:g} to {MAX_CAPTURE_FPS:g}; export it again"
-        )
-    return fps
+def _fill_cells(values: FloatArray, times: FloatArray) -> tuple[FloatArray, int]:
+    """Values (T, C) without NaN, by linear interpolation in each column, and how many were filled."""
+    is_empty, whole = np.isnan(values), values.copy()
+    for column in np.flatnonzero(is_empty.any(axis=0)):
+        there = ~is_empty[:, column]
+        whole[:, column] = np.interp(times, times[there], values[there, column])
+    return whole, int(is_empty.sum())
+
+
+def _relax_in_gaps(values: FloatArray, clock: CaptureTimes, notes: list[str]) -> tuple[FloatArray, FloatArray]:
+    """Values and times with the take's median pose in gaps that are too long to be interpolated; notes on all gaps."""
+    steps = np.diff(clock.times)
+    is_long = steps > MAX_SHORT_GAP_S
+    is_short = (steps > GAP_STEPS / clock.fps) & ~is_long
+    if is_short.any():
+        n_lost = int(np.rint(steps[is_short] * clock.fps - 1).sum())
+        at = clock.times[:-1][is_short]
+        notes.append(f"frames missing from {at[0]:.2f} s on, which are interpolated: {n_lost}")
+    if not is_long.any():
+        return values, clock.times
+    starts, ends = clock.times[:-1][is_long], clock.times[1:][is_long]
+    quoted = ", ".join(f"{a:.2f} to {b:.2f} s" for a, b in list(zip(starts, ends, strict=True))[:MAX_QUOTED])
+    more = f" and {len(starts) - MAX_QUOTED} more" if len(starts) > MAX_QUOTED else ""
+    notes.append(f"there is no face from {quoted}{more}; the pose relaxes there to the take's usual one")
+    added = np.concatenate([starts + RELAX_S, ends - RELAX_S])
+    times = np.concatenate([clock.times, added])
+    order = np.argsort(times, kind="stable")
+    usual = np.repeat(np.median(values, axis=0)[None], len(added), axis=0)
+    return np.concatenate([values, usual])[order], times[order]

@@ -9,11 +9,10 @@ from tts2face.interchange.exports.frame_grid import frame_rows
 from tts2face.interchange.exports.parts import Part, Target
 from tts2face.numeric.arrays import Float32Array
 from tts2face.types import HEAD_CHANNELS
-from tts2face.video.livelink import TIMECODE_RATES
+from tts2face.video.timecode import DEFAULT_TIMECODE_RATE, TIMECODE_RATES
 
 HEAD_COLUMNS = ("HeadYaw", "HeadPitch", "HeadRoll")
 EYES = ("Left", "Right")
-DEFAULT_TIMECODE_RATE = 60  # for other frame rates, with fractions of frames
 # Signs of the angles in the file relative to `HEAD_CHANNELS`: pitch down, yaw to the right, roll alike.
 HEAD_SIGNS = {"yaw": -1.0, "pitch": 1.0, "roll": 1.0}
 # Angles of the eyes at weight 1 of the gaze shapes: pitch follows eyeLookDown, yaw eyeLookIn of the left and

@@ -48,7 +48,7 @@ def recorded_motion(session: "Session", work: Work, _: Inputs) -> Iterator[Event
         raise InputError(
             "a recording is compared with a project that is made from it; import its sound with its words first"
         )
-    motion = _recorded(session, work.request, project)
+    motion, notes = _recorded(session, work.request, project)
     values, head = motion.face.values.astype("<f4"), motion.head.values.astype("<f4")
     parts = [values.tobytes(), head.tobytes(), b""]
     digest = digest_of(parts)
@@ -56,7 +56,7 @@ def recorded_motion(session: "Session", work: Work, _: Inputs) -> Iterator[Event
     yield Event({
         "type": "piece", "number": 0, "text": "", "occurrence": 0, "begin": 0.0,
         "seconds": motion.face.duration, "rate": SILENT_RATE, "n_frames": len(values), "n_samples": 0,
-        "digest": digest, "phones": [], "edges": [0.0], "words": [], "notes": [],
+        "digest": digest, "phones": [], "edges": [0.0], "words": [], "notes": notes,
         "channels": list(motion.face.channels),
     })  # fmt: skip
     if digest not in work.request.get("have", ()):
@@ -64,23 +64,24 @@ def recorded_motion(session: "Session", work: Work, _: Inputs) -> Iterator[Event
     yield Event({"type": "end", "dropped": [], "cut_to": None})
 
 
-def _recorded(session: "Session", options: Mapping[str, Any], project: Project) -> FaceMotion:
-    """Recorded motion from the offset on, at the project's frame rate."""
-    face = session.animated_face(has_gestures=project.request.has_gestures)
+def _recorded(session: "Session", options: Mapping[str, Any], project: Project) -> tuple[FaceMotion, list[str]]:
+    """Recorded motion from the offset on, at the project's frame rate, and notes on a take."""
+    face, notes = session.animated_face(has_gestures=project.request.has_gestures), list[str]()
     if options.get("recording"):
         found = _utterance_motion(session.talker, str(options["recording"]), face)
     else:
         capture = read_livelink(Path(options["take"]))
-        found = FaceMotion(face.motion_of_capture(capture), capture.head)
+        found, notes = FaceMotion(face.motion_of_capture(capture), capture.head), list(capture.notes)
     offset, fps = float(options.get("offset", 0.0)), float(project.request.fps)
     # 1e-6: an instant that is a frame of both rates counts in spite of rounding
     n_frames = int(np.floor(((len(found.face) - 1) / found.face.fps - offset) * fps + 1e-6)) + 1
     if n_frames < 1:
         raise InputError(f"the recording ends before its second {offset:g}; give a smaller offset")
     times = offset + np.arange(n_frames) / fps
-    return FaceMotion(
-        *(replace(trajectory, values=trajectory.at(times), fps=fps) for trajectory in (found.face, found.head))
+    face_motion, head = (
+        replace(trajectory, values=trajectory.at(times), fps=fps) for trajectory in (found.face, found.head)
     )
+    return FaceMotion(face_motion, head), notes
 
 
 def _utterance_motion(talker: Talker, name: str, face: AnimatedFace) -> FaceMotion:

@@ -1,0 +1,220 @@
+"""Takes of Live Link Face and tables like them are read with what they hold; what is missing or guessed is said."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lexicon.errors import DataError
+from tts2face.interchange.exports.arkit import ARKIT_SHAPES
+from tts2face.video.livelink import FaceCapture, read_livelink
+
+HEAD = ("HeadYaw", "HeadPitch", "HeadRoll")
+NAMES = (*(name[0].upper() + name[1:] for name in ARKIT_SHAPES), *HEAD)
+TEN = 10 * 3600.0  # o'clock
+FOUR_S = np.arange(240) / 60
+
+
+def jaw(times: np.ndarray) -> np.ndarray:
+    return 0.25 - 0.25 * np.cos(2 * np.pi * np.asarray(times))
+
+
+def timecode(second: float, counted: int = 60, sign: str = ":") -> str:
+    frames = round((second % 86400) * counted * 1000) / 1000
+    whole = int(frames // counted)
+    return f"{whole // 3600:02d}:{whole // 60 % 60:02d}:{whole % 60:02d}{sign}{frames - whole * counted:06.3f}"
+
+
+def rows_of(times: Sequence[float], labels: Sequence[str], names: Sequence[str] = NAMES) -> list[list[str]]:
+    rows = [["Timecode", "BlendShapeCount", *names]]
+    for value, label in zip(jaw(np.asarray(times)), labels, strict=True):
+        rows.append([label, "61", *(f"{value:.6f}" if name.lower() == "jawopen" else "0.000000" for name in names)])
+    return rows
+
+
+def read(folder: Path, rows: list[list[str]], delimiter: str = ",", **options: float) -> FaceCapture:
+    path = folder / "take.csv"
+    path.write_text("\n".join(delimiter.join(row) for row in rows) + "\n", encoding="utf-8")
+    return read_livelink(path, **options)
+
+
+def jaw_error(capture: FaceCapture) -> float:
+    """Largest difference of the jaw from the truth, at the times of the capture's frames."""
+    values = capture.weights.values[:, capture.weights.channels.index("jawOpen")]
+    return float(np.abs(values - jaw(np.arange(len(values)) / capture.weights.fps)).max())
+
+
+@pytest.mark.parametrize(
+    ("counted", "fps"), [(24, 24), (25, 25), (30, 30), (50, 50), (60, 60), (60, 30), (60, 30000 / 1001), (120, 60)]
+)
+def test_the_frame_rate_is_found(counted: int, fps: float, tmp_path: Path) -> None:
+    times = np.arange(round(4 * fps)) / fps
+    found = read(tmp_path, rows_of(times, [timecode(TEN + 5.5 + time, counted) for time in times]))
+    assert found.weights.fps == pytest.approx(fps, abs=1e-9)
+    assert jaw_error(found) < 1e-3
+    assert found.notes == ()
+
+
+@pytest.mark.parametrize("day", [86_398.0, 86_399.99])
+def test_a_take_goes_on_after_midnight(day: float, tmp_path: Path) -> None:
+    found = read(tmp_path, rows_of(FOUR_S, [timecode(day + time) for time in FOUR_S]))
+    assert (len(found.weights), found.weights.fps, found.notes) == (240, 60.0, ())
+    assert jaw_error(found) < 1e-3
+
+
+def test_a_second_without_a_face_keeps_its_time(tmp_path: Path) -> None:
+    times = np.concatenate([FOUR_S[:121], FOUR_S[121:] + 1.0])
+    found = read(tmp_path, rows_of(times, [timecode(TEN + time) for time in times]))
+    assert len(found.weights) == 300
+    assert found.notes == ("there is no face from 2.00 to 3.02 s; the pose relaxes there to the take's usual one",)
+    values = found.weights.values[:, found.weights.channels.index("jawOpen")]
+    assert np.abs(values[:121] - jaw(np.arange(121) / 60)).max() < 1e-6
+    assert values[150] == pytest.approx(np.median(jaw(times)), abs=1e-6)
+    assert np.abs(np.diff(values)).max() < 0.05  # no leap: a motion through the whole range takes a quarter second
+
+
+def test_rows_of_a_lost_face_are_no_frames(tmp_path: Path) -> None:
+    rows = rows_of(FOUR_S, [timecode(TEN + time) for time in FOUR_S])
+    rows[100:106] = [[row[0], "0", *("" for _ in NAMES)] for row in rows[100:106]]
+    rows[180] = [rows[180][0], "0"]
+    found = read(tmp_path, rows)
+    assert len(found.weights) == 240
+    assert jaw_error(found) < 0.03
+    assert "rows without a face: 7" in found.notes
+    assert "frames missing from 1.63 s on, which are interpolated: 7" in found.notes
+
+
+def test_frames_that_were_dropped_keep_their_time(tmp_path: Path) -> None:
+    kept = FOUR_S[np.random.default_rng(3).uniform(size=240) > 0.3]
+    kept = np.concatenate([[0.0], kept[(kept > 0) & (kept < FOUR_S[-1])], FOUR_S[-1:]])
+    found = read(tmp_path, rows_of(kept, [timecode(TEN + time) for time in kept]))
+    assert (len(found.weights), found.weights.fps) == (240, 60.0)
+    assert jaw_error(found) < 0.02
+    assert any(note.startswith("frames missing") for note in found.notes)
+
+
+@pytest.mark.parametrize("again", [0.0, -0.004])
+def test_a_row_that_is_not_later_is_left_out(again: float, tmp_path: Path) -> None:
+    labels = [timecode(TEN + time) for time in FOUR_S]
+    labels[120] = timecode(TEN + FOUR_S[119] + again)
+    found = read(tmp_path, rows_of(FOUR_S, labels))
+    assert len(found.weights) == 240
+    assert jaw_error(found) < 0.01
+    assert found.notes[0] == "rows left out, as their time is missing or not after that of the row before: 1"
+
+
+def test_a_clock_that_was_set_goes_on(tmp_path: Path) -> None:
+    labels = [timecode(TEN + time + (4000.0 if time > 1 else 0.0) - (6000.0 if time > 3 else 0.0)) for time in FOUR_S]
+    labels[200] = timecode(3.0)  # a single one astray
+    found = read(tmp_path, rows_of(FOUR_S, labels))
+    assert len(found.weights) == 240
+    assert jaw_error(found) < 0.01
+    assert "its clock leaps at 1.00 s, 3.00 s; the rows after it follow without a pause" in found.notes
+
+
+def test_a_clock_that_stands_still_counts_rows(tmp_path: Path) -> None:
+    found = read(tmp_path, rows_of(FOUR_S, ["00:00:00:00.000"] * 240), fps=30.0)
+    assert (len(found.weights), found.weights.fps) == (240, 30.0)
+    assert any("stands still" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(("sign", "counted"), [(";", 30), (";", 60), (".", 30)])
+def test_drop_frame_counts_real_time(sign: str, counted: int, tmp_path: Path) -> None:
+    fps, skipped = counted * 1000 / 1001, counted // 15
+    number, labels = (10 * 60 + 8) * 60 * counted + 58 * counted, list[str]()  # from 10:08:58 on, over a minute's end
+    while len(labels) < 4 * counted:
+        whole, frame = divmod(number, counted)
+        number += 1
+        if whole % 60 == 0 and whole // 60 % 10 and frame < skipped:
+            continue
+        labels.append(f"{whole // 3600:02d}:{whole // 60 % 60:02d}:{whole % 60:02d}{sign}{frame:02d}")
+    times = np.arange(len(labels)) / fps
+    found = read(tmp_path, rows_of(times, labels))
+    assert found.weights.fps == pytest.approx(fps, abs=1e-6)
+    assert len(found.weights) == len(labels)
+    assert jaw_error(found) < 1e-3
+
+
+def test_seconds_with_a_fraction_are_read(tmp_path: Path) -> None:
+    found = read(tmp_path, rows_of(FOUR_S, [f"10:00:{time + 5:06.3f}" for time in FOUR_S]))
+    assert found.weights.fps == 60.0
+    assert jaw_error(found) < 0.01
+    numbers = read(tmp_path, rows_of(FOUR_S, [f"{time:.4f}" for time in FOUR_S]))
+    assert numbers.weights.fps == 60.0
+    assert numbers.notes == ()
+
+
+def test_frame_numbers_count_to_60_without_an_option(tmp_path: Path) -> None:
+    rows = rows_of(FOUR_S, [str(frame) for frame in range(240)])
+    found = read(tmp_path, rows)
+    assert (len(found.weights), found.weights.fps) == (240, 60.0)
+    assert any("frame numbers, which are taken for 60 a second" in note for note in found.notes)
+    assert read(tmp_path, rows, fps=30.0).weights.fps == 30.0
+
+
+def test_a_take_within_one_second_counts_to_60_without_an_option(tmp_path: Path) -> None:
+    rows = rows_of(FOUR_S[:20], [timecode(TEN + time) for time in FOUR_S[:20]])
+    found = read(tmp_path, rows)
+    assert (len(found.weights), found.weights.fps) == (20, 60.0)
+    assert any("60 are taken" in note for note in found.notes)
+    assert read(tmp_path, rows, fps=24.0).weights.fps == 24.0
+    crossing = read(tmp_path, rows_of(FOUR_S[:20], [timecode(TEN + 5.9 + time) for time in FOUR_S[:20]]))
+    assert (crossing.weights.fps, crossing.notes) == (60.0, ())
+
+
+@pytest.mark.parametrize("delimiter", [";", "\t"])
+def test_tables_of_a_spreadsheet_with_decimal_commas(delimiter: str, tmp_path: Path) -> None:
+    rows = rows_of(FOUR_S, [timecode(TEN + time) for time in FOUR_S])
+    rows = [rows[0], *([cell.replace(".", ",") for cell in row] for row in rows[1:])]
+    found = read(tmp_path, [*rows, *[[""] * len(rows[0])] * 3], delimiter)
+    assert (len(found.weights), found.notes) == (240, ())
+    assert jaw_error(found) < 1e-3
+    path = tmp_path / "take.csv"
+    path.write_bytes(b"\xef\xbb\xbfsep=" + delimiter.encode() + b"\r\n" + path.read_bytes().replace(b"\n", b"\r\n"))
+    assert jaw_error(read_livelink(path)) < 1e-3
+
+
+@pytest.mark.parametrize("short", [False, True])
+def test_names_are_compared_without_case_and_in_any_order(short: bool, tmp_path: Path) -> None:
+    names = [name.replace("Left", "_L").replace("Right", "_R") if short else name for name in ARKIT_SHAPES[::-1]]
+    rows = rows_of(FOUR_S, [timecode(TEN + time) for time in FOUR_S], names)
+    rows = [[*row, "note" if row is rows[0] else "good"] for row in rows]  # a column of the user's own
+    found = read(tmp_path, [[*row[1:], row[0]] for row in rows])
+    assert set(found.weights.channels) == set(ARKIT_SHAPES)
+    assert not found.head.values.any()
+    assert jaw_error(found) < 1e-3
+
+
+def test_damage_costs_the_damaged_rows_only(tmp_path: Path) -> None:
+    rows = rows_of(FOUR_S, [timecode(TEN + time) for time in FOUR_S])
+    at = rows[0].index("JawOpen")
+    rows[40][at] = "NaN"
+    rows[41][at] = rows[42][0] = ""
+    rows = [*rows[:60], [], rows[0], *rows[60:], rows[0], rows[-1][:30]]
+    found = read(tmp_path, rows)
+    assert len(found.weights) == 240
+    assert jaw_error(found) < 0.01
+    assert "rows left out, as they have more or fewer cells than columns: 1" in found.notes
+    assert "cells without a number, which are interpolated: 2" in found.notes
+
+
+def test_turns_in_degrees_and_weights_per_cent_are_said(tmp_path: Path) -> None:
+    rows = rows_of(FOUR_S, [timecode(TEN + time) for time in FOUR_S])
+    at, yaw = rows[0].index("JawOpen"), rows[0].index("HeadYaw")
+    for number, row in enumerate(rows[1:]):
+        row[at], row[yaw] = f"{100 * float(row[at]):.4f}", str(number % 60)
+    found = read(tmp_path, rows)
+    assert jaw_error(found) < 1e-3
+    assert np.ptp(found.head.values[:, 1]) == pytest.approx(np.radians(59), abs=0.02)
+    assert [note.rpartition("taken for ")[2] for note in found.notes] == ["per cent", "degrees"]
+
+
+def test_what_is_no_take_is_refused_truly(tmp_path: Path) -> None:
+    rows = rows_of(FOUR_S[:1], [timecode(TEN)])
+    with pytest.raises(DataError, match="holds fewer than two frames with a time and a face \\(1\\)"):
+        read(tmp_path, rows)
+    with pytest.raises(DataError, match="no row with a column of times and ARKit's names"):
+        read(tmp_path, [["Timecode", "a"], ["1", "2"]])
+    with pytest.raises(DataError, match=r"has 5 frames per second by its column Timecode; supported are 10 to 240"):
+        read(tmp_path, rows_of(FOUR_S[:20], [timecode(TEN + number / 5) for number in range(20)]))

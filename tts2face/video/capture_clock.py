@@ -1,0 +1,89 @@
+"""One clock for the rows of a capture: without repetitions and jumps, across midnight; and its frame rate."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tts2face.numeric.arrays import FloatArray, IntArray, Mask
+from tts2face.video.timecode import FrameClock
+
+MAX_SHORT_GAP_S = 0.5  # a longer one hides a word: the pose in it is not interpolated
+MAX_LONG_GAP_S = 60.0  # a longer one is a clock that was set, or another take
+STANDARD_RATES = (12.0, 15.0, 24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 90.0, 100.0, 120.0)
+NTSC_RATES = tuple(nominal * 1000 / 1001 for nominal in (24, 30, 48, 60, 120))
+RATE_TOLERANCE = 0.02  # of a rate: a capture of few frames is that far from it
+NTSC_TOLERANCE = 3e-4  # of a rate, as 29.97 is .1 % from 30; a camera of 60 had 59.904
+GAP_STEPS = 1.5  # of the usual step: a longer one is a gap of frames
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CaptureTimes:
+    """Numbers (N,) of the rows that are frames, their times (N,) from 0 on, increasing, and the frame rate."""
+
+    rows: IntArray
+    times: FloatArray
+    fps: float
+    notes: tuple[str, ...]
+
+
+def order_frames(clock: FrameClock, still_fps: float) -> CaptureTimes:
+    """Frames of a capture in order of time.
+
+    Parameters
+    ----------
+    still_fps
+        Frame rate where the clock stands still.
+    """
+    rows, notes = np.flatnonzero(np.isfinite(clock.times)), list(clock.notes)
+    times = clock.times[rows]
+    if len(rows) > 1 and not np.ptp(times):
+        notes.append(f"its clock stands still; its rows are taken for {still_fps:g} frames a second")
+        times = np.arange(len(rows)) / still_fps
+    keep = ~_astray(times)
+    rows, times = rows[keep], _continue_clock(times[keep], clock.day_s, notes)
+    ahead = np.concatenate([[True], times[1:] > np.maximum.accumulate(times)[:-1]]) if len(times) else np.zeros(0, bool)
+    n_lost = len(clock.times) - int(ahead.sum())
+    if n_lost:
+        notes.append(f"rows left out, as their time is missing or not after that of the row before: {n_lost}")
+    rows, times = rows[ahead], times[ahead]
+    return CaptureTimes(rows, times - (times[0] if len(times) else 0.0), _frame_rate(times), tuple(notes))
+
+
+def _astray(times: FloatArray) -> Mask:
+    """Rows (T,) whose time lies far from those of both neighbours, which fit each other."""
+    found: Mask = np.zeros(len(times), np.bool_)
+    before, after = times[:-2], times[2:]
+    at = times[1:-1]
+    fit = (after > before) & (after - before <= MAX_SHORT_GAP_S)
+    found[1:-1] = fit & ((at < before - MAX_SHORT_GAP_S) | (at > after + MAX_SHORT_GAP_S))
+    return found
+
+
+def _continue_clock(times: FloatArray, day_s: float, notes: list[str]) -> FloatArray:
+    """Times across midnight; where the clock was set, the next row follows by the usual step."""
+    steps = np.diff(times)
+    if np.isfinite(day_s):
+        steps = np.where(steps < -day_s / 2, steps + day_s, steps)
+    inner = steps[(steps > 0) & (steps <= MAX_SHORT_GAP_S)]
+    is_set = (steps > MAX_LONG_GAP_S) | (steps < -MAX_SHORT_GAP_S)
+    if is_set.any() and len(inner):
+        steps = np.where(is_set, np.median(inner), steps)
+        at = np.concatenate([[0.0], np.cumsum(steps)])[:-1][is_set]
+        notes.append(
+            f"its clock leaps at {', '.join(f'{second:.2f} s' for second in at[:4])}{' ...' if len(at) > 4 else ''}; "
+            "the rows after it follow without a pause"
+        )
+    return np.concatenate([times[:1], times[:1] + np.cumsum(steps)])
+
+
+def _frame_rate(times: FloatArray) -> float:
+    """Frames a second of increasing times, from all steps without a gap; 0 of fewer than two."""
+    steps = np.diff(times)
+    if not len(steps):
+        return 0.0
+    rate = 1.0 / float(steps[steps < GAP_STEPS * np.median(steps)].mean())
+    for rates, tolerance in ((NTSC_RATES, NTSC_TOLERANCE), (STANDARD_RATES, RATE_TOLERANCE)):
+        nearest = min(rates, key=lambda standard: abs(standard - rate))
+        if abs(nearest - rate) <= tolerance * rate:
+            return nearest
+    return round(rate, 2)
