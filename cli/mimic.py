@@ -24,7 +24,10 @@ if TYPE_CHECKING:
 
 def mimic(  # noqa: PLR0913 - one parameter a flag
     take: Annotated[
-        Path | None, Parameter(help="Video of one person, or a .csv, .tsv or .txt table of Live Link Face.")
+        Path | None,
+        Parameter(
+            help="Video of one person, a .csv, .tsv or .txt table of Live Link Face, .a2f.json or .curves.jsonl."
+        ),
     ] = None,
     /,
     *,
@@ -46,7 +49,7 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     fps: Annotated[
         float | None, Parameter(help="Frames per second; by default the take's own rate, at most 30 for a capture.")
     ] = None,
-    audio: Annotated[Path | None, Parameter(help="Sound of a Live Link capture.")] = None,
+    audio: Annotated[Path | None, Parameter(help="Sound of a capture, which has none of its own.")] = None,
     take_fps: Annotated[
         float | None,
         Parameter(help="Frames that a capture counts to a second, where it has frame numbers or less than a second."),

@@ -111,6 +111,30 @@ def test_a_capture_is_exported_as_it_was_recorded(here: Path) -> None:
     matrix = np.array(json.loads((here / "a.a2f.json").read_text())["weightMat"])
     assert np.allclose(matrix, weights, rtol=1e-5, atol=1e-6)
     assert np.allclose(read_livelink(here / "a.csv").weights.values[::2], weights, rtol=0, atol=2e-6)
+    assert run(["mimic", "a.a2f.json", "--out", "b.curves.jsonl", "--export", "b.a2f.json", "--quiet"]) == 0
+    assert np.allclose(json.loads((here / "b.a2f.json").read_text())["weightMat"], matrix, rtol=0, atol=1e-5)
+    assert run(["mimic", "b.curves.jsonl", "--out", "c.curves.jsonl", "--quiet"]) == 0
+    assert (here / "c.curves.jsonl").read_text() == (here / "b.curves.jsonl").read_text()
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "code", "reason"),
+    [
+        ("a.track.json", '{"format": "tts2face-track"}', 3, "a.track.json is a track, which is exact"),
+        ("a.json", '{"mouthCues": []}', 3, "a.json holds no weights of shapes: JSON of Audio2Face has exportFps"),
+        ("a.words.jsonl", '{"start": 0, "end": 1, "word": "a"}', 3, "holds no weights of shapes: the first line"),
+        ("a.a2f.json", '{"exportFps": 30, "facsNames": ["jawOpen"], "weightMat": [[1], []]}', 3, "frame 1 of a.a2f"),
+        ("a.curves.jsonl", '{"fps": 0, "weights": ["jawOpen"]}', 3, "has 0 frames per second"),
+        ("a.bvh", "HIERARCHY", 2, "a.bvh has the suffix of the export bvh, which mimic does not read; give a video"),
+        ("a.glb", "glTF", 2, "a.glb has the suffix of the export glb, which mimic does not read"),
+    ],
+)
+def test_what_mimic_does_not_read_is_refused_for_what_it_is(
+    name: str, content: str, code: int, reason: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / name).write_text(content)
+    assert run(["mimic", name, "--out", "x.csv", "--quiet"]) == code
+    assert reason in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

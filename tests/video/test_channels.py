@@ -3,6 +3,7 @@
 import wave
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -96,3 +97,19 @@ def test_a_request_says_which_channel_it_takes(tmp_path: Path) -> None:
     (note,) = prepare(Request(audio=inverted)).notes
     assert note.startswith("the 2 channels of a.wav cancel each other")
     assert prepare(Request(audio=write(tmp_path / "b.wav", PLACES["right"]))).notes == ()
+
+
+def test_the_first_track_that_is_not_silent_is_taken(tmp_path: Path) -> None:
+    path = tmp_path / "screen.mkv"
+    with av.open(str(path), "w") as container:
+        streams = [container.add_stream("flac", rate=RATE, layout="mono") for _ in range(3)]
+        for at in range(0, RATE, 4800):
+            for stream, samples in zip(streams, (NONE, VOICE, OTHER), strict=True):
+                block = np.round(samples[None, at : at + 4800] * 32767).astype(np.int16)
+                frame = av.AudioFrame.from_ndarray(block, format="s16", layout="mono")
+                frame.sample_rate, frame.pts = RATE, at
+                container.mux(stream.encode(frame))
+        for stream in streams:
+            container.mux(stream.encode(None))
+    assert np.corrcoef(read_sound(path, RATE).samples, VOICE)[0, 1] > 0.99
+    assert channel_mix(path).note("screen.mkv").startswith("sound track 2 of 3 of screen.mkv is taken")

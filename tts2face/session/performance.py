@@ -10,6 +10,7 @@ from lexicon.errors import InputError
 from lexicon.values.checks import check_limits
 from lexicon.values.fields import check_fields
 from tts2face.face.body import Body
+from tts2face.interchange.exports.table import all_formats
 from tts2face.numeric.arrays import interpolate_rows
 from tts2face.picture.options import Picture
 from tts2face.session.animated_face import AnimatedFace, FaceMotion
@@ -22,7 +23,9 @@ from tts2face.video.livelink import MAX_CAPTURE_FPS, MIN_CAPTURE_FPS, TABLE_SUFF
 from tts2face.video.media import read_media_info, read_sound
 from tts2face.video.streaming import StreamingTracker
 from tts2face.video.take import Take, read_take
+from tts2face.video.weight_files import READERS, read_weight_file
 
+CAPTURE_SUFFIXES = (*TABLE_SUFFIXES, *READERS)
 CAPTURE_FPS = 30.0  # default frame rate of captures, whose own is higher than a video needs
 # of a performer's lips and expressions
 GAINS = (0.0, 4.0)
@@ -35,7 +38,8 @@ class Performance:
     Parameters
     ----------
     take
-        A video of one person, or a .csv, .tsv or .txt table of Live Link Face.
+        A video of one person, a .csv, .tsv or .txt table of Live Link Face, or weights of shapes as .a2f.json or
+        .curves.jsonl.
     gain
         Factor of the motion of lips and brows, 0 to 4.
     fps
@@ -68,10 +72,10 @@ class Performance:
         check_fields(self)
         check_limits("the gain", self.gain, GAINS)
         if self.audio is not None and not is_capture(self.take):
-            raise InputError(f"{self.take} has its own sound; --audio belongs to a Live Link Face .csv file")
+            raise InputError(f"{self.take} has its own sound; --audio belongs to a capture, as .csv or .a2f.json")
         if self.take_fps is not None:
             check_limits("the frame rate of the take", self.take_fps, (MIN_CAPTURE_FPS, MAX_CAPTURE_FPS))
-            if not is_capture(self.take):
+            if self.take.suffix.lower() not in TABLE_SUFFIXES:
                 raise InputError(f"{self.take} has its own frame rate; --take-fps belongs to a Live Link Face table")
 
 
@@ -113,9 +117,11 @@ def perform(
         LiteRT, OpenCV or the landmark models are missing.
     """
     take = performance.take
+    _check_kind(take)
     sound = sound_of_take(take) if performance.audio is None else read_sound(performance.audio, SOUND_RATE)
     if is_capture(take):
-        capture = read_livelink(take, performance.take_fps)
+        is_table = take.suffix.lower() in TABLE_SUFFIXES
+        capture = read_livelink(take, performance.take_fps) if is_table else read_weight_file(take)
         motion = FaceMotion(face.motion_of_capture(capture, gain=performance.gain), capture.head)
         fps = performance.fps or min(motion.face.fps, CAPTURE_FPS)
         return PerformedTake(face, resample_take(motion, fps), sound, capture.notes)
@@ -127,9 +133,21 @@ def perform(
     return PerformedTake(face, motion if performance.fps is None else resample_take(motion, performance.fps), sound)
 
 
+def _check_kind(take: Path) -> None:
+    """Refuse exports that hold no weights of shapes, before they are taken for a damaged video."""
+    if is_capture(take):
+        return
+    for info in all_formats():
+        if not info.is_sound and take.name.lower().endswith(info.suffixes):
+            raise InputError(
+                f"{take} has the suffix of the export {info.name}, which mimic does not read; give a video, a .csv of "
+                "Live Link Face, .a2f.json or .curves.jsonl"
+            )
+
+
 def is_capture(take: Path) -> bool:
-    """Whether the suffix of a path is that of a Live Link Face table; other files are read as videos."""
-    return take.suffix.lower() in TABLE_SUFFIXES
+    """Whether the suffix of a path is that of a table or of weights of shapes; other files are read as videos."""
+    return take.suffix.lower() in CAPTURE_SUFFIXES
 
 
 def retarget_take(take: Take, face: AnimatedFace, *, gain: float = 1.0) -> FaceMotion:

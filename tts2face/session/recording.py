@@ -231,4 +231,5 @@ def _read_audible_blocks(path: Path) -> Iterator[NDArray[np.float32]]:
             f"{path} lasts {n_samples / FEATURE_RATE:.3f} s; give a recording of {MIN_RECORDING_S} s or more"
         )
     if peak < SILENCE_LEVEL:
-        raise DataError(f"{path} is silent; check the microphone, or give another recording")
+        loudest = f"no sample is above {20 * np.log10(SILENCE_LEVEL):.0f} dB of full scale in any channel"
+        raise DataError(f"{path} is silent: {loudest}; check the microphone, or give another recording")

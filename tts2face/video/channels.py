@@ -32,20 +32,27 @@ DIGITS = 6  # of weights: equal channels get equal ones, whatever the last bit o
 class ChannelMix:
     """Weights (C,) of the channels of a recording.
 
-    `taken` is the number of the channel that stands for all, from 1, where they cancel each other; 0 otherwise.
+    `taken` is the number of the channel that stands for all, from 1, where they cancel each other; 0 otherwise. `track`
+    is the index of the sound track, the first one that is not silent, of `n_tracks`.
     """
 
     weights: FloatArray
     taken: int = 0
+    is_silent: bool = False
+    track: int = 0
+    n_tracks: int = 1
 
     def note(self, name: str) -> str:
         """A sentence for the user about what is guessed of the channels of a file; empty where nothing is."""
-        if not self.taken:
-            return ""
-        return (
+        track = (
+            f"sound track {self.track + 1} of {self.n_tracks} of {name} is taken, as what precedes it is silent; "
+            "give a file with one track to use another one"
+        )
+        cancelled = (
             f"the {len(self.weights)} channels of {name} cancel each other, as one is inverted: channel {self.taken} "
             "is taken alone; give a file with one channel to use another one"
         )
+        return "; ".join([track] * (self.track > 0) + [cancelled] * (self.taken > 0))
 
     def mono(self, frame: "AudioFrame") -> NDArray[np.float32]:
         """(n,) samples of one channel from a decoded frame."""
@@ -89,7 +96,7 @@ def mix_of_products(products: FloatArray, names: Sequence[str]) -> ChannelMix:
     heard = np.where(weights > 0, powers, 0.0)
     loudest = float(heard.max(initial=0.0))
     if loudest <= 0:
-        return ChannelMix(np.full(len(powers), 1.0 / max(len(powers), 1)))
+        return ChannelMix(np.full(len(powers), 1.0 / max(len(powers), 1)), is_silent=True)
     mixed = float(weights @ products @ weights)
     if mixed < CANCELLED * float(np.square(weights) @ powers):
         taken = int(np.argmax(heard >= EQUAL * loudest))

@@ -95,9 +95,9 @@ def video_stream(container: "InputContainer", path: Path) -> "VideoStream":
     return stream
 
 
-def sound_stream(container: "InputContainer", path: Path) -> "AudioStream":
-    """The first stream of sound; DataError without one."""
-    stream = first_decodable(container.streams.audio)
+def sound_stream(container: "InputContainer", path: Path, track: int = 0) -> "AudioStream":
+    """The first stream of sound from a number on; DataError without one."""
+    stream = first_decodable(container.streams.audio[track:]) or first_decodable(container.streams.audio)
     if stream is None:
         raise DataError(f"{path} holds no sound; give a recording with its sound track")
     return stream

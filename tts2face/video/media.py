@@ -6,7 +6,7 @@ the file starts where the first of them does, whatever its clock says there: tha
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import count
 from pathlib import Path
@@ -165,10 +165,18 @@ def channel_notes(paths: Iterable[Path]) -> tuple[str, ...]:
 @lru_cache(maxsize=64)
 def _channel_mix(path: Path, version: tuple[int, int, int], formats: str | None) -> ChannelMix:
     with open_container(path, formats) as container:
-        stream = sound_stream(container, path)
-        if stream.codec_context.channels == 1:
-            return ChannelMix(np.ones(1))
-        return choose_mix(decode_packets(container.demux(stream), path, start_time(path, formats)))
+        n_tracks = len(container.streams.audio)
+        n_channels = sound_stream(container, path).codec_context.channels
+    if n_tracks == 1 and n_channels == 1:
+        return ChannelMix(np.ones(1))
+    mixes = []
+    for track in range(n_tracks):  # recorders of screens write the system's sound first, then the microphone
+        with open_container(path, formats) as container:
+            stream = sound_stream(container, path, track)
+            mixes.append(choose_mix(decode_packets(container.demux(stream), path, start_time(path, formats))))
+        if not mixes[-1].is_silent:
+            return replace(mixes[-1], track=track, n_tracks=n_tracks)
+    return mixes[0]
 
 
 @contextmanager
@@ -176,7 +184,7 @@ def _open_sound(path: Path, formats: str | None = None) -> Iterator[tuple[int, I
     """Sample rate of a file's sound, and its samples as one channel, in blocks from the start of the file."""
     start, mix = start_time(path, formats), channel_mix(path, formats)
     with open_container(path, formats) as container:
-        stream = sound_stream(container, path)
+        stream = sound_stream(container, path, mix.track)
         yield stream.rate, _timed_samples(decode_frames(container, stream, path, start), mix, start, path)
 
 
