@@ -57,7 +57,7 @@ class StyleSource:
     Parameters
     ----------
     recordings
-        A folder of videos, Live Link tables (.csv) or marker captures (.c3d, .csv); or one of these files.
+        A folder of videos, Live Link tables (.csv, .tsv) or marker captures (.c3d, .trc, .csv); or one of these files.
     stills
         Captured basis expressions; by default those of the default head, transferred to the person.
     marker_options

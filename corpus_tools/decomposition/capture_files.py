@@ -1,4 +1,4 @@
-"""Facial capture files: Live Link Face tables, and markers as C3D or tables."""
+"""Facial capture files: Live Link Face tables, and markers as C3D, .trc or tables."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +17,7 @@ from tts2face.models.face import Face
 from tts2face.types import Trajectory
 from tts2face.video.livelink import FaceCapture, is_capture_table, read_livelink
 
-CAPTURE_SUFFIXES = frozenset({".c3d", ".csv", ".tsv"})
+CAPTURE_SUFFIXES = frozenset({".c3d", ".csv", ".trc", ".tsv"})
 LIVELINK_SUFFIXES = frozenset({".csv", ".tsv"})  # in a folder of recordings a .txt is a transcript
 # A feature is missing if no channel with one of these prefixes moves.
 FEATURE_CHANNELS = {"gaze": ("eyeLook",), "blink": ("eyeBlink",), "brows": ("brow",), "cheeks": ("cheek", "nose")}

@@ -1,12 +1,17 @@
-"""Files of facial marker capture: C3D (Vicon, OptiTrack, ...) and tables of comma-separated values."""
+"""Files of facial marker capture: C3D (Vicon, OptiTrack, ...), .trc, tables of Motive and of this project.
+
+The next format is a module with a reader that gives a `MarkerTake`, and its line in `read_markers`.
+"""
 
 from collections import Counter
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from corpus_tools.decomposition.c3d_file import C3dFile, read_c3d_file
+from corpus_tools.decomposition.marker_take import MM_PER_UNIT, MarkerTake
+from corpus_tools.decomposition.motive_table import is_motive_table, read_motive
+from corpus_tools.decomposition.trc_file import read_trc
 from corpus_tools.recordings.sound import SOUND_RATE
 from lexicon.errors import DataError, InputError
 from lexicon.values.tables import read_table
@@ -14,7 +19,6 @@ from tts2face.models.palette import GESTURE_FPS
 from tts2face.numeric.arrays import FloatArray
 from tts2face.types import Waveform
 
-MM_PER_UNIT = {"": 1.0, "mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "in": 25.4, "inch": 25.4, "ft": 304.8}
 SOUND_LABELS = ("audio", "sound", "voice", "speech", "mic")  # how analogue channels that hold sound are named
 MIN_SOUND_HZ = 8000.0  # analogue channels with a lower rate are not sound
 MIN_FPS, MAX_FPS = 10.0, 1000.0
@@ -23,27 +27,21 @@ MIN_GAP_STEPS = 1.5  # of the usual step: a longer one is a gap of frames
 AXES = ("x", "y", "z")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MarkerTake:
-    """Contents of a file: `points` (T, M, 3) in mm of the markers `names`, NaN in gaps, and sound where it has some."""
-
-    names: tuple[str, ...]
-    points: FloatArray
-    fps: float
-    sound: Waveform | None = None
-
-
 def read_markers(path: Path, fps: float | None = None) -> MarkerTake:
-    """The markers in a ``.c3d`` or ``.csv`` file.
+    """The markers in a ``.c3d``, ``.trc`` or ``.csv`` file.
 
     Parameters
     ----------
     fps
         Frame rate of a table with frame numbers.
     """
-    readers = {".c3d": lambda: read_c3d(path), ".csv": lambda: read_marker_table(path, fps)}
+    readers = {
+        ".c3d": lambda: read_c3d(path),
+        ".trc": lambda: read_trc(path, fps),
+        ".csv": lambda: read_marker_table(path, fps),
+    }
     if path.suffix.lower() not in readers:
-        raise InputError(f"{path.name} is not a marker file; supported suffixes are .c3d and .csv")
+        raise InputError(f"{path.name} is not a marker file; supported suffixes are .c3d, .trc and .csv")
     if not path.is_file():
         raise InputError(f"there is no capture {path}; check the path")
     take = readers[path.suffix.lower()]()
@@ -93,15 +91,20 @@ def _analogue_sound(file: C3dFile) -> Waveform | None:
 
 
 def read_marker_table(path: Path, fps: float | None = None) -> MarkerTake:
-    """The markers of a CSV table; errors as `read_markers`.
+    """The markers of a CSV table, that of Motive or one of this project; errors as `read_markers`.
 
-    The first column is ``time`` in seconds or ``frame``, the others are ``NAME_x``, ``NAME_y``, ``NAME_z`` in mm, in
-    any order; empty cells are gaps.
+    The first column of the latter is ``time`` in seconds or ``frame``, the others are ``NAME_x``, ``NAME_y``,
+    ``NAME_z`` in mm, in any order; empty cells are gaps.
     """
-    rows = [[cell.strip() for cell in row] for row in read_table(path)]
+    rows = [[cell.strip() for cell in row] for row in read_table(path, delimiters=",;\t")]
+    if is_motive_table(rows):
+        return read_motive(path, rows)
     first = rows[0][0].lower() if rows else ""
     if first not in ("time", "frame") or len(rows) < 2:
-        raise DataError(f"{path} is not a CSV table of markers: it needs the columns time or frame, then NAME_x, ...")
+        raise DataError(
+            f"{path} is not a CSV table of markers: it needs the columns time or frame, then NAME_x, ...; "
+            "or the headings of Motive, Format Version, ..."
+        )
     names = _parse_header(path, rows[0])
     values = np.array([_parse_row(path, number, row, len(rows[0])) for number, row in enumerate(rows[1:], start=2)])
     columns = [[rows[0].index(f"{name}_{axis}") for axis in AXES] for name in names]

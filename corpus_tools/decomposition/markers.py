@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 
 from corpus_tools.decomposition.capture import FaceRecording, read_capture_sound
-from corpus_tools.decomposition.marker_files import MarkerTake, read_markers
+from corpus_tools.decomposition.marker_files import read_markers
 from corpus_tools.decomposition.marker_gaps import fill_marker_gaps
 from corpus_tools.decomposition.marker_interpolation import MarkerInterpolator, build_marker_interpolator
 from corpus_tools.decomposition.marker_poses import HeadPoses, fit_head_poses
 from corpus_tools.decomposition.marker_sets import MIN_FACE_MARKERS, MarkerSet
+from corpus_tools.decomposition.marker_take import MarkerTake
 from lexicon.errors import DataError
 from tts2face.face.landmarks import rest_landmarks
 from tts2face.models.face import Face
@@ -72,7 +73,7 @@ def read_marker_recording(
         sound=take.sound or read_capture_sound(path),
         rest=rest.spread.rest.astype(np.float32),
         missing_features=marker_set.missing_features,
-        notes=(*_absent_markers(take, marker_set), *notes),
+        notes=(*take.notes, *_absent_markers(take, marker_set), *notes),
     )
 
 

@@ -19,7 +19,7 @@ from tts2face.video.tracking import FaceTracker
 
 NEUTRAL = "neutral"
 PICTURE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"})
-MARKER_SUFFIXES = frozenset({".c3d", ".csv"})
+MARKER_SUFFIXES = frozenset({".c3d", ".csv", ".trc"})
 LAST_FRAME_S = 0.1  # how long a video's last frame is shown at most
 
 
