@@ -165,12 +165,54 @@ def test_a_track_is_chosen_by_number_and_language_and_said(tmp_path: Path) -> No
         read_subtitles(film, None, SubtitleOptions(track="fr"))
 
 
+def ebu(
+    *blocks: tuple[tuple[int, ...], tuple[int, ...], bytes], table: bytes = b"00", start: bytes = b"00000000"
+) -> bytes:
+    """EBU STL at 25 frames a second of time codes (hours, minutes, seconds, frames) and texts."""
+    general = bytearray(b" " * 1024)
+    general[0:14] = b"850STL25.011" + table
+    general[256:264] = start
+    content = bytes(general)
+    for number, (begins, ends, text) in enumerate(blocks):
+        field = text.ljust(112, b"\x8f")
+        content += bytes([0, number, 0, 0xFF, 0, *begins, *ends, 20, 2, 0]) + field
+    return content
+
+
+def test_ebu_stl_is_read_from_the_start_of_its_programme(read: ReadText) -> None:
+    content = ebu(
+        ((10, 0, 1, 0), (10, 0, 3, 0), b"\x0b\x0bThe train was late.\x8aAgain.\x0a\x0a"),
+        ((10, 0, 4, 0), (10, 0, 5, 12), b"\x80D\xc2ej\xc8a vu\x81 \xfb \xa3"),
+        start=b"10000000",
+    )
+    found = read(content, ".stl")
+    assert [(round(cue.begin_s, 3), round(cue.end_s, 3), cue.text) for cue in found.cues] == [
+        (1.0, 3.0, "The train was late. Again."),
+        (4.0, 5.48, "Déjä vu ß £"),
+    ]
+    assert [warning.message for warning in found.warnings] == [
+        "the programme begins at 36000.00 s, as the file states; that is taken off"
+    ]
+
+
+def test_ebu_stl_of_other_alphabets_its_comments_and_its_long_texts(read: ReadText) -> None:
+    cyrillic = ebu(((0, 0, 1, 0), (0, 0, 3, 0), "Поезд опоздал.".encode("iso8859-5")), table=b"01")
+    assert read(cyrillic, ".stl").cues[0].text == "Поезд опоздал."
+    content = bytearray(ebu(((0, 0, 1, 0), (0, 0, 3, 0), b"one"), ((0, 0, 1, 0), (0, 0, 3, 0), b" two")))
+    content[1024 + 3] = 0  # the text goes on in the next block
+    assert [cue.text for cue in read(bytes(content), ".stl").cues] == ["one two"]
+    content = bytearray(ebu(((0, 0, 1, 0), (0, 0, 3, 0), b"one"), ((0, 0, 4, 0), (0, 0, 5, 0), b"a comment")))
+    content[1024 + 128 + 15] = 1
+    assert [cue.text for cue in read(bytes(content), ".stl").cues] == ["one"]
+    with pytest.raises(DataError, match="is EBU STL without subtitles"):
+        read(ebu(), ".stl")
+
+
 NO_TEXT = {
     "pictures of a Blu-ray": (".sup", b"PG" + bytes(8) + b"\x16" + bytes(200), "holds pictures of subtitles, no text"),
     "pictures of a DVD": (".sub", b"\x00\x00\x01\xba" + bytes(200), "holds pictures of subtitles, no text"),
     "the index of pictures": (".idx", b"# VobSub index file, v7\n", "is the index of pictures of subtitles"),
     "an archive": (".srt", b"PK\x03\x04" + bytes(200), "is a ZIP archive"),
-    "a broadcaster's file": (".stl", b"850STL25.01" + b"0" * 1200, "is EBU STL, which is not read"),
     "a damaged film": (".mp4", b"\x00\x00\x00\x18ftypisom" + bytes(200), "cannot be read as a film"),
     "other text": (".srt", b"Nothing here.\n", r"contains no subtitles of a format that is read \(SubRip, WebVTT"),
 }

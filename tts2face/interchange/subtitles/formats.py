@@ -22,12 +22,14 @@ MICRODVD_NAME = "MicroDVD"
 MPL2_NAME = "MPL2"
 PAIRS = "SubViewer"
 LRC = "LRC"
+EBU_STL = "EBU STL"
 SAMI = "SAMI"
 SUFFIXES = MappingProxyType({
     ".srt": SUBRIP, ".vtt": WEBVTT, ".ass": SUBSTATION, ".ssa": SUBSTATION, ".ttml": TTML, ".dfxp": TTML, ".itt": TTML,
-    ".xml": TTML, ".sbv": PAIRS, ".sub": MICRODVD_NAME, ".mpl": MPL2_NAME, ".lrc": LRC, ".smi": SAMI, ".sami": SAMI,
+    ".xml": TTML, ".sbv": PAIRS, ".sub": MICRODVD_NAME, ".mpl": MPL2_NAME, ".lrc": LRC, ".stl": EBU_STL,
+    ".smi": SAMI, ".sami": SAMI,
 })  # fmt: skip
-NAMES = (SUBRIP, WEBVTT, SUBSTATION, TTML, MICRODVD_NAME, MPL2_NAME, "SBV", PAIRS, LRC, SAMI)
+NAMES = (SUBRIP, WEBVTT, SUBSTATION, TTML, MICRODVD_NAME, MPL2_NAME, "SBV", PAIRS, LRC, SAMI, EBU_STL)
 FILM_SUFFIXES = (".mp4", ".m4v", ".mov", ".mkv", ".mks", ".webm")  # in which a track of subtitles may lie
 HEAD_LINES = 40  # within which a format shows itself
 _XML = re.compile(r"\s*<(?:\?xml|!DOCTYPE|!--|(?:\w+:)?tt[\s>])")
@@ -46,6 +48,7 @@ def subtitle_format(text: str, suffix: str) -> str:
     if _XML.match(text) or _SECTION.search(text):
         return TTML if _XML.match(text) else SUBSTATION
     named = SUFFIXES.get(suffix.lower(), SUBRIP)
+    named = SUBRIP if named == EBU_STL else named  # which is no text
     has_arrow = HAS_ARROW.search(text) is not None
     if has_arrow or named in {SUBSTATION, TTML}:
         return SUBRIP if has_arrow and named != WEBVTT else named

@@ -18,7 +18,8 @@ from lexicon.errors import DataError
 from lexicon.values.files import check_regular_file
 from tts2face.interchange.subtitles.binary import HEAD_BYTES, check_text, is_ebu, is_film
 from tts2face.interchange.subtitles.cues import Cue, Subtitles, SubtitleWarning, WrittenCue
-from tts2face.interchange.subtitles.decoding import decode_file
+from tts2face.interchange.subtitles.decoding import MAX_BYTES, decode_file
+from tts2face.interchange.subtitles.ebu import read_ebu
 from tts2face.interchange.subtitles.encodings import Decoded
 from tts2face.interchange.subtitles.formats import NAMES, read_format
 from tts2face.interchange.subtitles.labels import find_speakers
@@ -92,7 +93,9 @@ def _read(path: Path, encoding: str | None, options: SubtitleOptions) -> _File:
         raise DataError(f"{path} cannot be read ({refused.strerror}); check the file") from refused
     check_text(head, str(path))
     if is_ebu(head):
-        raise DataError(f"{path} is EBU STL, which is not read; convert it to .srt, as with Subtitle Edit")
+        if path.stat().st_size > MAX_BYTES:
+            raise DataError(f"{path} is larger than {MAX_BYTES >> 20} MiB; divide it")
+        return _File(*read_ebu(path.read_bytes(), str(path)), options.film_s)
     if is_film(head):
         from tts2face.interchange.subtitles.film_track import read_film
 
