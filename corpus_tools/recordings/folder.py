@@ -99,7 +99,11 @@ def pronounce_recording(recording: Recording) -> PronouncedWords | None:
 def recording_notes(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """Sentences about what is read of the recordings' transcripts, and about files beside them that are not read."""
     # a text in place of a file has no span
-    with_files = {one.video: None for one in recordings if not isinstance(one.transcript, str) or one.span is not None}
+    with_files = {
+        recording.video: None
+        for recording in recordings
+        if not isinstance(recording.transcript, str) or recording.span is not None
+    }
     notes: dict[str, None] = dict.fromkeys(note for video in with_files for note in subtitle_notes(video))
     for recording in recordings:
         try:

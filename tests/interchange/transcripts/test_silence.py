@@ -9,7 +9,8 @@ from tts2face.interchange.transcripts.silence import silence_labels, spoken_part
 
 NO_WORDS = [
     "", " ", "<eps>", "{SL}", "[noise]", "spn", "SPN", "<unk>", "sp", "pau", "#", "<p:>", "<usb>", "SIL", "brth", "xxx",
-    "yyy", "&=laughs", "*", "%", "h#", "epi", "nsn", "lau", "(laughs)", "[bracketed words]", "<sil> [noise]", "++UM++",
+    "yyy", "&=laughs", "*", "%", "h#", "epi", "nsn", "lau", "(laughs)", "((laughs))", "[bracketed words]",
+    "<sil> [noise]", "++UM++",
     "+noise+", "*cough*", "<VOCNOISE>", "dummy", "@", "...", "{laugh}", "-", "sil", "!SIL", "[]", "<s>",
 ]  # fmt: skip
 

@@ -18,22 +18,39 @@ from types import MappingProxyType
 
 from lexicon.errors import DataError
 from tts2face.interchange.subtitles.decoding import read_text
+from tts2face.interchange.transcripts.chat import read_cha
+from tts2face.interchange.transcripts.ctm import read_ctm
+from tts2face.interchange.transcripts.elan import read_eaf
+from tts2face.interchange.transcripts.exmaralda import read_exb
 from tts2face.interchange.transcripts.grid_align import read_align
+from tts2face.interchange.transcripts.htk import is_label_file, read_lab
 from tts2face.interchange.transcripts.label_table import is_label_table, read_label_table
 from tts2face.interchange.transcripts.silence import spoken_part
 from tts2face.interchange.transcripts.spoken import SpokenCue, Tier, Transcript
+from tts2face.interchange.transcripts.stm import read_stm
 from tts2face.interchange.transcripts.textgrid import is_textgrid, read_textgrid
 from tts2face.interchange.transcripts.tiers import choose_tier, name_tiers
+from tts2face.interchange.transcripts.timit import is_timit_prompt, read_timit
 from tts2face.interchange.transcripts.utterances import shared_words
 
 TEXT_SUFFIX = ".txt"
+LABEL_SUFFIX = ".lab"  # also plain words, as the Montreal Forced Aligner reads them
 OVERLAP_S = 1e-3  # edges that differ by less are one edge, rounded twice
 MAX_NAMED = 6  # labels in a note
 ReadTiers = Callable[[Path], list[Tier]]
-READERS: Mapping[str, ReadTiers] = MappingProxyType({
-    ".textgrid": read_textgrid,
-    ".align": read_align,
-})  # fmt: skip
+READERS: Mapping[str, ReadTiers] = MappingProxyType(
+    {
+        ".textgrid": read_textgrid,
+        ".align": read_align,
+        ".eaf": read_eaf,
+        ".exb": read_exb,
+        ".cha": read_cha,
+        ".ctm": read_ctm,
+        ".stm": read_stm,
+        ".wrd": read_timit,
+        ".lab": read_lab,
+    }
+)
 
 
 def read_transcript(path: Path, tier: str | None = None) -> Transcript:
@@ -62,22 +79,32 @@ def read_transcript(path: Path, tier: str | None = None) -> Transcript:
     if not spoken:
         raise DataError(f"{path} contains no word; check the file")
     words, shared = shared_words(spoken)
-    notes = (choice, _overlap_note(path, spoken), _left_out_note(path, left_out), shared and f"{path.name}: {shared}")
+    notes = (
+        choice,
+        *chosen.notes,
+        _overlap_note(path, spoken),
+        _left_out_note(path, left_out),
+        shared and f"{path.name}: {shared}",
+    )
     return Transcript(words, tuple(note for note in notes if note))
 
 
 def find_reader(path: Path) -> ReadTiers | None:
     """The reader of a file; None for plain text and other files."""
     suffix = path.suffix.lower()
+    if suffix == LABEL_SUFFIX and not is_label_file(read_text(path)):
+        return None
     if suffix in READERS:
         return READERS[suffix]
     return find_reader_of_text(read_text(path)) if suffix == TEXT_SUFFIX else None
 
 
 def find_reader_of_text(text: str) -> ReadTiers | None:
-    """The reader of a text that is a table of labels or a TextGrid, whatever its name; None for plain text."""
+    """The reader of a TextGrid, a table of labels or a prompt of TIMIT, whatever its name; None for plain text."""
     if is_textgrid(text):
         return read_textgrid
+    if is_timit_prompt(text):
+        return read_timit
     return read_label_table if is_label_table(text) else None
 
 

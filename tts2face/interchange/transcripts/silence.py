@@ -9,7 +9,9 @@ import re
 from importlib import resources
 
 # <eps>, {SL}, [noise], (laughs); several in a row; ++UM++, +noise+ (CMU Sphinx); *cough*; &=laughs (CHAT)
-_MARKED = re.compile(r"(?:<[^<>]*>|\{[^{}]*\}|\[[^\[\]]*\]|\([^()]*\)|\+{1,2}\w+\+{1,2}|\*\w+\*|&=\S+|\s)+")
+_MARKED = re.compile(
+    r"(?:<[^<>]*>|\{[^{}]*\}|\[[^\[\]]*\]|\(\([^()]*\)\)|\([^()]*\)|\+{1,2}\w+\+{1,2}|\*\w+\*|&=\S+|\s)+"
+)
 # <LAUGH-yeah> (Buckeye), [laughter-yeah] (Switchboard): a word, and how it is said
 _SAID_LAUGHING = re.compile(r"[<\[](?:laughter|laugh|cry|yawn|ext|hes)-([^\W\d][\w'’_-]*)[>\]]", re.IGNORECASE)
 # within an utterance; a space behind < is a comparison; no brackets of ( ), in which people also write what is said

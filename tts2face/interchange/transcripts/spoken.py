@@ -17,13 +17,16 @@ class Tier:
     """A row of labels of a file, in the order of the file, with silences and noises.
 
     ``has_points`` if the labels are instants, whose start is their end; ``is_speech`` if the format says that the
-    labels are words, whatever their name.
+    labels are words, whatever their name. ``kind`` is what the file says of the tier beside its name, ``notes`` are
+    sentences about its times.
     """
 
     name: str
     labels: tuple[SpokenCue, ...]
     has_points: bool = False
     is_speech: bool = False
+    kind: str = ""
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

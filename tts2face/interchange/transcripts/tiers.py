@@ -12,12 +12,12 @@ from tts2face.interchange.transcripts.spoken import Tier
 
 # Parts of names, in lower case; of a name all its words count ("Anna - words", "TokensAlign", "ORT-MAU").
 WORDS = re.compile(
-    r"words?(?:align\w*)?|wrds?|tokens?(?:align\w*)?|tok|orts?|orth|orthograph\w*|mots?|w[oö]rter|wort|palabras?|parole|palavras?|slova|woord(?:en)?"
+    r"wds?|words?(?:align\w*)?|wrds?|tokens?(?:align\w*)?|tok|orts?|orth|orthograph\w*|mots?|w[oö]rter|wort|palabras?|parole|palavras?|slova|woord(?:en)?"
 )
 TEXTS = re.compile(
     r"texts?|txt|transcripts?|transcriptions?|transcri[bt]\w*|trans|trs|tx|utt|utts|utterances?|sentences?|phrases?|"
     r"speech|speaker|spoken|said|says|dialogue?|turns?|trn|ipu\w*|lines?|english|french|german|spanish|italian|dutch|"
-    r"portuguese|polish|czech|russian|swedish|danish|finnish|deutsch|français|español|italiano|nederlands|default"
+    r"portuguese|polish|czech|russian|swedish|danish|finnish|deutsch|français|español|italiano|nederlands"
 )
 # Phones, and what is about the words: never chosen for their names, nor for their content where words are
 PHONES_BY_NAME = re.compile(
@@ -86,6 +86,7 @@ def tier_rank(tier: Tier) -> int:
     if tier.is_speech:
         return RANK_WORDS
     by_name = _rank_of_name(tier.name)
+    by_name = _rank_of_name(tier.kind) if by_name is None else by_name
     if by_name == RANK_PHONES or has_phones(tier):
         return RANK_PHONES
     if by_name is not None:

@@ -23,10 +23,16 @@ def shared_words(labels: Sequence[SpokenCue]) -> tuple[tuple[SpokenCue, ...], st
 
 def _divided(label: SpokenCue) -> list[SpokenCue]:
     words = label.text.split()
-    lengths = list(accumulate(map(nominal_length, words), initial=0.0))
-    scale = (label.end - label.start) / lengths[-1]
-    edges = [*(label.start + length * scale for length in lengths[:-1]), label.end]
-    return [SpokenCue(start, end, word) for word, (start, end) in zip(words, pairwise(edges), strict=True)]
+    return [SpokenCue(*span, word) for word, span in zip(words, share_time(label.start, label.end, words), strict=True)]
+
+
+def share_time(start: float, end: float, texts: Sequence[str]) -> list[tuple[float, float]]:
+    """Spans of consecutive texts from `start` to `end`, in seconds, in proportion to their nominal lengths."""
+    lengths = list(accumulate((sum(map(nominal_length, text.split())) or LETTER_S for text in texts), initial=0.0))
+    scale = (end - start) / lengths[-1]
+    # the last edge is the end itself, free of rounding
+    edges = [*(start + length * scale for length in lengths[:-1]), end]
+    return list(pairwise(edges))
 
 
 def nominal_length(word: str) -> float:

@@ -1,0 +1,51 @@
+"""Transcripts of CHAT (``.cha``, CHILDES and TalkBank): main lines with their times, and times of words in ``%wor``.
+
+Source: MacWhinney, The CHILDES Project, Part 1: The CHAT Transcription Format (2026).
+"""
+
+import re
+from pathlib import Path
+
+from lexicon.errors import DataError
+from tts2face.interchange.subtitles.decoding import read_text
+from tts2face.interchange.transcripts.slots import interpolated
+from tts2face.interchange.transcripts.spoken import SpokenCue, Tier
+
+_LINE = re.compile(r"([*%@][^:\t]*):?\t?(.*)", re.DOTALL)
+_BULLET = re.compile(r"\x15%?(?:\w+:\s*)?(\d+)_(\d+)\x15")  # milliseconds
+_TIMED_WORD = re.compile(r"(\S+)\s*\x15(\d+)_(\d+)\x15")
+_NOT_SAID = re.compile(
+    r"\x15[^\x15]*\x15|\[[^\[\]]*\]|&=\S+|\(\.*\d*[.:]?\d*\)|\+[^\s\w]+\S*|\b(?:xxx|yyy|www)\b|(?<!\S)0\w+|\([^()]*\)"
+)  # bullets, codes, events, pauses, marks of ends and links, what is not understood or left out
+_PARTS = re.compile(r"@\S*|[<>‹›⌈⌉⌊⌋↑↓„‡:^ˈˌ]|&[-+~]?")  # of words: forms, scopes, overlaps, length
+
+
+def read_cha(path: Path) -> list[Tier]:
+    """Utterances of each speaker, or their words where ``%wor`` has their times."""
+    text = read_text(path).replace("\r\n", "\n").replace("\r", "\n")
+    if "@Begin" not in text and "@UTF8" not in text and not re.search(r"^\*\w+:", text, re.MULTILINE):
+        raise DataError(f"{path} is no transcript of CHAT (no line such as *CHI: ...); correct it")
+    # a line that begins with a tab goes on with the one before
+    lines = [match.groups() for line in re.split(r"\n(?!\t)", text) if (match := _LINE.fullmatch(line))]
+    speakers: list[str] = []
+    utterances: list[list[SpokenCue] | str] = []
+    spans: list[float | None] = []
+    for kind, content in lines:
+        plain = " ".join(content.split())
+        if kind.startswith("*"):
+            bullets = _BULLET.findall(plain)
+            speakers.append(kind[1:].strip())
+            utterances.append(_PARTS.sub("", _NOT_SAID.sub(" ", plain)))
+            spans += [int(bullets[0][0]) / 1000, int(bullets[-1][1]) / 1000] if bullets else [None, None]
+        elif kind == "%wor" and utterances and (words := _TIMED_WORD.findall(plain)):
+            utterances[-1] = [
+                SpokenCue(int(start) / 1000, int(end) / 1000, _PARTS.sub("", word)) for word, start, end in words
+            ]
+    edges = interpolated(spans)
+    n_unknown = spans.count(None) // 2
+    notes = (f"{n_unknown} lines of {path.name} without times lie between the others",) if n_unknown else ()
+    tiers: dict[str, list[SpokenCue]] = {}
+    for at, (speaker, said) in enumerate(zip(speakers, utterances, strict=True)):
+        cues = said if isinstance(said, list) else [SpokenCue(edges[2 * at], edges[2 * at + 1], said.strip())]
+        tiers.setdefault(speaker, []).extend(cues)
+    return [Tier(name, tuple(cues), is_speech=True, notes=notes) for name, cues in tiers.items()]
