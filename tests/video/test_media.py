@@ -14,7 +14,7 @@ import pytest
 
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.films import join_clips
-from tts2face.video.media import _shift_samples, _upright_pixels, read_frames, read_media_info, read_sound
+from tts2face.video.media import _upright_pixels, read_frames, read_media_info, read_sound
 
 
 def test_pictures_come_in_order_with_their_times(make_video):
@@ -38,12 +38,6 @@ def test_a_tone_keeps_its_pitch_and_level_at_every_rate(make_video, rate):
     spectrum = np.abs(np.fft.rfft(sound.samples))
     assert np.argmax(spectrum) * rate / len(sound.samples) == pytest.approx(440, abs=1)
     assert sound.samples[rate // 4 : rate // 2].std() == pytest.approx(0.5 / np.sqrt(2), rel=0.01)
-
-
-def test_sound_is_shifted_to_the_clock_of_the_file():
-    samples = np.arange(1, 4, dtype=np.float32)
-    np.testing.assert_array_equal(_shift_samples(samples, 2), [0, 0, 1, 2, 3])
-    np.testing.assert_array_equal(_shift_samples(samples, -1), [2, 3])
 
 
 @pytest.mark.parametrize(("degrees", "corner"), [(0, (0, 0)), (90, (1, 0)), (180, (1, 2)), (-90, (0, 1))])

@@ -7,6 +7,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import numpy as np
+
 from lexicon.errors import DataError, InputError
 from lexicon.values.files import check_regular_file
 
@@ -25,6 +27,8 @@ MAX_BROKEN_S = 0.1  # of packets that cannot be decoded between others that can
 LEAST_PACKET_S = 0.001  # of what cannot be decoded and states no duration
 # Formats that state how long they are; of others FFmpeg guesses it from the first bit rates.
 STATE_DURATION = frozenset({"matroska", "webm", "mov", "mp4", "avi", "wav", "w64", "flac", "asf", "aiff", "caf"})
+BROADCASTS = ("mpegts", "mpeg")
+MAX_PRIMING_S = 0.1  # AAC begins with up to 2,112 samples that are not the recording's, .1 s at 22,050 Hz
 RIFF_HEAD = 8  # bytes before those that a RIFF file counts
 
 
@@ -32,7 +36,7 @@ def start_time(path: Path, formats: str | None = None) -> float:
     """Seconds of a file's clock at which it starts: its first picture, or the first sample of its sound that is heard.
 
     What an encoder needs before the first sample is not heard where a file says how much that is (MP3 with the header
-    of LAME, Opus, AAC in MP4 and Matroska).
+    of LAME, Opus, AAC in MP4 and Matroska). In a broadcast it is taken to be what precedes the first picture.
     """
     return _start_time(path, file_version(path), formats)
 
@@ -41,13 +45,27 @@ def start_time(path: Path, formats: str | None = None) -> float:
 def _start_time(path: Path, version: tuple[int, int, int], formats: str | None) -> float:
     with open_container(path, formats) as container:
         sound = first_decodable(container.streams.audio)
-        streams = [sound, next((stream for stream in container.streams.video if _is_film(stream)), None)]
-        known = [stream for stream in streams if stream is not None and stream.start_time is not None]
-        starts = [float((stream.start_time or 0) * (stream.time_base or 0)) for stream in known]
+        film = next((stream for stream in container.streams.video if _is_film(stream)), None)
+        shown, heard = _stated_start(film), _stated_start(sound)
         first = next(decode_packets(container.demux(sound), path, 0.0), None) if sound else None
-        if first is not None and first.time is not None:
-            starts.append(float(first.time))  # Opus in WebM: before the time that the stream states
-        return min(starts, default=0.0)
+        if first is not None and first.time is not None:  # Opus in WebM: before the time that the stream states
+            heard = min(float(first.time), np.inf if heard is None else heard)
+        if shown is None or heard is None:
+            return heard or shown or 0.0
+        is_unstated = is_broadcast(container) and shown - heard <= MAX_PRIMING_S
+        return shown if is_unstated and shown > heard else min(shown, heard)
+
+
+def _stated_start(stream: "AudioStream | VideoStream | None") -> float | None:
+    """Seconds of the clock at which a stream says that it starts; None if it does not."""
+    if stream is None or stream.start_time is None or stream.time_base is None:
+        return None
+    return float(stream.start_time * stream.time_base)
+
+
+def is_broadcast(container: "InputContainer") -> bool:
+    """Whether a file is an MPEG stream, whose clock may be set anew, and which does not state what encoders add."""
+    return not {*container.format.name.split(",")}.isdisjoint(BROADCASTS)
 
 
 def metadata_options() -> dict[str, Any]:

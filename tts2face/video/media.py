@@ -23,6 +23,7 @@ from tts2face.video.container import (
     decode_packets,
     file_version,
     first_decodable,
+    is_broadcast,
     open_container,
     sound_stream,
     start_time,
@@ -41,7 +42,6 @@ ABSOLUTE_DURATION = "matroska"  # whose duration ends at its last time stamp, wh
 DEFAULT_FPS = 25  # of a broadcast that states none
 MAX_FPS = 240.0  # upper limit of cameras; higher stated rates are those of the file's time base
 QUARTER_TURN_DEG = 90
-BROADCASTS = ("mpegts", "mpeg")  # formats whose clock may be set anew, as where two files are joined
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,6 +193,7 @@ def _timed_samples(
 ) -> Iterator[NDArray[np.float32]]:
     """Samples of frames, with silence where the file has a time but no sound."""
     expected = start
+    n_early = 0  # samples before the start of the file that remain to be left out
     for number in count():
         frame = next(frames, None)
         if frame is None:
@@ -204,19 +205,16 @@ def _timed_samples(
                 f"the sound of {path} begins {gap:.0f} s after its pictures, more than {MAX_DELAY_S:g} s; cut the "
                 "file where the sound begins"
             )
-        if number == 0 or LEAST_GAP_S < gap <= MAX_DELAY_S:
-            samples = _shift_samples(samples, round(gap * frame.sample_rate))
+        offset = round(gap * frame.sample_rate)
+        if number == 0:
+            n_early = max(-offset, 0)
+        if (number == 0 and offset > 0) or LEAST_GAP_S < gap <= MAX_DELAY_S:
+            samples = np.concatenate([np.zeros(offset, np.float32), samples])
         if number == 0 or abs(gap) > LEAST_GAP_S:
             expected += gap
         expected += frame.samples / frame.sample_rate
-        yield samples
-
-
-def _shift_samples(samples: NDArray[np.float32], offset: int) -> NDArray[np.float32]:
-    """Samples delayed by `offset` samples: padded with zeros, or cut if the offset is negative."""
-    if offset >= 0:
-        return np.concatenate([np.zeros(offset, np.float32), samples])
-    return samples[-offset:]
+        yield samples[n_early:]
+        n_early -= min(n_early, len(samples))
 
 
 def _frame_rate(container: "InputContainer", stream: "VideoStream", path: Path) -> float:
@@ -236,12 +234,11 @@ def _timed_frames(
     container: "InputContainer", stream: "VideoStream", path: Path, start: float
 ) -> "Iterator[tuple[float, VideoFrame]]":
     """Frames with their times after `start`; a broadcast whose clock is set anew goes on with the next frame."""
-    is_broadcast = not {*container.format.name.split(",")}.isdisjoint(BROADCASTS)
     before: float | None = None
     offset = start
     for frame in decode_frames(container, stream, path, start):
         time = _presentation_time(frame, path) - offset
-        if is_broadcast and before is not None and not before < time <= before + MAX_DELAY_S:
+        if is_broadcast(container) and before is not None and not before < time <= before + MAX_DELAY_S:
             step = float(1 / (stream.average_rate or stream.guessed_rate or DEFAULT_FPS))
             offset += time - before - step
             time = before + step
