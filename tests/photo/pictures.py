@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from tts2face.face.deformation import REST_HEAD
 from tts2face.face.landmarks import moved_landmarks
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
@@ -16,7 +17,7 @@ from tts2face.photo.photograph import Photograph
 from tts2face.photo.speaking_photo import speaking_photo
 from tts2face.picture.camera import camera_matrices
 from tts2face.picture.options import Picture
-from tts2face.picture.renderer import draw
+from tts2face.picture.renderer import MeshRenderer, draw
 from tts2face.types import Trajectory
 
 ONE_PROCESS = pytest.mark.xdist_group("photo")  # modules with the same picture of 400 pixels, drawn once
@@ -37,7 +38,7 @@ def still(name: str, side: int, *, head: tuple[float, ...] = (0, 0, 0), **weight
 def _drawn(name: str, side: int, head: tuple[float, ...], weights: tuple[tuple[str, float], ...]) -> np.ndarray:
     face = load_face(name)
     pose = np.array([*np.radians(head), 0, 0, 0], np.float32)
-    return draw(face, _weights(face, dict(weights))[0], pose, picture=Picture(size=f"{side}x{side}"))
+    return draw(face, weights_of(face, **dict(weights)), pose, picture=Picture(size=f"{side}x{side}"))
 
 
 def projected(name: str, side: int, **weights: float) -> np.ndarray:
@@ -50,7 +51,7 @@ def _projected(name: str, side: int, shapes: tuple[tuple[str, float], ...]) -> n
     weights = dict(shapes)
     face = load_face(name)
     camera = camera_matrices(Picture().view, face, (side, side))
-    motion = Trajectory(face.shape_names, _weights(face, weights), 30.0)
+    motion = Trajectory(face.shape_names, weights_of(face, **weights)[None], 30.0)
     points = moved_landmarks(face, motion)[0] @ camera.view[:, :3].T + camera.view[:, 3]
     places = camera.lens[1:3] + camera.lens[0] * points[:, :2] / points[:, 2:] - 0.5
     depths = (points[:, 2] - points[:, 2].mean()) * camera.lens[0] / points[:, 2].mean()
@@ -79,5 +80,11 @@ def photographed(picture: Photograph, found: FoundFace, smile: float = 0.0) -> P
     return PhotographedFace(picture, found, {"mouthSmileLeft": smile, "mouthSmileRight": smile})
 
 
-def _weights(face: Face, weights: dict[str, float]) -> np.ndarray:
-    return np.array([[weights.get(shape, 0.0) for shape in face.shape_names]], np.float32)
+def drawn(renderer: MeshRenderer, head: np.ndarray = REST_HEAD, **weights: float) -> np.ndarray:
+    """Picture of a face whose shapes have weights, with its head in a pose (6,)."""
+    return renderer.draw(weights_of(renderer.scene.face, **weights), head)
+
+
+def weights_of(face: Face, **weights: float) -> np.ndarray:
+    """Weights of all shapes of a face, 0 where none is given."""
+    return np.array([weights.get(name, 0.0) for name in face.shape_names], np.float32)

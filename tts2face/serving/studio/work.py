@@ -83,7 +83,7 @@ class WorkKind:
     2. `prepare`, which sets title and files by the content of an order, and `run`, which makes the files and calls
        `BackgroundWork.show`; it may run again, at most `MAX_TRIES` times, from nothing;
     3. its place in `Studio`, and its routes and page;
-    4. a test that it goes on with the next server (``tests/serving/studio/test_work.py``).
+    4. a test that it goes on with the next server (``tests/serving/studio/test_kinds_of_work.py``).
     """
 
     name: str
