@@ -31,13 +31,7 @@ PARSES = (
 NAMES_HIGHER = ()
 # Modules that name a type of arrays for themselves which `tts2face.numeric.arrays` names for all.
 ARRAY_ROOM = "tts2face.numeric.arrays"
-NAMES_ARRAYS = tuple(
-    f"tts2face.photo.{name}"
-    for name in (
-        "camera", "eyes", "fit", "light", "lines", "matte", "mesh", "mouth", "photograph", "shapes",
-        "speaking_photo", "spreading", "surface", "teeth",
-    )
-)  # fmt: skip
+NAMES_ARRAYS = ()
 ARRAY_NAME = re.compile(
     r"^(?:Array|Floats|FloatArray|Float32Array|Ints|IntArray|Mask|Pixels|RealArray) = NDArray\[[\w.]+\]$",
     re.MULTILINE,

@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tts2face.numeric.arrays import FloatArray
 from tts2face.photo.found_face import FoundFace
 from tts2face.video.pose import CAMERA_DISTANCE_MM, rigid_points, similarity_transforms
-
-Floats = NDArray[np.float64]
 
 TO_CAMERA = np.array([1.0, -1.0, -1.0])  # from x right, y up, z towards the camera to x right, y down, z ahead
 PIXEL_AXES = np.array([1.0, -1.0, 1.0])  # from x right, y up, z towards the camera to y down
@@ -33,9 +31,9 @@ class PhotoCamera:
         Of the origin of the head in the landmarks' depths, pixels towards the camera.
     """
 
-    turn: Floats
+    turn: FloatArray
     scale: float
-    origin: Floats
+    origin: FloatArray
     depth: float
 
     @property
@@ -44,35 +42,35 @@ class PhotoCamera:
         return CAMERA_DISTANCE_MM * self.scale
 
     @property
-    def view(self) -> Floats:
+    def view(self) -> FloatArray:
         """(3, 4) from head to camera: x right, y down, z ahead, mm."""
         return np.column_stack([TO_CAMERA[:, None] * self.turn, (0.0, 0.0, CAMERA_DISTANCE_MM)])
 
-    def depths_of(self, landmarks: Floats) -> Floats:
+    def depths_of(self, landmarks: FloatArray) -> FloatArray:
         """Landmarks (N, 3), whose z goes away from the camera, as pixels and depths."""
         return np.column_stack([landmarks[:, :2], -landmarks[:, 2] - self.depth])
 
-    def to_head(self, places: Floats) -> Floats:
+    def to_head(self, places: FloatArray) -> FloatArray:
         """Points (N, 3) of the head, mm, of pixels and depths (N, 3)."""
         ahead = CAMERA_DISTANCE_MM - places[:, 2] / self.scale
         across = (places[:, :2] - self.origin) * ahead[:, None] / self.focal_px
         seen = np.column_stack([across, ahead]) - (0.0, 0.0, CAMERA_DISTANCE_MM)
-        points: Floats = (seen * TO_CAMERA) @ self.turn
+        points: FloatArray = (seen * TO_CAMERA) @ self.turn
         return points
 
-    def ways_to_head(self, ways: Floats) -> Floats:
+    def ways_to_head(self, ways: FloatArray) -> FloatArray:
         """Displacements (..., 3) in the head, mm, of those in pixels and depths (..., 3)."""
-        turned: Floats = (ways * PIXEL_AXES / self.scale) @ self.turn
+        turned: FloatArray = (ways * PIXEL_AXES / self.scale) @ self.turn
         return turned
 
-    def to_pixels(self, points: Floats) -> Floats:
+    def to_pixels(self, points: FloatArray) -> FloatArray:
         """Pixels and depths (N, 3) of points (N, 3) of the head, mm."""
         seen = points @ self.view[:, :3].T + self.view[:, 3]
         across = seen[:, :2] * (self.focal_px / seen[:, 2:]) + self.origin
         return np.column_stack([across, (CAMERA_DISTANCE_MM - seen[:, 2]) * self.scale])
 
 
-def find_camera(face: FoundFace, head_landmarks: Floats) -> PhotoCamera:
+def find_camera(face: FoundFace, head_landmarks: FloatArray) -> PhotoCamera:
     """Camera that sees the rigid landmarks (478, 3) of a head, mm, where the photograph shows them (least squares)."""
     indices, _, weights = rigid_points()
     seen = face.landmarks * TO_CAMERA

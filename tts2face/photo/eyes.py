@@ -4,17 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter, label
 from scipy.spatial import ConvexHull
 
 from tts2face.models.face import Face
-from tts2face.numeric.arrays import points_in_polygon, smoothstep
+from tts2face.numeric.arrays import FloatArray, IntArray, Mask, Pixels, points_in_polygon, smoothstep
 from tts2face.photo.lines import LidLines
 from tts2face.photo.mesh import grid_triangles
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 IRISES = ((468, 469, 470, 471, 472), (473, 474, 475, 476, 477))  # middle and edge of the irises, right and left
 SIDES = ("Right", "Left")
@@ -57,16 +53,16 @@ class EyePatch:
     share of a turn of the gaze that the places follow. It lies ``ahead_mm`` before the eye.
     """
 
-    picture: NDArray[np.uint8]
-    white: Floats
+    picture: Pixels
+    white: FloatArray
     corner: tuple[int, int]
-    places: Floats
-    turning: Floats
-    triangles: Ints
+    places: FloatArray
+    turning: FloatArray
+    triangles: IntArray
     ahead_mm: float = 0.0
 
 
-def eye_patches(pixels: NDArray[np.uint8], landmarks: Floats, lids: LidLines, scale: float) -> list[list[EyePatch]]:
+def eye_patches(pixels: Pixels, landmarks: FloatArray, lids: LidLines, scale: float) -> list[list[EyePatch]]:
     """Patches of the person's right and left eye, each before those of catchlights that stay, if both have some."""
     found = [_patches(pixels, landmarks, lids, (eye, scale), stay=True) for eye in (0, 1)]
     if min(len(patches) for patches in found) > 1:
@@ -75,7 +71,7 @@ def eye_patches(pixels: NDArray[np.uint8], landmarks: Floats, lids: LidLines, sc
 
 
 def _patches(
-    pixels: NDArray[np.uint8], landmarks: Floats, lids: LidLines, of_eye: tuple[int, float], *, stay: bool
+    pixels: Pixels, landmarks: FloatArray, lids: LidLines, of_eye: tuple[int, float], *, stay: bool
 ) -> list[EyePatch]:
     """Patch of an eye, and those of its catchlights, if they shall stay."""
     eye, scale = of_eye
@@ -105,7 +101,7 @@ def _patches(
     return found
 
 
-def gaze_shapes(head: Face, turning: Floats, eye: int) -> Mapping[str, Floats]:
+def gaze_shapes(head: Face, turning: FloatArray, eye: int) -> Mapping[str, FloatArray]:
     """Displacements (N, 3), mm, of a patch by the shapes of gaze that turn an eye of the head."""
     found = {}
     for own in head.eyes:
@@ -119,13 +115,13 @@ def gaze_shapes(head: Face, turning: Floats, eye: int) -> Mapping[str, Floats]:
 class _Shown:
     """An eye without lids and catchlights: its picture (h, w, 3), its white (3,), and their polygons (M, 2)."""
 
-    picture: Floats
-    white: Floats
-    catchlights: list[Floats]
+    picture: FloatArray
+    white: FloatArray
+    catchlights: list[FloatArray]
 
 
 def _without_lids(
-    part: NDArray[np.uint8], polygon: Floats, iris: tuple[Floats, float], scale: float, *, stay: bool
+    part: Pixels, polygon: FloatArray, iris: tuple[FloatArray, float], scale: float, *, stay: bool
 ) -> _Shown:
     """An eye whose opening is a polygon (N, 2), completed beyond it, and under catchlights that shall stay."""
     middle, radius = iris
@@ -159,8 +155,8 @@ def _without_lids(
 
 
 def _catchlights(
-    colours: Floats, base: Floats, is_seen: NDArray[np.bool_], away: Floats, radius: float
-) -> list[Floats]:
+    colours: FloatArray, base: FloatArray, is_seen: Mask, away: FloatArray, radius: float
+) -> list[FloatArray]:
     """Polygons (M, 2) around the brightest spots on an iris, pixels, as the axes of the picture turn.
 
     They are brighter than the white of the eye, round, and brighter than a smooth picture `base` (h, w, 3) of the eye;
@@ -188,7 +184,7 @@ def _catchlights(
     return rings
 
 
-def _sclera(colours: Floats, seen: NDArray[np.bool_], off: tuple[Floats, Floats], scale: float) -> Floats | None:
+def _sclera(colours: FloatArray, seen: Mask, off: tuple[FloatArray, FloatArray], scale: float) -> FloatArray | None:
     """Colours (h, w, 3) of the white of the eye: a polynomial through what is seen of it."""
     if int(seen.sum()) <= LEAST_SEEN:
         return None
@@ -203,10 +199,10 @@ def _sclera(colours: Floats, seen: NDArray[np.bool_], off: tuple[Floats, Floats]
     return np.clip(terms @ factors, limits[0], limits[1])
 
 
-def _rings(colours: Floats, seen: NDArray[np.bool_], away: Floats) -> Floats:
+def _rings(colours: FloatArray, seen: Mask, away: FloatArray) -> FloatArray:
     """Colours (h, w, 3) of an iris that is seen whole: the means of its rings."""
     middles = (np.arange(N_RINGS) + 0.5) / N_RINGS_INSIDE
-    profile: list[Floats] = []
+    profile: list[FloatArray] = []
     for middle in middles:
         ring = seen & (np.abs(away - middle) < RING_WIDTH)
         usual = (
@@ -216,7 +212,7 @@ def _rings(colours: Floats, seen: NDArray[np.bool_], away: Floats) -> Floats:
     return np.stack([np.interp(away, middles, np.array(profile)[:, c]) for c in range(3)], axis=-1)
 
 
-def _coverage(shape: tuple[int, int], polygon: Floats) -> Floats:
+def _coverage(shape: tuple[int, int], polygon: FloatArray) -> FloatArray:
     """(h, w) share of each pixel within a polygon."""
     offsets = (np.arange(FINE) - (FINE - 1) / 2) / FINE
     down, across = np.mgrid[: shape[0], : shape[1]].astype(np.float64)

@@ -11,16 +11,14 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from lexicon.errors import DataError, InputError
 from lexicon.values.json_text import read_json
 from lexicon.values.records import checked, errors_at
+from tts2face.numeric.arrays import FloatArray
 from tts2face.photo.lines import InnerLips, LidLines
 from tts2face.storage.files import write_atomically
-
-Floats = NDArray[np.float64]
 
 LINES = {"lips": ("upper", "lower", "seam"), "right_eye": ("upper", "lower"), "left_eye": ("upper", "lower")}
 POINTS = ("teeth", "pivot")
@@ -47,8 +45,8 @@ class PhotoFit:
     point about which the head turns.
     """
 
-    lines: Mapping[tuple[str, str], Floats]
-    points: Mapping[str, Floats]
+    lines: Mapping[tuple[str, str], FloatArray]
+    points: Mapping[str, FloatArray]
     name: str = "the fit"
 
     def __post_init__(self) -> None:
@@ -82,7 +80,7 @@ _Written: Any = make_dataclass(
 )
 
 
-def _rounded(places: Floats) -> Any:
+def _rounded(places: FloatArray) -> Any:
     return np.round(places, DIGITS).tolist()
 
 
@@ -131,7 +129,7 @@ class PhotoPlaces:
     reduced_by: float
     scale: float
 
-    def point(self, name: str, found: Floats) -> Floats:
+    def point(self, name: str, found: FloatArray) -> FloatArray:
         """A point (3,), pixels and depth, with the place that is given for it.
 
         Raises
@@ -174,7 +172,7 @@ class PhotoPlaces:
         (right, left) = eyes
         return LidLines((right[0], left[0]), (right[1], left[1]), found.fold)
 
-    def used(self, lips: InnerLips, lids: LidLines, points: Mapping[str, Floats]) -> PhotoFit:
+    def used(self, lips: InnerLips, lids: LidLines, points: Mapping[str, FloatArray]) -> PhotoFit:
         """The fit that gives these lines and points (3,), pixels and depths."""
         lines = {("lips", "seam"): lips.upper} if lips.is_closed else {}
         if not lips.is_closed:
@@ -188,11 +186,11 @@ class PhotoPlaces:
             {name: self._of_file(point) for name, point in points.items()},
         )
 
-    def _of_file(self, places: Floats) -> Floats:
-        found: Floats = (places[..., :2] + 0.5) * self.reduced_by
+    def _of_file(self, places: FloatArray) -> FloatArray:
+        found: FloatArray = (places[..., :2] + 0.5) * self.reduced_by
         return found
 
-    def _placed(self, name: str, places: Floats, margin: float = 0.0) -> Floats:
+    def _placed(self, name: str, places: FloatArray, margin: float = 0.0) -> FloatArray:
         """Pixels (N, 2) of the picture of places of the file, which may lie outside it by a share of its size."""
         size = np.array(self.size) * self.reduced_by
         outside = ((places < -margin * size) | (places > (1 + margin) * size)).any(axis=1)
@@ -204,7 +202,7 @@ class PhotoPlaces:
             )
         return places / self.reduced_by - 0.5
 
-    def _line(self, part: str, edge: str, found: Floats) -> Floats:
+    def _line(self, part: str, edge: str, found: FloatArray) -> FloatArray:
         """The line (N, 3) that is given in place of one that was found, with its depths."""
         given = self._placed(f"{part}.{edge}", self.fit.lines[part, edge])
         off = float(np.linalg.norm(given.mean(axis=0) - found[:, :2].mean(axis=0)))
@@ -219,7 +217,7 @@ class PhotoPlaces:
         at = _shares(fine)
         return np.column_stack([*(np.interp(shares, at, fine[:, axis]) for axis in (0, 1)), found[:, 2]])
 
-    def _opening(self, part: str, upper: Floats, lower: Floats) -> tuple[Floats, Floats]:
+    def _opening(self, part: str, upper: FloatArray, lower: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Upper and lower line (N, 3) of an opening; one that is not given moves with the corners of the other."""
         lines = [upper, lower]
         given = [(part, edge) in self.fit.lines for edge in ("upper", "lower")]
@@ -242,35 +240,35 @@ class PhotoPlaces:
         return first, second
 
 
-def _gaps(upper: Floats, lower: Floats) -> Floats:
+def _gaps(upper: FloatArray, lower: FloatArray) -> FloatArray:
     """(N,) distance of lines, pixels, down from the line between the corners."""
     along = upper[-1, :2] - upper[0, :2]
     down = np.array([-along[1], along[0]]) / np.linalg.norm(along)
-    found: Floats = (lower - upper)[:, :2] @ down
+    found: FloatArray = (lower - upper)[:, :2] @ down
     return found
 
 
-def _with_corners(line: Floats, other: Floats) -> Floats:
+def _with_corners(line: FloatArray, other: FloatArray) -> FloatArray:
     """A line (N, 3) whose ends are those of another one."""
     share = _shares(line[:, :2])[:, None]
-    moved: Floats = line + (1 - share) * (other[0] - line[0]) + share * (other[-1] - line[-1])
+    moved: FloatArray = line + (1 - share) * (other[0] - line[0]) + share * (other[-1] - line[-1])
     return moved
 
 
-def _shares(line: Floats) -> Floats:
+def _shares(line: FloatArray) -> FloatArray:
     """(N,) share of the length of a line at each of its points."""
     ways = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
-    found: Floats = ways / ways[-1]
+    found: FloatArray = ways / ways[-1]
     return found
 
 
-def _goes_on(step: Floats, along: Floats) -> bool:
+def _goes_on(step: FloatArray, along: FloatArray) -> bool:
     """Whether a step (2,) of a line goes on, not more than a little back from its end, which lies `along` (2,)."""
     length = float(np.linalg.norm(step))
     return length > 0 and float(step @ along) >= -BACKWARDS * length * float(np.linalg.norm(along))
 
 
-def _forward(line: Floats) -> Floats:
+def _forward(line: FloatArray) -> FloatArray:
     """The points (M, 2) of a line that go on."""
     along = line[-1] - line[0]
     kept = [line[0]]

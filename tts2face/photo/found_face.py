@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.landmarks import (
@@ -17,6 +16,7 @@ from tts2face.models.landmarks import (
     N_MESH_LANDMARKS,
     eye_aperture,
 )
+from tts2face.numeric.arrays import FloatArray, Pixels
 from tts2face.photo.photograph import Photograph, read_photograph, split_number
 from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.pose import head_angles, rigid_points, similarity_transforms
@@ -60,7 +60,7 @@ class FoundFace:
         Sentences for the user.
     """
 
-    landmarks: NDArray[np.float64]
+    landmarks: FloatArray
     spread: float
     angles_deg: tuple[float, float, float]
     eye_distance_px: float
@@ -126,7 +126,7 @@ class PhotoReader:
 
 
 def find_face(
-    pixels: NDArray[np.uint8],
+    pixels: Pixels,
     tracker: FaceTracker,
     name: str | Path,
     *,
@@ -172,7 +172,7 @@ def _count(n: int) -> str:
     return "one face" if n == 1 else f"{n} faces"
 
 
-def _faces(pixels: NDArray[np.uint8], tracker: FaceTracker, wanted: int) -> list[Crop]:
+def _faces(pixels: Pixels, tracker: FaceTracker, wanted: int) -> list[Crop]:
     """Crops around faces of a picture, the largest first; where the whole shows too few, parts of it are searched.
 
     The detector reads 128 pixels, in which it sees no face narrower than about 15.
@@ -193,7 +193,7 @@ def _faces(pixels: NDArray[np.uint8], tracker: FaceTracker, wanted: int) -> list
     return sorted(kept, key=lambda crop: -crop.side)
 
 
-def _parts(pixels: NDArray[np.uint8]) -> Iterator[tuple[NDArray[np.uint8], int, int]]:
+def _parts(pixels: Pixels) -> Iterator[tuple[Pixels, int, int]]:
     """The picture, then overlapping squares of it, with their left and top edges."""
     yield pixels, 0, 0
     height, width = pixels.shape[:2]
@@ -209,7 +209,7 @@ def _starts(length: int, side: int) -> Sequence[int]:
     return [round(start) for start in np.linspace(0, length - side, n).tolist()]
 
 
-def _read(pixels: NDArray[np.uint8], tracker: FaceTracker, crop: Crop, n_faces: int) -> FoundFace:
+def _read(pixels: Pixels, tracker: FaceTracker, crop: Crop, n_faces: int) -> FoundFace:
     steps = [(across, down) for across in (-1, 0, 1) for down in (-1, 0, 1)]
     step = CROP_STEP * crop.side
     readings = [tracker.read_crop(pixels, replace(crop, x=crop.x + a * step, y=crop.y + d * step)) for a, d in steps]

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from tts2face.models.baked_light import (
@@ -25,16 +24,13 @@ from tts2face.models.baked_light import (
 )
 from tts2face.models.landmarks import LEFT_LIDS, OUTER_LIP_LOWER, OUTER_LIP_UPPER, RIGHT_LIDS
 from tts2face.models.view_transform import TABLE_SIDE
-from tts2face.numeric.arrays import LUMINANCE, decode_srgb, smoothstep, vertex_normals
+from tts2face.numeric.arrays import LUMINANCE, FloatArray, IntArray, Pixels, decode_srgb, smoothstep, vertex_normals
 from tts2face.photo.lines import LEAST_BLUR_PX, colours_at, grey_at
 from tts2face.photo.mesh import PhotoMesh
 from tts2face.photo.mouth import PICTURED
 from tts2face.photo.shapes import PhotoPerson
 from tts2face.photo.surface import EYES, LIDS, SKIN
 from tts2face.picture.baked.response import MOVE_MM
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 LIGHT_BLUR = 0.03  # of the width of the face
 SMALL_SPREAD_PX = 3.0  # blur of the smaller picture in which that is done
@@ -87,12 +83,12 @@ class MouthRows:
     the walls do not.
     """
 
-    pictured: Sequence[tuple[Ints, Floats]]
-    lit: Sequence[tuple[Ints, Floats]]
-    walls: Sequence[tuple[Ints, Floats]]
-    dark: Floats
+    pictured: Sequence[tuple[IntArray, FloatArray]]
+    lit: Sequence[tuple[IntArray, FloatArray]]
+    walls: Sequence[tuple[IntArray, FloatArray]]
+    dark: FloatArray
 
-    def light(self) -> tuple[Ints, Floats, Floats]:
+    def light(self) -> tuple[IntArray, FloatArray, FloatArray]:
         """Vertices (M,), their base (M, 3), which is added to that of a picture, and responses (6, 3, M)."""
         rows, bases, responses = [], [], []
         none, full = np.zeros(3), np.ones(3)
@@ -111,8 +107,8 @@ class MouthRows:
 
 
 def skin_light(
-    pixels: NDArray[np.uint8], mesh: PhotoMesh, vertices: Floats, by_movement: Floats
-) -> tuple[Ints, Floats]:
+    pixels: Pixels, mesh: PhotoMesh, vertices: FloatArray, by_movement: FloatArray
+) -> tuple[IntArray, FloatArray]:
     """Vertices (N,) whose colour follows their normal and movement, and (10, 3, N) its responses.
 
     Light of first order (Basri and Jacobs 2003) is fitted to the skin's luminance. `by_movement` (3, V) is the change
@@ -146,7 +142,7 @@ def skin_light(
     return rows, responses
 
 
-def _fit(terms: Floats, values: Floats) -> Floats:
+def _fit(terms: FloatArray, values: FloatArray) -> FloatArray:
     usual = float(np.median(values)) * USUAL_LIGHT
     ridge = np.diag(LIGHT_RIDGE) * len(values)
     weights = np.ones(len(values))
@@ -158,7 +154,7 @@ def _fit(terms: Floats, values: Floats) -> Floats:
     return np.asarray(light)
 
 
-def _blurred(pixels: NDArray[np.uint8], spread: float, places: Floats) -> Floats:
+def _blurred(pixels: Pixels, spread: float, places: FloatArray) -> FloatArray:
     """Colours (N, 3) of a blurred picture (H, W, 3) at places (N, 2): of a smaller one, which shows the same."""
     from PIL import Image
 
@@ -172,10 +168,10 @@ def _blurred(pixels: NDArray[np.uint8], spread: float, places: Floats) -> Floats
 
 
 def picture_light(
-    pixels: NDArray[np.uint8],
-    pages: NDArray[np.uint8],
-    skin: tuple[PhotoMesh, Floats, Floats],
-    drawn: Ints,
+    pixels: Pixels,
+    pages: Pixels,
+    skin: tuple[PhotoMesh, FloatArray, FloatArray],
+    drawn: IntArray,
     mouth: MouthRows,
 ) -> BakedLight:
     """Light of a face in a picture (H, W, 3): that of the skin turns with it, that of the mouth comes through the lips.
@@ -232,7 +228,7 @@ def picture_light(
     )
 
 
-def wrinkles(pixels: NDArray[np.uint8], mesh: PhotoMesh, motion: Mapping[str, Floats], person: PhotoPerson) -> Floats:
+def wrinkles(pixels: Pixels, mesh: PhotoMesh, motion: Mapping[str, FloatArray], person: PhotoPerson) -> FloatArray:
     """(3, V) change of the light of vertices by their movement over `MOVE_MM`, of their colour.
 
     Parameters
@@ -247,7 +243,7 @@ def wrinkles(pixels: NDArray[np.uint8], mesh: PhotoMesh, motion: Mapping[str, Fl
     return np.ascontiguousarray(found.T) * float(MOVE_MM)
 
 
-def _answers(motion: Floats, others: Sequence[Floats]) -> Floats:
+def _answers(motion: FloatArray, others: Sequence[FloatArray]) -> FloatArray:
     """(V, 3) factors of a movement that are 1 together for a motion (V, 3), and as near to 0 as may be for others."""
     moves = np.linalg.norm(motion, axis=1) > LEAST_MM
     rows = np.stack([motion, *others], axis=1)[moves]
@@ -258,7 +254,7 @@ def _answers(motion: Floats, others: Sequence[Floats]) -> Floats:
     return answers
 
 
-def _forehead_lines(pixels: NDArray[np.uint8], mesh: PhotoMesh, person: PhotoPerson) -> Floats:
+def _forehead_lines(pixels: Pixels, mesh: PhotoMesh, person: PhotoPerson) -> FloatArray:
     """(V,) change of light in lines across the forehead, of the colour."""
     brows, top = person.landmarks[list(BROW_EDGES), :2], person.landmarks[FOREHEAD_TOP, :2]
     along = brows[-1] - brows[0]
@@ -274,11 +270,11 @@ def _forehead_lines(pixels: NDArray[np.uint8], mesh: PhotoMesh, person: PhotoPer
     inside = _between(share, FOREHEAD) * (1 - smoothstep(np.abs(across) / half, *FOREHEAD_SIDE))
     rows = np.flatnonzero(inside)
     faint[rows] += DEEPER * _shown_lines(pixels, mesh.places[rows], np.tile(along, (len(rows), 1)), person.scale)
-    found: Floats = inside * faint
+    found: FloatArray = inside * faint
     return found
 
 
-def _smile_folds(pixels: NDArray[np.uint8], mesh: PhotoMesh, person: PhotoPerson) -> Floats:
+def _smile_folds(pixels: Pixels, mesh: PhotoMesh, person: PhotoPerson) -> FloatArray:
     """(V,) change of light at the folds from nose to mouth, of the colour; less where the picture smiles already."""
     found = np.zeros(len(mesh.places))
     for numbers in FOLDS:
@@ -297,7 +293,7 @@ def _smile_folds(pixels: NDArray[np.uint8], mesh: PhotoMesh, person: PhotoPerson
     return found * (1 - person.smile)
 
 
-def _nearest(line: Floats, places: Floats) -> tuple[Floats, Floats, Floats]:
+def _nearest(line: FloatArray, places: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Way from a line (M, 2) to places (V, 2), positive to the right in the picture, share of it, and its direction."""
     fine = np.stack(
         [np.interp(np.linspace(0, len(line) - 1, N_FOLD_POINTS), np.arange(len(line)), line[:, k]) for k in (0, 1)], 1
@@ -309,11 +305,11 @@ def _nearest(line: Floats, places: Floats) -> tuple[Floats, Floats, Floats]:
     rows = np.arange(len(places))
     direction = steps[best]
     right = np.column_stack([np.abs(direction[:, 1]), -direction[:, 0] * np.sign(direction[:, 1])])
-    way: Floats = (off[rows, best] * right).sum(axis=1)
+    way: FloatArray = (off[rows, best] * right).sum(axis=1)
     return way, best / (len(fine) - 1), direction
 
 
-def _shown_lines(pixels: NDArray[np.uint8], places: Floats, direction: Floats, scale: float) -> Floats:
+def _shown_lines(pixels: Pixels, places: FloatArray, direction: FloatArray, scale: float) -> FloatArray:
     """(V,) how much brighter a picture is on lines in a direction (V, 2) than to their sides, of its brightness."""
     if not len(places):
         return np.zeros(0)
@@ -322,11 +318,11 @@ def _shown_lines(pixels: NDArray[np.uint8], places: Floats, direction: Floats, s
     off = [place + way * scale * side for way in BESIDE_LINE for place in on]
     grey = grey_at(pixels, np.stack([*on, *off], axis=1), max(LEAST_BLUR_PX, LINE_BLUR * scale))
     own, others = grey[:, : len(on)].mean(axis=1), grey[:, len(on) :].mean(axis=1)
-    found: Floats = np.clip((own - others) / np.maximum(others, 1.0), -MOST_SHOWN, MOST_SHOWN)
+    found: FloatArray = np.clip((own - others) / np.maximum(others, 1.0), -MOST_SHOWN, MOST_SHOWN)
     return found
 
 
-def _between(share: Floats, limits: tuple[float, float, float, float]) -> Floats:
+def _between(share: FloatArray, limits: tuple[float, float, float, float]) -> FloatArray:
     """1 between the second and the third of four limits, falling to 0 at the first and the last."""
-    found: Floats = smoothstep(share, *limits[:2]) * (1 - smoothstep(share, *limits[2:]))
+    found: FloatArray = smoothstep(share, *limits[:2]) * (1 - smoothstep(share, *limits[2:]))
     return found

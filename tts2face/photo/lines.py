@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tts2face.models.landmarks import (
@@ -14,9 +13,9 @@ from tts2face.models.landmarks import (
     OUTER_LIP_UPPER,
     RIGHT_LIDS,
 )
+from tts2face.numeric.arrays import FloatArray, IntArray, Pixels
 from tts2face.photo.found_face import FoundFace
 
-Floats = NDArray[np.float64]
 N_LIP = 41  # along a lip, from the person's right corner to the left one
 CLOSED_GAP = 0.02  # of the eye distance, as all lengths below; closed lips have up to .017, narrow smiles from .024
 SEARCHED = 0.03  # to either side of the landmarks
@@ -53,7 +52,7 @@ FOLD_COLUMNS = slice(6, -6)
 FOLD_SKIN = 0.5
 
 
-def lab_at(pixels: NDArray[np.uint8], places: Floats, blur: float) -> Floats:
+def lab_at(pixels: Pixels, places: FloatArray, blur: float) -> FloatArray:
     """CIE Lab of 8 bits (..., 3) of a blurred picture (H, W, 3) at places (..., 2), x and y."""
     import cv2
 
@@ -63,13 +62,13 @@ def lab_at(pixels: NDArray[np.uint8], places: Floats, blur: float) -> Floats:
     )
 
 
-def grey_at(pixels: NDArray[np.uint8], places: Floats, blur: float) -> Floats:
+def grey_at(pixels: Pixels, places: FloatArray, blur: float) -> FloatArray:
     """Mean (...) of the channels of a blurred picture (H, W, 3) at places (..., 2), x and y."""
     part, low = _around(pixels, places, blur)
     return _sample(part.mean(axis=2)[..., None], places - low, blur)[..., 0]
 
 
-def _around(pixels: NDArray[np.uint8], places: Floats, blur: float) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+def _around(pixels: Pixels, places: FloatArray, blur: float) -> tuple[Pixels, IntArray]:
     """The part of a picture that a blur reads at places, and its left top pixel."""
     margin = int(np.ceil(4 * blur)) + 1
     last = np.array(pixels.shape[1::-1]) - 1
@@ -78,14 +77,14 @@ def _around(pixels: NDArray[np.uint8], places: Floats, blur: float) -> tuple[NDA
     return pixels[low[1] : high[1], low[0] : high[0]], low
 
 
-def _sample(values: Floats, places: Floats, blur: float) -> Floats:
+def _sample(values: FloatArray, places: FloatArray, blur: float) -> FloatArray:
     """Values (..., C) of a blurred picture (h, w, C) at places (..., 2)."""
     from scipy.ndimage import gaussian_filter
 
     return colours_at(gaussian_filter(values, (blur, blur, 0)), places)
 
 
-def colours_at(values: Floats, places: Floats) -> Floats:
+def colours_at(values: FloatArray, places: FloatArray) -> FloatArray:
     """Values (..., C) of a picture (H, W, C) at places (..., 2), x and y, between its pixels."""
     from scipy.ndimage import map_coordinates
 
@@ -107,8 +106,8 @@ class InnerLips:
         Largest opening by the landmarks, of the eye distance.
     """
 
-    upper: Floats
-    lower: Floats
+    upper: FloatArray
+    lower: FloatArray
     gap: float
 
     @property
@@ -117,7 +116,7 @@ class InnerLips:
         return self.gap < CLOSED_GAP
 
 
-def find_lip_line(pixels: NDArray[np.uint8], face: FoundFace) -> InnerLips:
+def find_lip_line(pixels: Pixels, face: FoundFace) -> InnerLips:
     """Inner edges of the lips of a face in a picture (H, W, 3).
 
     Notes
@@ -140,14 +139,14 @@ def find_lip_line(pixels: NDArray[np.uint8], face: FoundFace) -> InnerLips:
     return InnerLips(upper, lower, gap)
 
 
-def spline_weights(n: int, m: int) -> Floats:
+def spline_weights(n: int, m: int) -> FloatArray:
     """(m, n) values at m places of the natural cubic spline through n equidistant ones."""
     from scipy.interpolate import CubicSpline
 
     return np.asarray(CubicSpline(np.linspace(0, 1, n), np.eye(n), bc_type="natural")(np.linspace(0, 1, m)))
 
 
-def darken_lip_edges(pixels: NDArray[np.uint8], lips: InnerLips, scale: float) -> NDArray[np.uint8]:
+def darken_lip_edges(pixels: Pixels, lips: InnerLips, scale: float) -> Pixels:
     """Picture (H, W, 3) whose parted lips darken towards their inner edges, as lips that meet do."""
     if lips.is_closed:
         return pixels
@@ -167,7 +166,7 @@ def darken_lip_edges(pixels: NDArray[np.uint8], lips: InnerLips, scale: float) -
     return darker
 
 
-def _seam(pixels: NDArray[np.uint8], line: Floats, scale: float) -> Floats:
+def _seam(pixels: Pixels, line: FloatArray, scale: float) -> FloatArray:
     """A line (N, 3) moved to the darkest seam."""
     along = line[-1, :2] - line[0, :2]
     across = np.array([-along[1], along[0]]) / np.linalg.norm(along)
@@ -180,7 +179,7 @@ def _seam(pixels: NDArray[np.uint8], line: Floats, scale: float) -> Floats:
     return moved
 
 
-def _edge(pixels: NDArray[np.uint8], line: Floats, outer: Floats, scale: float) -> Floats:
+def _edge(pixels: Pixels, line: FloatArray, outer: FloatArray, scale: float) -> FloatArray:
     """The inner edge (N, 3) of one lip, from its landmarks and those of its outer edge."""
     inwards = (line - outer)[:, :2]
     inwards /= np.linalg.norm(inwards, axis=1, keepdims=True) + TINY_PX
@@ -207,7 +206,7 @@ def _edge(pixels: NDArray[np.uint8], line: Floats, outer: Floats, scale: float) 
     return moved
 
 
-def cheapest_path(cost: Floats, offsets: Floats, stiffness: float) -> Floats:
+def cheapest_path(cost: FloatArray, offsets: FloatArray, stiffness: float) -> FloatArray:
     """Offset (N,) of each row of the cheapest path through costs (N, P), smoothed."""
     step = stiffness * ((offsets[:, None] - offsets) / STIFF_STEP) ** 2
     total, came = cost[0].copy(), np.zeros(cost.shape, np.int64)
@@ -221,7 +220,7 @@ def cheapest_path(cost: Floats, offsets: Floats, stiffness: float) -> Floats:
     return _smooth(offsets[chosen[::-1]][:, None], SMOOTHING)[:, 0]
 
 
-def _smooth(values: Floats, n: int) -> Floats:
+def _smooth(values: FloatArray, n: int) -> FloatArray:
     """Means of n neighbours along the first axis, (N, K); the ends are held."""
     padded = np.pad(values, ((n // 2, n // 2), (0, 0)), mode="edge")
     kernel = np.ones(n) / n
@@ -235,12 +234,12 @@ class LidLines:
     The folds lie `fold` pixels above the upper margins.
     """
 
-    upper: tuple[Floats, Floats]
-    lower: tuple[Floats, Floats]
+    upper: tuple[FloatArray, FloatArray]
+    lower: tuple[FloatArray, FloatArray]
     fold: float
 
 
-def find_lid_lines(pixels: NDArray[np.uint8], landmarks: Floats, scale: float) -> LidLines:
+def find_lid_lines(pixels: Pixels, landmarks: FloatArray, scale: float) -> LidLines:
     """Margins of the lids in a picture (H, W, 3) from landmarks (478, 3); `scale` is the eye distance, pixels."""
     weights = spline_weights(len(RIGHT_LIDS[0]), N_LID)
     lines = [[weights @ landmarks[list(numbers)] for numbers in lids] for lids in LID_MARGINS]
@@ -270,7 +269,7 @@ class _Eye:
     """An eye whose margins the landmarks give."""
 
     def __init__(
-        self, pixels: NDArray[np.uint8], landmarks: Floats, upper: Floats, lower: Floats, scale: float, eye: int
+        self, pixels: Pixels, landmarks: FloatArray, upper: FloatArray, lower: FloatArray, scale: float, eye: int
     ) -> None:
         self._pixels, self._landmarks, self._eye = pixels, landmarks, eye
         self._upper, self._lower, self._scale = upper, lower, scale
@@ -282,13 +281,13 @@ class _Eye:
         self._down = down / np.linalg.norm(down) if np.linalg.norm(down) > 1e-6 else across * np.sign(across[1])
         self._skin = self._lab(landmarks[list(BELOW[eye]), :2]).mean(axis=0)
 
-    def _lab(self, places: Floats) -> Floats:
+    def _lab(self, places: FloatArray) -> FloatArray:
         return lab_at(self._pixels, places, max(0.6, LID_BLUR * self._scale))
 
-    def _is_skin(self, places: Floats) -> Floats:
+    def _is_skin(self, places: FloatArray) -> FloatArray:
         """(...) likeness of the hue at places (..., 2) to that of the skin below the eye."""
         off = (self._lab(places) - self._skin)[..., 1:] / HUE_SPREAD
-        found: Floats = np.exp(-(off**2).sum(axis=-1) / 2)
+        found: FloatArray = np.exp(-(off**2).sum(axis=-1) / 2)
         return found
 
     @property
@@ -296,15 +295,15 @@ class _Eye:
         """Height of the opening by the landmarks, of the eye distance."""
         return float(np.linalg.norm((self._lower - self._upper)[N_LID // 2, :2])) / self._scale
 
-    def edge_scores(self) -> Floats:
+    def edge_scores(self) -> FloatArray:
         """(K + 1,) how well the lower lid fits there by which `LOWER_STEPS` it may lie lower, and at the landmarks."""
         steps = np.append(LOWER_STEPS, 0.0) * self._scale
         lines = self._lower[None, MIDDLE, :2] + steps[:, None, None] * self._bow[MIDDLE] * self._down
         inside, outside = (self._is_skin(lines + way * self._scale * self._down) for way in (-INSIDE, OUTSIDE))
-        scores: Floats = (outside - inside).mean(axis=1)
+        scores: FloatArray = (outside - inside).mean(axis=1)
         return scores
 
-    def enlarged(self, step: float) -> list[Floats]:
+    def enlarged(self, step: float) -> list[FloatArray]:
         """Margins of an eye whose lower lid lies lower, with corners where skin begins."""
         upper, lower = self._upper.copy(), self._lower.copy()
         lower[:, :2] += step * self._bow * self._down
@@ -318,7 +317,7 @@ class _Eye:
             lower[:, :2] += shift
         return [upper, lower]
 
-    def skin_above(self) -> Floats:
+    def skin_above(self) -> FloatArray:
         """(K,) likeness to skin below the brow, at `FOLD_STEPS` above the upper margin; 1 too near to that skin."""
         brow = self._landmarks[list(ABOVE[self._eye]), :2]
         skin = np.median(self._lab(brow), axis=0)

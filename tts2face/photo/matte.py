@@ -7,16 +7,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tts2face.models.landmarks import FACE_OVAL
-from tts2face.numeric.arrays import smoothstep
+from tts2face.numeric.arrays import Float32Array, FloatArray, IntArray, Mask, Pixels, smoothstep
 from tts2face.photo.photograph import Photograph
 
-Floats = NDArray[np.float32]
-Mask = NDArray[np.bool_]
-Pixels = NDArray[np.uint8]
-Network = Callable[[Floats], Sequence[Floats]]
+Network = Callable[[Float32Array], Sequence[Float32Array]]
 
 SIDE = 256  # of the network's input
 AROUND = 3.0  # of the eye distance, around the oval of the face, that the network reads besides the whole picture
@@ -53,11 +49,11 @@ STANDS_OUT_REACH = 0.3  # of the eye distance, from whose mean colour lines stan
 class MatteReading:
     """Share (H, W) of a person in the pixels of a picture, and its standard deviation (H, W) over the readings."""
 
-    share: Floats
-    deviation: Floats
+    share: Float32Array
+    deviation: Float32Array
 
 
-def part_background(picture: Photograph, landmarks: NDArray[np.float64], scale: float, network: Network) -> Photograph:
+def part_background(picture: Photograph, landmarks: FloatArray, scale: float, network: Network) -> Photograph:
     """Picture with the person as its opaque part and the background behind; as it is if they are too much alike.
 
     Parameters
@@ -96,7 +92,7 @@ def part_background(picture: Photograph, landmarks: NDArray[np.float64], scale: 
     return _layered(picture, cover, around, layers)
 
 
-def read_person(pixels: Pixels, places: NDArray[np.float64], scale: float, network: Network) -> MatteReading:
+def read_person(pixels: Pixels, places: FloatArray, scale: float, network: Network) -> MatteReading:
     """Mean of the network's readings of a picture and of two parts of it around a face, each also mirrored."""
     height, width = pixels.shape[:2]
     oval = places[list(FACE_OVAL)]
@@ -134,7 +130,7 @@ def _is_doubtful(reading: MatteReading, face: Mask, scale: float) -> bool:
     )
 
 
-def _fading(first: int, end: int, length: int) -> Floats:
+def _fading(first: int, end: int, length: int) -> Float32Array:
     """(end - first,) weights of a part of a side: less towards its ends, unless they are those of the side."""
     away = np.arange(end - first) + 0.5
     ways = [way for way, is_inside in ((away, first > 0), (away[::-1], end < length)) if is_inside]
@@ -143,7 +139,7 @@ def _fading(first: int, end: int, length: int) -> Floats:
     )
 
 
-def _read(part: Pixels, network: Network) -> Floats:
+def _read(part: Pixels, network: Network) -> Float32Array:
     """Share (h, w) of a person in the pixels of a part (h, w, 3) of a picture."""
     import cv2
 
@@ -152,7 +148,7 @@ def _read(part: Pixels, network: Network) -> Floats:
     return np.asarray(cv2.resize(found, part.shape[1::-1], interpolation=cv2.INTER_CUBIC)).clip(0, 1)
 
 
-def _cover(pixels: Pixels, share: Floats, face: Mask, scale: float) -> tuple[Floats, Floats]:
+def _cover(pixels: Pixels, share: Float32Array, face: Mask, scale: float) -> tuple[Float32Array, Float32Array]:
     """Cover (H, W) by a person whose share is read, and its colours (H, W, 3) spread over the picture.
 
     Where the colours around a pixel tell person and background apart, its own colour says how they are mixed in it.
@@ -174,7 +170,7 @@ def _cover(pixels: Pixels, share: Floats, face: Mask, scale: float) -> tuple[Flo
     return ((cover - LEAST) / (MOST - LEAST)).clip(0, 1).astype(np.float32), of_person
 
 
-def _joined(cover: Floats, face: Mask, reach: float) -> Floats:
+def _joined(cover: Float32Array, face: Mask, reach: float) -> Float32Array:
     """Cover (H, W) of the place that is joined to the face, and of its rim."""
     import cv2
 
@@ -185,7 +181,7 @@ def _joined(cover: Floats, face: Mask, reach: float) -> Floats:
     return np.where(own | is_rim, cover, 0).astype(np.float32)
 
 
-def _layered(picture: Photograph, cover: Floats, near: Mask, layers: Sequence[Pixels]) -> Photograph:
+def _layered(picture: Photograph, cover: Float32Array, near: Mask, layers: Sequence[Pixels]) -> Photograph:
     """Picture in two layers (H, W, 3), whose colours of person and background near the person are given and changed.
 
     Where both are mixed they give the picture: mainly the person's are changed, which move with the rim.
@@ -218,7 +214,7 @@ def _grown(mask: Mask, way: float) -> Mask:
     return np.asarray(change(mask.astype(np.uint8), kernel)) > 0
 
 
-def _spread(colours: Floats, known: Mask, scale: float) -> tuple[Floats, Floats]:
+def _spread(colours: Float32Array, known: Mask, scale: float) -> tuple[Float32Array, Float32Array]:
     """Colours (H, W, 3) spread from where they are known, by narrower blurs where these reach, and their variance."""
     import cv2
 
@@ -261,8 +257,8 @@ def _paint_hole(pixels: Pixels, hole: Mask, scale: float) -> Pixels:
 
 
 def _between(
-    pixels: Pixels, free: Mask, stands_out: Floats, places: tuple[NDArray[np.int64], NDArray[np.int64]], scale: float
-) -> tuple[Floats, Floats]:
+    pixels: Pixels, free: Mask, stands_out: Float32Array, places: tuple[IntArray, IntArray], scale: float
+) -> tuple[Float32Array, Float32Array]:
     """Colours (N, 3) on the way between the free ends of rows around places (N,), (N,), and their weights (N, 1)."""
     line, at = places
     columns = np.arange(free.shape[1])
@@ -275,7 +271,7 @@ def _between(
     return ((1 - share) * first + share * last).astype(np.float32), weight[:, None].astype(np.float32)
 
 
-def _nearest(pixels: Pixels, known: Floats, scale: float) -> Pixels:
+def _nearest(pixels: Pixels, known: Float32Array, scale: float) -> Pixels:
     """Picture (H, W, 3) whose nearest surroundings go on where it is not known (H, W), in a smaller picture.
 
     Source: Bertalmio, Bertozzi and Sapiro 2001, Navier-Stokes, fluid dynamics, and image and video inpainting.

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import Delaunay, cKDTree
 
 from tts2face.models.landmarks import (
@@ -19,13 +18,10 @@ from tts2face.models.landmarks import (
     OUTER_LIP_LOWER,
     OUTER_LIP_UPPER,
 )
-from tts2face.numeric.arrays import points_in_polygon
+from tts2face.numeric.arrays import FloatArray, IntArray, Mask, points_in_polygon
 from tts2face.photo.lines import LID_MARGINS, N_LID, InnerLips, LidLines
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Mask = NDArray[np.bool_]
-Frame = tuple[Floats, Floats]
+Frame = tuple[FloatArray, FloatArray]
 
 LIP_RINGS = (
     (62, 183, 42, 41, 38, 12, 268, 271, 272, 407, 292),
@@ -73,20 +69,20 @@ class PhotoMesh:
         Least and greatest (2,) pixel of the mesh: what may move of the picture.
     """
 
-    places: Floats
-    known: Ints
-    depths: Floats
-    triangles: Ints
-    upper_lip: Ints
-    lower_lip: Ints
-    upper_lids: tuple[Ints, Ints]
-    lower_lids: tuple[Ints, Ints]
-    bands: tuple[Ints, Ints]
-    folds: tuple[Ints, Ints]
-    landmarks: Ints
-    landmark_vertices: Ints
-    outside: Floats
-    border: Ints
+    places: FloatArray
+    known: IntArray
+    depths: FloatArray
+    triangles: IntArray
+    upper_lip: IntArray
+    lower_lip: IntArray
+    upper_lids: tuple[IntArray, IntArray]
+    lower_lids: tuple[IntArray, IntArray]
+    bands: tuple[IntArray, IntArray]
+    folds: tuple[IntArray, IntArray]
+    landmarks: IntArray
+    landmark_vertices: IntArray
+    outside: FloatArray
+    border: IntArray
     frame: Frame
 
     @property
@@ -95,7 +91,9 @@ class PhotoMesh:
         return dict(zip(self.landmarks.tolist(), self.landmark_vertices.tolist(), strict=True))
 
 
-def build_mesh(size: tuple[int, int], landmarks: Floats, lips: InnerLips, lids: LidLines, scale: float) -> PhotoMesh:
+def build_mesh(
+    size: tuple[int, int], landmarks: FloatArray, lips: InnerLips, lids: LidLines, scale: float
+) -> PhotoMesh:
     """Mesh of a picture of a size (width, height) with landmarks (478, 3), pixels and depths.
 
     `scale` is the distance of the outer eye corners, pixels.
@@ -162,25 +160,25 @@ class _Points:
     """Vertices that are added one line after the other."""
 
     def __init__(self) -> None:
-        self._lines: list[Floats] = []
+        self._lines: list[FloatArray] = []
         self._count = 0
 
     @property
-    def every(self) -> Floats:
+    def every(self) -> FloatArray:
         return np.concatenate(self._lines)
 
-    def add(self, line: Floats) -> Ints:
+    def add(self, line: FloatArray) -> IntArray:
         """Vertices of a line (N, 3)."""
         self._lines.append(line)
         self._count += len(line)
         return np.arange(self._count - len(line), self._count)
 
-    def add_between(self, other: Ints, line: Floats) -> Ints:
+    def add_between(self, other: IntArray, line: FloatArray) -> IntArray:
         """Vertices of a line (N, 3) that shares its ends with another one."""
         return np.concatenate([other[:1], self.add(line[1:-1]), other[-1:]])
 
 
-def _band(margin: Floats, fold: float) -> Iterator[Floats]:
+def _band(margin: FloatArray, fold: float) -> Iterator[FloatArray]:
     """Rows (23, 3) of the band above the margin (25, 3) of an upper lid, up to the fold."""
     along = margin[-1, :2] - margin[0, :2]
     up = np.array([along[1], -along[0]]) / np.linalg.norm(along)
@@ -196,10 +194,10 @@ def _band(margin: Floats, fold: float) -> Iterator[Floats]:
 class _Mouth:
     """Frame along the line between the lips, in which they are parted."""
 
-    middle: Floats
+    middle: FloatArray
     half_width: float
-    axes: Floats
-    line: Floats
+    axes: FloatArray
+    line: FloatArray
     scale: float
 
     @classmethod
@@ -211,29 +209,29 @@ class _Mouth:
         middle = (left + right) / 2
         return cls(middle, half, axes, ((lips.upper + lips.lower)[:, :2] / 2 - middle) @ axes.T, scale)
 
-    def below(self, places: Floats) -> Floats:
+    def below(self, places: FloatArray) -> FloatArray:
         """(N,) how far places (N, 2) lie below the line between the lips, pixels."""
         local = (places - self.middle) @ self.axes.T
-        below: Floats = local[:, 1] - np.interp(local[:, 0], *self.line.T)
+        below: FloatArray = local[:, 1] - np.interp(local[:, 0], *self.line.T)
         return below
 
-    def part(self, places: Floats, side: Floats) -> Floats:
+    def part(self, places: FloatArray, side: FloatArray) -> FloatArray:
         """Places (N, 2) with parted lips; side (N,) is -1 above, 1 below, 0 where they are."""
         off = self.below(places)
         across = (places - self.middle) @ self.axes[0] / self.half_width
         lens = np.sqrt(np.clip(1 - across**2, 0, 1)) * np.exp(-np.abs(off) / (PART_REACH * self.scale))
         way = np.where(side, side, np.sign(off)) * PART * self.scale * lens
-        parted: Floats = places + way[:, None] * self.axes[1]
+        parted: FloatArray = places + way[:, None] * self.axes[1]
         return parted
 
 
 def _landmarks(
-    landmarks: Floats,
-    lines: Floats,
-    openings: Sequence[Floats],
+    landmarks: FloatArray,
+    lines: FloatArray,
+    openings: Sequence[FloatArray],
     mouth: _Mouth,
     of_picture: tuple[tuple[int, int], float],
-) -> Ints:
+) -> IntArray:
     """Landmarks that become vertices: not on the lines, in the openings, or on the other side of the mouth."""
     size, scale = of_picture
     on_lines = {
@@ -251,29 +249,29 @@ def _landmarks(
     kept &= side[used] * mouth.below(places) >= 0
     kept &= ~np.any([points_in_polygon(places, polygon) for polygon in openings], axis=0)
     kept &= ((places >= EDGE_PX) & (places <= np.array(size) - 1 - EDGE_PX)).all(axis=1)
-    chosen: Ints = used[kept]
+    chosen: IntArray = used[kept]
     return chosen
 
 
-def way_outside(places: Floats, oval: Floats) -> Floats:
+def way_outside(places: FloatArray, oval: FloatArray) -> FloatArray:
     """(N,) way from places (N, 2) to a closed line (M, 2), less than 0 inside."""
     ends = np.roll(oval, -1, axis=0)
     sides = ends - oval
     at = np.einsum("nmc,mc->nm", places[:, None] - oval, sides) / np.maximum((sides**2).sum(axis=1), 1e-12)
     nearest = oval + np.clip(at, 0, 1)[..., None] * sides
     way = np.linalg.norm(places[:, None] - nearest, axis=2).min(axis=1)
-    signed: Floats = np.where(points_in_polygon(places, oval), -way, way)
+    signed: FloatArray = np.where(points_in_polygon(places, oval), -way, way)
     return signed
 
 
-def _frame(size: tuple[int, int], oval: Floats, scale: float) -> Frame:
+def _frame(size: tuple[int, int], oval: FloatArray, scale: float) -> Frame:
     """Corners of the part of a picture (width, height), around the oval of a face, that may move."""
     low = np.maximum(oval.min(axis=0) - MOST_REACH * scale, -0.5)
     high = np.minimum(oval.max(axis=0) + MOST_REACH * scale, np.array(size) - 0.5)
     return low, high
 
 
-def _grids(frame: Frame, oval: Floats, near: Floats, scale: float) -> Iterator[Floats]:
+def _grids(frame: Frame, oval: FloatArray, near: FloatArray, scale: float) -> Iterator[FloatArray]:
     tree = cKDTree(near)
     for share, first, last in GRIDS:
         step, reach = share * scale, min(last, MOST_REACH) * scale
@@ -290,7 +288,7 @@ def _grids(frame: Frame, oval: Floats, near: Floats, scale: float) -> Iterator[F
         yield places[tree.query(places)[0] > GRID_CLEAR * step] if len(places) else places
 
 
-def _border(frame: Frame, scale: float) -> Floats:
+def _border(frame: Frame, scale: float) -> FloatArray:
     step = GRIDS[-1][0] * scale
     (left, top), (right, bottom) = frame
     across, down = (np.linspace(a, b, max(8, int((b - a) / step))) for a, b in ((left, right), (top, bottom)))
@@ -299,7 +297,7 @@ def _border(frame: Frame, scale: float) -> Floats:
     return np.concatenate([*rows, *columns])
 
 
-def _triangles(places: Floats, slits: Sequence[tuple[Ints, Ints]]) -> Ints:
+def _triangles(places: FloatArray, slits: Sequence[tuple[IntArray, IntArray]]) -> IntArray:
     """Triangles between places (V, 2), counter-clockwise with y up, without those within slits."""
     found = np.asarray(Delaunay(places).simplices, np.int64)
     corners = places[found]
@@ -313,11 +311,11 @@ def _triangles(places: Floats, slits: Sequence[tuple[Ints, Ints]]) -> Ints:
         within = np.array(np.isin(found, polygon).all(axis=1), bool)
         within[within] = points_in_polygon(middles[within], places[polygon])
         kept &= ~within
-    left: Ints = found[kept]
+    left: IntArray = found[kept]
     return left
 
 
-def grid_triangles(numbers: Ints) -> Ints:
+def grid_triangles(numbers: IntArray) -> IntArray:
     """Triangles of a grid of vertices (R, C), of rows from above and columns from the left, seen from ahead."""
     a, b, c, d = (part.ravel() for part in (numbers[:-1, :-1], numbers[:-1, 1:], numbers[1:, :-1], numbers[1:, 1:]))
     return np.concatenate([np.column_stack([a, c, d]), np.column_stack([a, d, b])])

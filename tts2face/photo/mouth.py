@@ -3,15 +3,11 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tts2face.models.face import Face
 from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT, UPPER_LIP_INNER_MID
-from tts2face.numeric.arrays import LUMINANCE, decode_srgb, encode_srgb, vertex_normals
+from tts2face.numeric.arrays import LUMINANCE, FloatArray, IntArray, Pixels, decode_srgb, encode_srgb, vertex_normals
 from tts2face.photo.mesh import PhotoMesh
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 PICTURED = "teeth_pictured"  # part of upper teeth that a picture shows
 TEETH, OTHERS = ("teeth_upper", "teeth_lower"), ("gums_upper", "gums_lower", "tongue")
@@ -53,22 +49,22 @@ class MouthInside:
     ``texels`` (M, 2) are places in a picture that shows the colours, if there is one.
     """
 
-    vertices: Floats
-    shapes: Floats
-    colours: Floats
-    parts: dict[str, Ints]
-    texels: Floats | None = None
+    vertices: FloatArray
+    shapes: FloatArray
+    colours: FloatArray
+    parts: dict[str, IntArray]
+    texels: FloatArray | None = None
 
     @property
-    def teeth_edge(self) -> Floats:
+    def teeth_edge(self) -> FloatArray:
         """(3,) middle of the edge of the upper teeth, mm."""
         teeth = self.vertices[np.unique(self.parts[TEETH[0] if self.texels is None else PICTURED])]
         middle = (teeth[:, 0].min() + teeth[:, 0].max()) / 2
         front = teeth[(np.abs(teeth[:, 0] - middle) < EDGE_MM) & (teeth[:, 2] > teeth[:, 2].max() - EDGE_MM)]
-        place: Floats = front[front[:, 1].argmin()] * (0, 1, 1) + (middle, 0, 0)
+        place: FloatArray = front[front[:, 1].argmin()] * (0, 1, 1) + (middle, 0, 0)
         return place
 
-    def moved(self, way: Floats) -> "MouthInside":
+    def moved(self, way: FloatArray) -> "MouthInside":
         """The parts, moved by a way (3,), mm."""
         return replace(self, vertices=self.vertices + way)
 
@@ -78,20 +74,20 @@ class MouthPlace:
     """Where the mouth of a head lies in a face: a point (3,) of the head comes to its lips' middle (3,), mm."""
 
     size: float
-    middle: Floats
-    lip: Floats
+    middle: FloatArray
+    lip: FloatArray
 
     @classmethod
-    def of(cls, head_landmarks: Floats, landmarks: Floats, *, is_parted: bool) -> "MouthPlace":
+    def of(cls, head_landmarks: FloatArray, landmarks: FloatArray, *, is_parted: bool) -> "MouthPlace":
         """Behind lips of a face with landmarks (478, 3), mm."""
         corners = [MOUTH_CORNER_RIGHT, MOUTH_CORNER_LEFT]
         wide, usual = (np.linalg.norm(np.diff(points[corners], axis=0)) for points in (landmarks, head_landmarks))
         size = float(np.clip(wide / usual * (PARTED_WIDTH if is_parted else 1.0), *WIDTH_LIMITS))
         return cls(size, head_landmarks[UPPER_LIP_INNER_MID], landmarks[UPPER_LIP_INNER_MID])
 
-    def to_face(self, points: Floats) -> Floats:
+    def to_face(self, points: FloatArray) -> FloatArray:
         """Points (..., 3) of the head in the face."""
-        placed: Floats = (points - self.middle) * self.size + self.lip - (0.0, 0.0, BEHIND_MM)
+        placed: FloatArray = (points - self.middle) * self.size + self.lip - (0.0, 0.0, BEHIND_MM)
         return placed
 
 
@@ -126,23 +122,23 @@ def head_mouth(
 class MouthLight:
     """Linear light of the teeth (3,) and of the lips (3,)."""
 
-    teeth: Floats
-    lips: Floats
+    teeth: FloatArray
+    lips: FloatArray
 
     @property
-    def dark(self) -> Floats:
+    def dark(self) -> FloatArray:
         """(3,) displayed colours behind lips that hardly part, of those in open light."""
-        share: Floats = np.divide(*self.displayed(np.stack([self.teeth * DARK_SHARE, self.teeth])))
+        share: FloatArray = np.divide(*self.displayed(np.stack([self.teeth * DARK_SHARE, self.teeth])))
         return share
 
-    def displayed(self, linear: Floats) -> Floats:
+    def displayed(self, linear: FloatArray) -> FloatArray:
         """Colours (N, 3), 0..255, of linear light (N, 3), in grey where the lips are grey."""
         hue = min(1.0, float(np.ptp(self.lips) / self.lips.max()) / LEAST_HUE)
         grey = (linear @ LUMINANCE)[:, None]
         return encode_srgb(grey + hue * (linear - grey)).astype(np.float64)
 
 
-def mouth_light(pixels: NDArray[np.uint8], landmarks: Floats, sclera: Floats) -> MouthLight:
+def mouth_light(pixels: Pixels, landmarks: FloatArray, sclera: FloatArray) -> MouthLight:
     """Light in a mouth from the colours of cheeks, lips and the white of the eyes (3,), 0..255."""
     skin, lips = cheek_light(pixels, landmarks), _median(pixels, landmarks[list(LIP_RED), :2], LIP_PX)
     white = np.maximum(decode_srgb(sclera / 255), LEAST_LIGHT)
@@ -152,12 +148,12 @@ def mouth_light(pixels: NDArray[np.uint8], landmarks: Floats, sclera: Floats) ->
     return MouthLight(bright * tint / float(tint @ LUMINANCE), lips)
 
 
-def cheek_light(pixels: NDArray[np.uint8], landmarks: Floats) -> Floats:
+def cheek_light(pixels: Pixels, landmarks: FloatArray) -> FloatArray:
     """Linear light (3,) of the cheeks of a face with landmarks (478, 2 or 3) in a picture (H, W, 3)."""
     return _median(pixels, landmarks[list(CHEEKS), :2], CHEEK_PX)
 
 
-def _median(pixels: NDArray[np.uint8], places: Floats, reach: int) -> Floats:
+def _median(pixels: Pixels, places: FloatArray, reach: int) -> FloatArray:
     """Median linear light (3,) of the pixels around places (N, 2)."""
     found = []
     for across, down in np.rint(places).astype(int):
@@ -167,7 +163,9 @@ def _median(pixels: NDArray[np.uint8], places: Floats, reach: int) -> Floats:
     return np.maximum(decode_srgb(np.median(every if len(every) else pixels.reshape(-1, 3), axis=0) / 255), LEAST_LIGHT)
 
 
-def _colours(head: Face, used: Ints, parts: dict[str, Ints], vertices: Floats, light: MouthLight) -> Floats:
+def _colours(
+    head: Face, used: IntArray, parts: dict[str, IntArray], vertices: FloatArray, light: MouthLight
+) -> FloatArray:
     """(M, 3) colours in open light, 0..255."""
     own = decode_srgb(head.colours[used] / 255.0)
     is_tooth = np.isin(np.arange(len(used)), np.concatenate([parts[name] for name in TEETH]))
@@ -192,7 +190,7 @@ def _colours(head: Face, used: Ints, parts: dict[str, Ints], vertices: Floats, l
     return light.displayed(lit)
 
 
-def mouth_walls(mesh: PhotoMesh, vertices: Floats, shapes: Floats, light: MouthLight) -> MouthInside:
+def mouth_walls(mesh: PhotoMesh, vertices: FloatArray, shapes: FloatArray, light: MouthLight) -> MouthInside:
     """Walls of a mouth, from the edges of the lips (of vertices (V, 3) and shapes (K, V, 3), mm) to the dark."""
     ring = np.concatenate([mesh.upper_lip, mesh.lower_lip[-2:0:-1]])
     n = len(ring)

@@ -8,16 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
+from tts2face.numeric.arrays import Pixels
 from tts2face.storage.pictures import open_picture
 
 if TYPE_CHECKING:
     from PIL.Image import Image as Picture
 
-
-Pixels = NDArray[np.uint8]
 
 FORMATS = ("JPEG", "PNG", "WEBP", "TIFF", "BMP", "GIF")  # of Pillow; HEIF besides
 ADVICE = "give a JPEG, PNG, WebP, HEIC or TIFF picture"

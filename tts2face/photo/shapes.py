@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tts2face.models.landmarks import (
     CHIN,
@@ -16,14 +15,11 @@ from tts2face.models.landmarks import (
     OUTER_LIP_LOWER,
     OUTER_LIP_UPPER,
 )
-from tts2face.numeric.arrays import smoothstep
+from tts2face.numeric.arrays import FloatArray, IntArray, smoothstep
 from tts2face.photo.camera import PhotoCamera
 from tts2face.photo.lines import LID_MARGINS, N_LID, N_LIP, InnerLips, spline_weights
 from tts2face.photo.mesh import LIP_RINGS, PhotoMesh
 from tts2face.photo.spreading import Spreading
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 OWN_SHAPES = ("eyeBlink", "eyeLook", "tongue")  # prefixes of the head's shapes whose skin is moved otherwise
 # Towards landmarks of the skin, of the face's oval, of brows, the folds above the eyes, and lips and lids.
@@ -70,7 +66,7 @@ class PhotoPerson:
     """A person in a picture: its size (width, height), landmarks (478, 3) in pixels and depths, lips, and smile."""
 
     size: tuple[int, int]
-    landmarks: Floats
+    landmarks: FloatArray
     lips: InnerLips
     smile: float
     scale: float
@@ -87,8 +83,8 @@ class PhotoPerson:
 
 
 def face_shapes(
-    mesh: PhotoMesh, spreading: Spreading, motion: Mapping[str, Floats], person: PhotoPerson
-) -> dict[str, Floats]:
+    mesh: PhotoMesh, spreading: Spreading, motion: Mapping[str, FloatArray], person: PhotoPerson
+) -> dict[str, FloatArray]:
     """Displacements (V, 3) of a mesh by the motion (478, 3) of the head's landmarks in each shape, mm."""
     names = [name for name in motion if not name.startswith(OWN_SHAPES)]
     moved = np.stack([motion[name] for name in names], axis=1)
@@ -96,7 +92,7 @@ def face_shapes(
         for pair in brow:
             moved[list(pair)] = moved[list(pair)].mean(axis=0)
     of_lip, of_lid = spline_weights(len(INNER_LIP_UPPER), N_LIP), spline_weights(len(LID_MARGINS[0][0]), N_LID)
-    lines: list[tuple[Ints, Floats, Sequence[int]]] = [
+    lines: list[tuple[IntArray, FloatArray, Sequence[int]]] = [
         (mesh.upper_lip, of_lip, INNER_LIP_UPPER),
         (mesh.lower_lip, of_lip, INNER_LIP_LOWER),
     ]
@@ -121,13 +117,13 @@ def face_shapes(
     return {name: found[:, number] for number, name in enumerate(names)}
 
 
-def _still(mesh: PhotoMesh, way: float, others: Sequence[Ints]) -> Ints:
+def _still(mesh: PhotoMesh, way: float, others: Sequence[IntArray]) -> IntArray:
     """Vertices that lie farther from the face than a way, or at the edge of the picture, without others."""
     far = np.union1d(np.flatnonzero(mesh.outside > way), mesh.border)
     return np.setdiff1d(far, np.concatenate(others))
 
 
-def blink(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson, eye: int) -> Floats:
+def blink(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson, eye: int) -> FloatArray:
     """(V, 3) displacement that shuts an eye, pixels and depths."""
     points = np.column_stack([mesh.places, np.zeros(len(mesh.places))])
     points[mesh.known, 2] = mesh.depths
@@ -137,7 +133,7 @@ def blink(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson, eye: int) 
     along = upper[-1, :2] - upper[0, :2]
     at_line = (upper[:, :2] - upper[0, :2]) @ along / (along @ along)
     vertex_of = mesh.vertex_of
-    found: dict[int, Floats] = dict(zip(mesh.upper_lids[eye].tolist(), ways["upper"], strict=True))
+    found: dict[int, FloatArray] = dict(zip(mesh.upper_lids[eye].tolist(), ways["upper"], strict=True))
     found |= dict(zip(mesh.lower_lids[eye].tolist(), ways["lower"], strict=True))
     for row in mesh.bands[eye]:
         found |= dict(zip(row.tolist(), ways["upper"][1:-1], strict=True))
@@ -160,13 +156,13 @@ def blink(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson, eye: int) 
     return spreading.exact(np.array(list(found)), np.array(list(found.values())))
 
 
-def closing(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson) -> Floats:
+def closing(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson) -> FloatArray:
     """(V, 3) displacement that closes the lips of the picture, pixels and depths."""
     if person.lips.is_closed:
         return np.zeros((len(mesh.places), 3))
     ways = person.lips.lower - person.lips.upper
     numbers = np.arange(N_LIP)
-    follow: dict[int, Floats] = {}
+    follow: dict[int, FloatArray] = {}
     vertex_of = mesh.vertex_of
     at_landmark = np.linspace(0, N_LIP - 1, len(INNER_LIP_UPPER))
     for line, outer, ring, share, near, far in (
@@ -191,15 +187,15 @@ def closing(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson) -> Float
 class HeadRegion:
     """Where the head lies in a picture: ellipse and neck."""
 
-    across: Floats
-    down: Floats
-    middle: Floats
+    across: FloatArray
+    down: FloatArray
+    middle: FloatArray
     half_axes: tuple[float, float, float]
-    chin: Floats
+    chin: FloatArray
     width: float
 
     @classmethod
-    def of(cls, landmarks: Floats) -> "HeadRegion":
+    def of(cls, landmarks: FloatArray) -> "HeadRegion":
         """Region of landmarks (478, 2 or 3), pixels."""
         top, chin = landmarks[TOP, :2], landmarks[CHIN, :2]
         height = float(np.linalg.norm(chin - top))
@@ -211,16 +207,16 @@ class HeadRegion:
             np.array([down[1], -down[0]]), down, middle, (side * width, up * height, below * height), chin, width
         )
 
-    def radius(self, places: Floats) -> Floats:
+    def radius(self, places: FloatArray) -> FloatArray:
         """(N,) way of places (N, 2) from the middle of the head in its half axes."""
         off = places - self.middle
         side, up, below = self.half_axes
         across, down = off @ self.across, off @ self.down
-        found: Floats = np.hypot(across / side, np.where(down < 0, down / up, down / below))
+        found: FloatArray = np.hypot(across / side, np.where(down < 0, down / up, down / below))
         return found
 
 
-def head_follow(mesh: PhotoMesh, person: PhotoPerson) -> Floats:
+def head_follow(mesh: PhotoMesh, person: PhotoPerson) -> FloatArray:
     """(V,) share of the head's motion that vertices follow."""
     region, scale = HeadRegion.of(person.landmarks), person.scale
     follow = 1 - smoothstep(region.radius(mesh.places), *HEAD_FADE)
@@ -232,14 +228,14 @@ def head_follow(mesh: PhotoMesh, person: PhotoPerson) -> Floats:
     return np.where(mesh.outside <= 0, 1.0, follow) * edge_share(mesh, person)
 
 
-def edge_share(mesh: PhotoMesh, person: PhotoPerson) -> Floats:
+def edge_share(mesh: PhotoMesh, person: PhotoPerson) -> FloatArray:
     """(V,) 1 in what may move of the picture, falling to 0 at its edges."""
     low, high = mesh.frame
     inside = np.minimum(mesh.places - low, high - mesh.places).min(axis=1)
     return smoothstep(np.maximum(inside - EDGE_STILL_PX, 0.0) / person.scale, 0.0, EDGE_FADE)
 
 
-def breathing(mesh: PhotoMesh, person: PhotoPerson, follow: Floats, px_per_mm: float) -> Floats:
+def breathing(mesh: PhotoMesh, person: PhotoPerson, follow: FloatArray, px_per_mm: float) -> FloatArray:
     """(V, 3) rise of the shoulders, pixels and depths."""
     region = HeadRegion.of(person.landmarks)
     below = (mesh.places - region.chin) @ region.down / person.scale
@@ -247,11 +243,13 @@ def breathing(mesh: PhotoMesh, person: PhotoPerson, follow: Floats, px_per_mm: f
     share = smoothstep(below, *SHOULDERS) * (1 - smoothstep(below, *BELOW_SHOULDERS))
     share *= (1 - follow) * (1 - smoothstep(aside, *BESIDE_SHOULDERS))
     rise = BREATH_MM * px_per_mm * np.append(-region.down, 0.0)
-    found: Floats = (share * edge_share(mesh, person))[:, None] * rise
+    found: FloatArray = (share * edge_share(mesh, person))[:, None] * rise
     return found
 
 
-def depths(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson, camera: PhotoCamera, pivot: Floats) -> Floats:
+def depths(
+    mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson, camera: PhotoCamera, pivot: FloatArray
+) -> FloatArray:
     """(V,) depths of all vertices: of the background, a little before the pivot of the head."""
     scale = person.scale
     behind = camera.to_pixels(pivot[None])[0, 2] + BACKGROUND_DEPTH * scale
@@ -261,5 +259,5 @@ def depths(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson, camera: P
     pulls = np.concatenate([np.where(at_rim, RIM_DEPTH_PULL, DEPTH_PULL), np.full(len(far), DEPTH_PULL)])
     values = np.concatenate([mesh.depths, np.full(len(far), behind)])
     found = spreading.near(np.concatenate([mesh.known, far]), values, pulls)
-    bounded: Floats = np.maximum(found, behind - BEYOND_DEPTH * scale)
+    bounded: FloatArray = np.maximum(found, behind - BEYOND_DEPTH * scale)
     return bounded

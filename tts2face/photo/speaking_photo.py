@@ -16,6 +16,7 @@ from tts2face.models.face import Face, FacePart
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.light import Photographed
 from tts2face.models.photo_view import PhotoView
+from tts2face.numeric.arrays import Float32Array, FloatArray, IntArray, Pixels
 from tts2face.photo.camera import PhotoCamera, find_camera
 from tts2face.photo.eyes import EYE_BEHIND_MM, SIDES, EyePatch, eye_patches, gaze_shapes
 from tts2face.photo.fit import NOTHING_GIVEN, PhotoFit, PhotoPlaces
@@ -40,9 +41,6 @@ from tts2face.photo.surface import (
 )
 from tts2face.photo.teeth import OwnTeeth, find_teeth, teeth_and_tongue
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 BREATH = "breath"
 SMILE_KEPT = 0.6  # of a smile with parted lips, while they speak
 INTO_LIP = 0.012  # of the eye distance, by which the edges of parted lips are taken from within the lip
@@ -55,14 +53,14 @@ class _Model:
     """The shipped head without hair, its landmarks (478, 3), mm, and the names of the shapes of photographed faces."""
 
     head: Face
-    landmarks: Floats
+    landmarks: FloatArray
     names: tuple[str, ...]
 
     @classmethod
     def of(cls, head: Face) -> "_Model":
         return cls(head, scatter_landmarks(head, landmark_positions(head)), (*head.shape_names, BREATH))
 
-    def motion(self) -> dict[str, Floats]:
+    def motion(self) -> dict[str, FloatArray]:
         """(478, 3) motion of the landmarks in each shape, mm; 0 for those that the head lacks."""
         moved = landmark_motion(self.head, np.arange(len(self.head.shapes)))
         spread = np.nan_to_num(scatter_landmarks(self.head, moved))
@@ -79,14 +77,14 @@ class Traced:
     model: _Model
     seen: PhotographedFace
     camera: PhotoCamera
-    landmarks: Floats
+    landmarks: FloatArray
     given: PhotoPlaces
     person: PhotoPerson
     lids: LidLines
-    pivot: Floats
+    pivot: FloatArray
 
     @property
-    def pixels(self) -> NDArray[np.uint8]:
+    def pixels(self) -> Pixels:
         """(H, W, 3) of the picture."""
         return self.seen.picture.pixels
 
@@ -96,9 +94,9 @@ class Skinned(Traced):
     """The face with its skin: a mesh over the picture, pixels and depths (V, 3) of it, its motion and its creases."""
 
     mesh: PhotoMesh
-    photo: Floats
+    photo: FloatArray
     skin: Vertices
-    creases: Floats
+    creases: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -116,7 +114,7 @@ class Laid(Pictured):
 
     surface: PhotoSurface
     corners: NDArray[np.int32]
-    weights: NDArray[np.float32]
+    weights: Float32Array
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -124,7 +122,7 @@ class Filled(Laid):
     """The face with a mouth, and the place (3,) of the edge of its upper teeth."""
 
     mouth: MouthRows
-    teeth_edge: Floats
+    teeth_edge: FloatArray
 
 
 Step = TypeVar("Step", bound=Traced)
@@ -278,7 +276,7 @@ def _face(face: Filled, metadata: Mapping[str, Any]) -> Face:
     )
 
 
-def _view(picture: Photograph, camera: PhotoCamera, follow: Floats, pages: PhotoPages) -> PhotoView:
+def _view(picture: Photograph, camera: PhotoCamera, follow: FloatArray, pages: PhotoPages) -> PhotoView:
     high, wide = picture.pixels.shape[:2]
     lens = np.array([camera.focal_px, *camera.origin])
     rounded = np.rint(follow * FOLLOW_STEPS) / FOLLOW_STEPS
@@ -295,7 +293,7 @@ def _parts(surface: PhotoSurface) -> tuple[FacePart, ...]:
     return tuple(parts)
 
 
-def _skin(mesh: PhotoMesh, person: PhotoPerson, camera: PhotoCamera, model: _Model) -> tuple[Floats, Vertices]:
+def _skin(mesh: PhotoMesh, person: PhotoPerson, camera: PhotoCamera, model: _Model) -> tuple[FloatArray, Vertices]:
     """Pixels and depths (V, 3) of the picture, and vertices of its skin with closed lips."""
     spreading = Spreading(mesh.places, mesh.triangles, person.scale)
     found = face_shapes(mesh, spreading, model.motion(), person)
@@ -317,7 +315,7 @@ def _skin(mesh: PhotoMesh, person: PhotoPerson, camera: PhotoCamera, model: _Mod
     return photo, Vertices(rest, np.stack([found.get(name, zero) for name in model.names]), follow)
 
 
-def _shown_places(mesh: PhotoMesh, person: PhotoPerson) -> Floats:
+def _shown_places(mesh: PhotoMesh, person: PhotoPerson) -> FloatArray:
     """(V, 2) pixels that vertices show: their own, and some way into the lip at the edges of parted lips."""
     places = mesh.places.copy()
     if not person.lips.is_closed:
@@ -329,7 +327,7 @@ def _shown_places(mesh: PhotoMesh, person: PhotoPerson) -> Floats:
     return places
 
 
-def _before_person(patch: EyePatch, picture: Photograph) -> Ints:
+def _before_person(patch: EyePatch, picture: Photograph) -> IntArray:
     """Triangles (M, 3) of an eye that lie within the person of a picture: large eyes reach beyond the cheeks."""
     if picture.alpha is None:
         return patch.triangles
@@ -337,7 +335,7 @@ def _before_person(patch: EyePatch, picture: Photograph) -> Ints:
     return np.asarray(patch.triangles[(picture.alpha[down, across] == OPAQUE)[patch.triangles].all(axis=1)])
 
 
-def _eye_vertices(patch: EyePatch, eye: int, photo: Floats, camera: PhotoCamera, model: _Model) -> Vertices:
+def _eye_vertices(patch: EyePatch, eye: int, photo: FloatArray, camera: PhotoCamera, model: _Model) -> Vertices:
     """Vertices of a patch behind the skin around it, which is given by the pixels and depths (V, 3) of all skin."""
     away, near = cKDTree(photo[:, :2]).query(patch.places, N_NEAR)
     shares = 1 / (np.asarray(away) + 1)
@@ -349,7 +347,7 @@ def _eye_vertices(patch: EyePatch, eye: int, photo: Floats, camera: PhotoCamera,
     return Vertices(places, shapes, np.ones(len(places)))
 
 
-def _add_inside(surface: PhotoSurface, inside: MouthInside, pages: PhotoPages) -> tuple[Ints, Floats]:
+def _add_inside(surface: PhotoSurface, inside: MouthInside, pages: PhotoPages) -> tuple[IntArray, FloatArray]:
     """Vertices (N,) of what lies in the mouth, and their colours (N, 3) in open light."""
     n = len(inside.vertices)
     shapes = np.zeros((surface.vertices[0].shapes.shape[0], n, 3))

@@ -1,12 +1,10 @@
 """Displacements of a mesh that are known at some vertices, spread smoothly over the others."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from tts2face.numeric.arrays import FloatArray, IntArray
 
 LEAST_LENGTH = 0.004  # of an edge, of the size of the face: shorter ones weigh no more
 RIDGE = 1e-9  # so that pieces of the mesh where nothing is known have a solution
@@ -28,7 +26,7 @@ class Spreading:
     Source: Sorkine et al. 2004, Laplacian surface editing.
     """
 
-    def __init__(self, places: Floats, triangles: Ints, scale: float) -> None:
+    def __init__(self, places: FloatArray, triangles: IntArray, scale: float) -> None:
         edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
         edges = np.unique(np.sort(edges, axis=1), axis=0)
         lengths = np.linalg.norm(places[edges[:, 0]] - places[edges[:, 1]], axis=1) / scale
@@ -42,7 +40,7 @@ class Spreading:
         self._n = n
         self._bending = (laplacian.T @ laplacian).tocsr()
 
-    def exact(self, vertices: Ints, values: Floats) -> Floats:
+    def exact(self, vertices: IntArray, values: FloatArray) -> FloatArray:
         """(V, ...) values that are those given (N, ...) at vertices (N,)."""
         n = self._n
         found = np.zeros((n, values[0].size))
@@ -53,7 +51,9 @@ class Spreading:
         found[free] = _solved(inside, -(system[:, vertices] @ found[vertices]))
         return found.reshape(n, *values.shape[1:])
 
-    def near(self, vertices: Ints, values: Floats, weights: Floats, still: Ints | None = None) -> Floats:
+    def near(
+        self, vertices: IntArray, values: FloatArray, weights: FloatArray, still: IntArray | None = None
+    ) -> FloatArray:
         """(V, ...) values near those given (N, ...) at vertices (N,), by weights (N,); 0 at those that are still."""
         n = self._n
         pull, wanted = np.zeros(n), np.zeros((n, values[0].size))
@@ -66,7 +66,7 @@ class Spreading:
         return found.reshape(n, *values.shape[1:])
 
 
-def _solved(system: sparse.csc_matrix, values: Floats) -> Floats:
+def _solved(system: sparse.csc_matrix, values: FloatArray) -> FloatArray:
     """Solution (N, K) of a symmetric system, whose own order keeps its factors sparse, for values (N, K).
 
     One column after the other: all at once go through a threaded BLAS, which takes eight times as long.

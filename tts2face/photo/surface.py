@@ -8,13 +8,12 @@ from numpy.typing import NDArray
 
 from tts2face.models.baked_light import LEAST_SIDE
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
+from tts2face.numeric.arrays import Float32Array, FloatArray, IntArray, Mask, Pixels
 from tts2face.photo.eyes import IRISES, EyePatch
 from tts2face.photo.lines import LID_MARGINS, N_LID, N_LIP
 from tts2face.photo.mesh import PhotoMesh, grid_triangles
 from tts2face.photo.teeth import OwnTeeth
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 SKIN, LIDS, EYES = "skin", "lids", "eyes"  # parts, of which the first two show the picture itself
 PAGE_MARGIN = 1 / 64  # of a page, beyond what it shows: the places nearest to its edges are not read
 BETWEEN_PX = 4  # of patches on their page
@@ -28,9 +27,9 @@ SHOWN_ABOVE = 0.018  # of the eye distance above the fold, whose skin a lid show
 class Vertices:
     """Places (V, 3), mm, shapes (K, V, 3), and share of the head's motion (V,) of vertices."""
 
-    places: Floats
-    shapes: Floats
-    follow: Floats
+    places: FloatArray
+    shapes: FloatArray
+    follow: FloatArray
 
     def between(self, others: "Vertices", share: float) -> "Vertices":
         """Vertices on the way to others (V, 3)."""
@@ -42,7 +41,7 @@ class Vertices:
         )
         return Vertices(*mixed)
 
-    def at(self, numbers: Ints) -> "Vertices":
+    def at(self, numbers: IntArray) -> "Vertices":
         """Those of some numbers (N,)."""
         return Vertices(self.places[numbers], self.shapes[:, numbers], self.follow[numbers])
 
@@ -52,16 +51,16 @@ class PhotoSurface:
     """Parts that are added one after the other."""
 
     vertices: list[Vertices] = field(default_factory=list)
-    uv: list[Floats] = field(default_factory=list)
-    colours: list[Floats] = field(default_factory=list)
-    parts: list[tuple[str, Ints]] = field(default_factory=list)
+    uv: list[FloatArray] = field(default_factory=list)
+    colours: list[FloatArray] = field(default_factory=list)
+    parts: list[tuple[str, IntArray]] = field(default_factory=list)
 
     @property
     def count(self) -> int:
         """Number of vertices."""
         return sum(len(part.places) for part in self.vertices)
 
-    def add(self, vertices: Vertices, *, uv: Floats | None = None, colours: Floats | None = None) -> Ints:
+    def add(self, vertices: Vertices, *, uv: FloatArray | None = None, colours: FloatArray | None = None) -> IntArray:
         """Numbers (N,) of added vertices, with places in their page (N, 2) or colours (N, 3)."""
         n = len(vertices.places)
         first = self.count
@@ -71,7 +70,7 @@ class PhotoSurface:
         return first + np.arange(n)
 
     @property
-    def places(self) -> Floats:
+    def places(self) -> FloatArray:
         """Places (V, 3) of all vertices, mm."""
         return np.concatenate([part.places for part in self.vertices])
 
@@ -84,7 +83,7 @@ class PhotoSurface:
         )
 
 
-def moves(vertices: Vertices) -> NDArray[np.bool_]:
+def moves(vertices: Vertices) -> Mask:
     """(V,) whether vertices move with a shape or with the head."""
     return np.asarray((np.abs(vertices.shapes).max(axis=(0, 2)) > MOVED) | (vertices.follow > MOVED))
 
@@ -96,20 +95,18 @@ class PhotoPages:
     ``corner`` (2,) and ``patch_corners`` are the pixels of the picture that would lie at the left top of the pages.
     """
 
-    pages: NDArray[np.uint8]
-    corner: Floats
-    patch_corners: Sequence[Floats]
+    pages: Pixels
+    corner: FloatArray
+    patch_corners: Sequence[FloatArray]
 
-    def uv(self, places: Floats, corner: Floats | None = None) -> Floats:
+    def uv(self, places: FloatArray, corner: FloatArray | None = None) -> FloatArray:
         """(N, 2) places in a page of pixels (N, 2) of the picture."""
         size = np.array(self.pages.shape[2:0:-1], np.float64)
-        found: Floats = (places - (self.corner if corner is None else corner) + 0.5) / size
+        found: FloatArray = (places - (self.corner if corner is None else corner) + 0.5) / size
         return found.clip(0, 1)
 
 
-def lay_pages(
-    pixels: NDArray[np.uint8], mesh: PhotoMesh, is_moving: NDArray[np.bool_], patches: Sequence[EyePatch | OwnTeeth]
-) -> PhotoPages:
+def lay_pages(pixels: Pixels, mesh: PhotoMesh, is_moving: Mask, patches: Sequence[EyePatch | OwnTeeth]) -> PhotoPages:
     """Pages of a picture (H, W, 3) whose vertices (V,) move, and of patches."""
     shown = mesh.places[mesh.triangles[is_moving[mesh.triangles].any(axis=1)]].reshape(-1, 2)
     low = np.clip(np.floor(shown.min(axis=0)).astype(int) - 2, 0, None)
@@ -155,8 +152,8 @@ def add_lids(surface: PhotoSurface, mesh: PhotoMesh, pages: PhotoPages, scale: f
 
 
 def place_landmarks(
-    mesh: PhotoMesh, landmarks: Floats, eyes: Sequence[tuple[EyePatch, Ints]]
-) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    mesh: PhotoMesh, landmarks: FloatArray, eyes: Sequence[tuple[EyePatch, IntArray]]
+) -> tuple[NDArray[np.int32], Float32Array]:
     """Three vertices (478, 3) and their weights for each landmark (478, 2 or more), pixels.
 
     Eyes are given with the numbers of their vertices.
@@ -179,7 +176,7 @@ def place_landmarks(
 
 def _vertices(mesh: PhotoMesh) -> Mapping[int, int]:
     """Vertices that are landmarks: their own, and those of lips and lids on the lines through them."""
-    lines: list[tuple[Ints, Sequence[int], int]] = [
+    lines: list[tuple[IntArray, Sequence[int], int]] = [
         (mesh.upper_lip, INNER_LIP_UPPER, (N_LIP - 1) // (len(INNER_LIP_UPPER) - 1)),
         (mesh.lower_lip, INNER_LIP_LOWER, (N_LIP - 1) // (len(INNER_LIP_LOWER) - 1)),
     ]
@@ -192,7 +189,7 @@ def _vertices(mesh: PhotoMesh) -> Mapping[int, int]:
     return mesh.vertex_of | on_lines
 
 
-def _triangle_around(place: Floats, places: Floats, triangles: Ints) -> tuple[Ints, Floats]:
+def _triangle_around(place: FloatArray, places: FloatArray, triangles: IntArray) -> tuple[IntArray, FloatArray]:
     """Corners (3,) of the triangle around a place (2,), or nearest to it, and the weights of the place in it."""
     a, b, c = (places[triangles[:, k]] for k in range(3))
     first, second, off = b - a, c - a, place - a

@@ -4,24 +4,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
 from lexicon.errors import DataError
 from tts2face.face.landmarks import landmark_positions, scatter_landmarks
 from tts2face.models.face import Face
 from tts2face.models.landmarks import UPPER_LIP_INNER_MID
-from tts2face.numeric.arrays import decode_srgb, encode_srgb, points_in_polygon, smoothstep
+from tts2face.numeric.arrays import FloatArray, Mask, Pixels, decode_srgb, encode_srgb, points_in_polygon, smoothstep
 from tts2face.photo.camera import TO_CAMERA, PhotoCamera, find_camera
 from tts2face.photo.found_face import FoundFace, PhotoReader
 from tts2face.photo.lines import LEAST_LIP_BLUR_PX, InnerLips, cheapest_path, colours_at, find_lip_line, lab_at
 from tts2face.photo.mesh import LIP_RINGS, grid_triangles
 from tts2face.photo.mouth import CHEEKS, PICTURED, TEETH, MouthInside, MouthLight, MouthPlace, cheek_light, head_mouth
 from tts2face.video.pose import rigid_points, similarity_transforms
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 UPPER = TEETH[0]  # of the head
 HALF_WIDTH_MM, AROUND_MM = 26.0, 3.0  # that are searched: to either side, and above and below the opening
@@ -83,28 +78,28 @@ class OwnTeeth:
         Linear light of the teeth and of the cheeks.
     """
 
-    picture: NDArray[np.uint8]
+    picture: Pixels
     left: float
     top: float
     step: float
-    across: Floats
-    edge: Floats
+    across: FloatArray
+    edge: FloatArray
     ends_in_lip: bool
-    light: Floats
-    skin: Floats
+    light: FloatArray
+    skin: FloatArray
 
     @property
     def corner(self) -> tuple[int, int]:
         """Its left top pixel, where its own pixels are counted from."""
         return (0, 0)
 
-    def in_light_of(self, skin: Floats) -> "OwnTeeth":
+    def in_light_of(self, skin: FloatArray) -> "OwnTeeth":
         """The teeth as they are beside cheeks of a linear light (3,)."""
         gain = np.clip(skin / self.skin, *LIGHT_GAIN)
         picture = encode_srgb(decode_srgb(self.picture / 255) * gain)
         return replace(self, picture=picture, light=self.light * gain, skin=self.skin * gain)
 
-    def texels(self, across: Floats, up: Floats) -> Floats:
+    def texels(self, across: FloatArray, up: FloatArray) -> FloatArray:
         """(N, 2) places in the picture of places along and up, mm."""
         return np.column_stack([(across - self.left) / self.step, (self.top - up) / self.step])
 
@@ -114,8 +109,8 @@ class UpperTeeth:
     """Front of the upper teeth of a head: height of their edges, and depths (N,) at ways (N,) from the middle, mm."""
 
     edge: float
-    ways: Floats
-    depths: Floats
+    ways: FloatArray
+    depths: FloatArray
 
     @classmethod
     def of(cls, head: Face) -> "UpperTeeth":
@@ -126,14 +121,12 @@ class UpperTeeth:
         depths = [teeth[np.abs(np.abs(teeth[:, 0]) - way) < ARCH_STEP_MM, 2].max() for way in ways]
         return cls(float(teeth[:, 1].min()), ways, gaussian_filter(np.array(depths), 1.0, mode="nearest"))
 
-    def points(self, across: Floats, up: Floats) -> Floats:
+    def points(self, across: FloatArray, up: FloatArray) -> FloatArray:
         """(..., 3) points on the front of the teeth."""
         return np.stack([across, up, np.interp(np.abs(across), self.ways, self.depths)], axis=-1)
 
 
-def find_teeth(
-    pixels: NDArray[np.uint8], face: FoundFace, lips: InnerLips, camera: PhotoCamera, head: Face
-) -> OwnTeeth | None:
+def find_teeth(pixels: Pixels, face: FoundFace, lips: InnerLips, camera: PhotoCamera, head: Face) -> OwnTeeth | None:
     """Upper teeth between the lips of a face in a picture (H, W, 3); None where too little of them is seen."""
     if lips.is_closed:
         return None
@@ -185,9 +178,7 @@ def _unlikeness(face: FoundFace, other: FoundFace) -> float:
 class _View:
     """Teeth of a picture in the axes of the head."""
 
-    def __init__(
-        self, pixels: NDArray[np.uint8], face: FoundFace, lips: InnerLips, camera: PhotoCamera, arch: UpperTeeth
-    ) -> None:
+    def __init__(self, pixels: Pixels, face: FoundFace, lips: InnerLips, camera: PhotoCamera, arch: UpperTeeth) -> None:
         self._pixels, self._camera, self._arch = pixels, camera, arch
         self._opening = np.concatenate([lips.upper, lips.lower[::-1]])[:, :2]
         self._blur = max(LEAST_LIP_BLUR_PX, TEETH_BLUR * face.eye_distance_px)
@@ -201,21 +192,21 @@ class _View:
         middle = camera.to_head(camera.depths_of(face.landmarks[[UPPER_LIP_INNER_MID]]))
         self._middle = float(middle[0, 0])
 
-    def _places(self, across: Floats, up: Floats) -> Floats:
+    def _places(self, across: FloatArray, up: FloatArray) -> FloatArray:
         """(R, C, 2) pixels of a grid of places along (C,) and up (R,), mm."""
         grid = np.stack(np.broadcast_arrays(across[None], up[:, None]), axis=-1).astype(np.float64)
         points = self._arch.points(grid[..., 0], grid[..., 1])
         points[..., 0] += self._middle
         return self._camera.to_pixels(points.reshape(-1, 3))[:, :2].reshape(grid.shape)
 
-    def _sampled(self, places: Floats) -> Floats:
+    def _sampled(self, places: FloatArray) -> FloatArray:
         """(..., 3) colours at pixels (..., 2)."""
         return colours_at(self._pixels.astype(np.float64), places)
 
-    def _is_open(self, places: Floats) -> Mask:
+    def _is_open(self, places: FloatArray) -> Mask:
         return points_in_polygon(places.reshape(-1, 2), self._opening).reshape(places.shape[:-1])
 
-    def heights(self, across: Floats) -> Floats:
+    def heights(self, across: FloatArray) -> FloatArray:
         """(R,) heights that are searched, downwards, mm: those of the opening at places across (C,)."""
         up = np.arange(self._arch.edge + HIGHEST_MM, self._arch.edge - LOWEST_MM, -ROW_MM)
         is_row = self._is_open(self._places(across, up)).any(axis=1)
@@ -223,7 +214,7 @@ class _View:
         rows = np.flatnonzero(is_row) if is_row.any() else np.arange(2 * around)
         return up[max(rows[0] - around, 0) : rows[-1] + around + 1]
 
-    def likeness(self, across: Floats, up: Floats) -> tuple[Floats, Floats]:
+    def likeness(self, across: FloatArray, up: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(R, C) likeness to teeth of what is seen between the lips, and its lightness."""
         places = self._places(across, up)
         colours = lab_at(self._pixels, places, self._blur)
@@ -236,18 +227,18 @@ class _View:
             alike = alike * smoothstep(bright / brightest, *LEAST_BRIGHT)
         return alike, np.where(is_open, bright, np.nan)
 
-    def opening(self, across: Floats, up: Floats) -> tuple[Floats, Floats]:
+    def opening(self, across: FloatArray, up: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Heights (C,) of the edges of the upper and the lower lip, mm."""
         is_open = self._is_open(self._places(across, up))
         first, last = is_open.argmax(axis=0), len(up) - 1 - is_open[::-1].argmax(axis=0)
         return up[first], up[last]
 
-    def completed(self, across: Floats, edge: Floats, *, ends_in_lip: bool) -> OwnTeeth:
+    def completed(self, across: FloatArray, edge: FloatArray, *, ends_in_lip: bool) -> OwnTeeth:
         """Teeth whose edges are seen at places (N,), with their mirror image beyond and gums above them."""
         step = 1 / float(np.clip(TEXELS_A_PIXEL * self._camera.scale, *TEXELS_MM))
         reach = float(np.abs(across).max())
         n = int(np.ceil(reach / step))
-        columns: Floats = step * np.arange(-n, n + 1, dtype=np.float64)
+        columns: FloatArray = step * np.arange(-n, n + 1, dtype=np.float64)
         own = (columns >= across[0]) & (columns <= across[-1])
         line = np.interp(columns, across, edge)
         ends = np.where(
@@ -286,7 +277,7 @@ class _View:
         )
 
 
-def _mirror_gain(colours: Floats, is_seen: Mask, columns: Floats) -> float:
+def _mirror_gain(colours: FloatArray, is_seen: Mask, columns: FloatArray) -> float:
     """How bright colours (R, C, 3) of teeth are near the end of the side of which less is seen, over the other side."""
     shown = columns[is_seen.any(axis=0)]
     if not len(shown):
@@ -331,7 +322,7 @@ def teeth_and_tongue(head: Face, place: MouthPlace, light: MouthLight, teeth: Ow
     return [sheet, others]
 
 
-def _edges(likeness: Floats, bright: Floats, up: Floats) -> tuple[Floats, Floats, Floats]:
+def _edges(likeness: FloatArray, bright: FloatArray, up: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Edge, height over it and top (C,) of the upper teeth in columns of likeness (R, C) at heights (R,), mm."""
     likeness = _first_run(likeness)
     over, under = round(OVER_EDGE_MM / ROW_MM), round(UNDER_EDGE_MM / ROW_MM)
@@ -350,14 +341,14 @@ def _edges(likeness: Floats, bright: Floats, up: Floats) -> tuple[Floats, Floats
     return edge, is_tooth.sum(axis=0) * ROW_MM, top
 
 
-def _first_run(likeness: Floats) -> Floats:
+def _first_run(likeness: FloatArray) -> FloatArray:
     """Likeness (R, C) of the first teeth from above alone: below them lie the lower ones, or the tongue."""
     has_begun = np.cumsum(likeness, axis=0) * ROW_MM >= LEAST_AT_SIDE_MM
     has_ended = np.logical_or.accumulate(has_begun & (likeness < GAP_LIKENESS), axis=0)
     return np.where(has_ended, 0.0, likeness)
 
 
-def _middle_row(is_seen: Mask, across: Floats) -> Mask:
+def _middle_row(is_seen: Mask, across: FloatArray) -> Mask:
     """(C,) which columns belong to the row of teeth in the middle."""
     kept = np.zeros(len(across), bool)
     for side in (1, -1):
