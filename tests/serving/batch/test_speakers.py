@@ -141,6 +141,18 @@ def test_a_sign_that_is_left_out_changes_no_face(plan_of: Planner) -> None:
     assert [line.casting.other for line in plan_of(content, name="one.ass").lines if line.segment] == [0]
 
 
+def test_words_of_no_length_are_of_one_person(plan_of: Planner) -> None:
+    content = "".join(
+        f"{number}\n00:00:0{begin} --> 00:00:0{end}\n{word}\n\n"
+        for number, (begin, end, word) in enumerate(
+            [("1,0", "1,5", "Come"), ("1,5", "1,5", "with"), ("1,5", "2,5", "me"), ("2,5", "3,5", "now.")], start=1
+        )
+    )
+    lines = plan_of(content, per="file").lines
+    assert [line.casting.other for line in lines] == [0, 0, 0, 0]
+    assert len({line.segment.request["text"] for line in lines if line.segment}) == 1  # one sentence, cut at its words
+
+
 def test_speakers_can_be_read_as_words(plan_of: Planner) -> None:
     plan = plan_of(speakers=False)
     assert next((line.speaker, line.text) for line in plan.lines) == ("", "ANN: Hello there.")

@@ -154,7 +154,7 @@ class FilePlan:
         fps = exact_rate(self.base.request.fps)
         self._lines = [line for cue in cues for line in cue_lines(cue)]
         for _, group in groupby(self._lines, key=lambda line: round(line[0].begin_s * float(fps))):
-            self.speakers.tell_apart([line for line in group if not line[0].kind or self.speakers.is_spoken(*line)])
+            self.speakers.tell_apart(list(group))
         margins = (MARGIN_S, MARGIN_S) if self.recordings.track else (self.base.lead, 0.0)
         before, after = (round(margin * fps) for margin in margins)
         windows = cue_windows(cues, fps, (before, after), is_spoken=self.speakers.is_spoken, rate_of=self._rate_of)

@@ -64,7 +64,9 @@ class Speakers:
         """Note the lines of one instant, with their parts: several speakers without a role do not look alike."""
         strangers: list[str] = []
         for number, (cue, part) in enumerate(group):
-            if self.cast.role_of(cue, self.names[0]) is not None:
+            # nobody says a sign, and a word without a length comes before the next one of the same person
+            is_alone = (cue.has_estimated_end and not part) or (cue.kind and not self.is_spoken(cue, part))
+            if is_alone or self.cast.role_of(cue, self.names[0]) is not None:
                 continue
             who = cue.speaker or f"{number}"  # nobody without a name speaks twice at once
             if who not in strangers:
