@@ -6,14 +6,20 @@ other.
 """
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from lexicon.dictionary import word_key, word_set
 from lexicon.ipa import IpaPhone, parse_ipa
+from lexicon.phones import PHONES
 from lexicon.written_forms import read_table
 
 _DEMONSTRATIVE_BEFORE = word_set("of for with at like about after before in on by from than")
 _DEMONSTRATIVE_AFTER = word_set("is was will would could may might must one sounds looks means makes")
+# Last phones that a word does not have before a consonant, and before a vowel (Roach 2009, ch. 12; Wells 2008): a sound
+# decides badly between them, as both are short and take the place of the next sound (decision 235).
+_NOT_BEFORE_CONSONANT = {"the": frozenset({"i"})}
+_NOT_BEFORE_VOWEL = {"to": frozenset({"ə", "ɪ"})}
 _ALWAYS_REDUCED = frozenset({"a", "an", "am", "the", "to", "in"})  # also where they begin a sentence
 
 
@@ -44,6 +50,31 @@ def _weak_forms() -> dict[str, tuple[tuple[str, ...], ...]]:
 def weak_forms(word: str) -> tuple[tuple[str, ...], ...]:
     """Phones of each weak form of a function word; none of other words."""
     return _weak_forms().get(word_key(word), ())
+
+
+def fitting_forms(
+    words: Sequence[tuple[str, Sequence[tuple[str, ...]]]],
+) -> tuple[tuple[str, tuple[tuple[str, ...], ...]], ...]:
+    """English words with those of their pronunciations that the sound after them allows: /ðə/ cat, /ði/ apple.
+
+    Parameters
+    ----------
+    words
+        Words in order with their alternative pronunciations in phones; words that may begin with a vowel or with a
+        consonant, and ends, allow all.
+    """
+    found = []
+    for at, (word, forms) in enumerate(words):
+        following = words[at + 1][1] if at + 1 < len(words) else ()
+        begins = {PHONES[phones[0]].is_vowel for phones in following if phones}
+        barred: frozenset[str] = frozenset()
+        if len(begins) == 1:
+            table = _NOT_BEFORE_VOWEL if True in begins else _NOT_BEFORE_CONSONANT
+            barred = table.get(word_key(word), barred)
+        # what a user's dictionary says stays, whatever follows
+        fitting = tuple(form for form in forms if form[-1] not in barred)
+        found.append((word, fitting or tuple(forms)))
+    return tuple(found)
 
 
 def reduced_segments(

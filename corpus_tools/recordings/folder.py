@@ -9,6 +9,7 @@ from corpus_tools.recordings.subtitle_cues import find_subtitles, read_cues, sub
 from corpus_tools.recordings.transcripts import WrittenWords, find_transcript, passed_over, read_transcript
 from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import DataError, InputError
+from lexicon.function_words import fitting_forms
 from lexicon.normalize import normalize
 from lexicon.values.tables import read_table
 from tts2face.sound.word_lattice import PronouncedWords, Pronunciations
@@ -91,8 +92,8 @@ def pronounce_recording(recording: Recording) -> PronouncedWords | None:
     words = re.findall(r"[^\W_]+(?:['’][^\W_]+)*", text)
     if not words:
         raise DataError(f"the transcript of {recording.name} contains no word; write the spoken words into it")
-    return tuple(
-        (word, look_up_pronunciations(word, is_letter=recording.is_spelling and len(word) == 1)) for word in words
+    return fitting_forms(
+        [(word, look_up_pronunciations(word, is_letter=recording.is_spelling and len(word) == 1)) for word in words]
     )
 
 

@@ -6,7 +6,7 @@ from itertools import count
 from lexicon.dictionary import Dictionary, cmudict_lookup
 from lexicon.errors import DataError
 from lexicon.foreign_words import make_readable
-from lexicon.function_words import weak_forms
+from lexicon.function_words import fitting_forms, weak_forms
 from lexicon.marked_text import MarkedText
 from lexicon.pronounce import Word, pronounce
 from lexicon.sequence import PhoneSequence, WordSpan
@@ -35,11 +35,11 @@ def pronounce_transcript(text: str, language: str, own: Dictionary | None = None
     BackendError
         A word needs espeak-ng, which is not installed.
     """
-    return tuple(
-        (word.text, _pronunciations(word, spoken, own))
-        for part, spoken in _parts(text, language)
-        for word in pronounce(part, spoken, own).words
-    )
+    found: list[tuple[str, Pronunciations]] = []
+    for part, spoken in _parts(text, language):
+        words = [(word.text, _pronunciations(word, spoken, own)) for word in pronounce(part, spoken, own).words]
+        found += fitting_forms(words) if spoken.startswith("en") else words
+    return tuple(found)
 
 
 def _parts(text: str, language: str) -> Iterator[tuple[str, str]]:

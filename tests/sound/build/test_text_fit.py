@@ -38,6 +38,17 @@ def test_another_text_for_the_project_s_own_voice() -> None:
         align_recording(speech.waveform, pronounce_transcript(RIGHT[0], "en-us"))
 
 
+@pytest.mark.parametrize("name", ["heart", "espeak"])
+def test_the_before_consonants_has_a_schwa(name: str) -> None:
+    text = "The dog ran to the river. They put the cups on the table to open the box of the old man."
+    sound = load_voice(name, "en-us").speak(text).waveform
+    phones, words, _ = align_recording(sound, pronounce_transcript(text, "en-us"))
+    spoken = [(word.text.lower(), "".join(phones.phones[word.first : word.last])) for word in words]
+    assert [form for word, form in spoken if word == "the"] == ["ðə"] * 5 + ["ði"]
+    assert [form for word, form in spoken if word == "to"][1] in {"tu", "tʊ"}
+    assert ("of", "ʌv") in spoken
+
+
 def test_wrong_sentences_among_right_ones() -> None:
     voice = load_voice("heart", "en-us")
     said = [RIGHT[0], RIGHT[1], "It was a sunny day in the park.", "Nobody saw the dog again."]
