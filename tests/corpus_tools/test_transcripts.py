@@ -123,6 +123,19 @@ def test_word_times_are_samples_of_25_khz(write):
     assert cues_of(write(".align", ALIGN)) == (SpokenCue(0.95, 1.18, "bin"), SpokenCue(1.18, 1.36, "blue"))
 
 
+@pytest.mark.parametrize(("rate", "unit"), [(1000, "milliseconds"), (10_000_000, "units of 100 ns")])
+def test_word_times_of_another_unit_are_read_right_and_said(write, rate, unit):
+    words = ((0.95, 1.18, "bin"), (1.18, 1.36, "blue"), (1.36, 1.6, "at"))
+    path = write(".align", "".join(f"{round(a * rate)} {round(b * rate)} {word}\n" for a, b, word in words))
+    assert cues_of(path) == tuple(SpokenCue(*word) for word in words)
+    assert f"are read as {unit}" in read_transcript(path).notes[0]
+
+
+def test_word_times_that_cannot_be_meant_are_refused(write):
+    with pytest.raises(DataError, match=r"no samples of 25 kHz: half of its words would last 4e-05 s"):
+        read_transcript(write(".align", "1 2 bin\n2 3 blue\n"))
+
+
 def test_all_grid_alignments_agree_with_the_manifest(takes):
     listed = {one.name: one.transcript for one in find_recordings(takes)}
     aligned = {path.stem: read_transcript(path).text for path in sorted((takes / "align").glob("*.align"))}
