@@ -42,8 +42,10 @@ from cli.process import (
     write_message,
 )
 from cli.render import convert, render
+from cli.tool_flags import Tier
+from cli.transcript import TextFile
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
-from lexicon.values.files import LARGEST_TEXT_BYTES, decode_utf8, read_bounded, read_text
+from lexicon.values.files import LARGEST_TEXT_BYTES, decode_utf8, read_bounded
 from tts2face import __version__
 from tts2face.picture.options import Picture
 from tts2face.processes.collection import pause_collection
@@ -119,8 +121,13 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     out: Out = None,
     export: Exports = None,
     file: Annotated[
-        Path | None, Parameter(help="Read the text from a UTF-8 file.", name=["--file", "--transcript"])
+        Path | None,
+        Parameter(
+            help="Read the text from a UTF-8 file, or the words of a TextGrid, a table of labels or subtitles.",
+            name=["--file", "--transcript"],
+        ),
     ] = None,
+    tier: Tier = None,
     text_option: Annotated[
         str | None, Parameter(help="The text as an option, for example the words of --audio.", name="--text")
     ] = None,
@@ -165,8 +172,11 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     # a wrong option is refused before the modules of a session are loaded
     from cli.speak import SpeakOptions, run_request
 
+    words = None if file is None else TextFile(file, tier, quiet)
+    if tier is not None and file is None:
+        raise InputError("--tier belongs to a file of words; give it with --file, or remove --tier")
     request = options_from_flags(
-        Request, options, text=_read_text(text if text_option is None else text_option, file, is_needed=needs_text)
+        Request, options, text=_read_text(text if text_option is None else text_option, words, is_needed=needs_text)
     )
     speak_options = SpeakOptions(
         out,
@@ -191,7 +201,7 @@ def _gesture_method(method: str | None, *, noise: bool, none: bool) -> str:
     return next(iter(used.values()), GESTURES[0])
 
 
-def _read_text(text: str | None, file: Path | None, *, is_needed: bool) -> str:
+def _read_text(text: str | None, file: TextFile | None, *, is_needed: bool) -> str:
     if text is None and file is None and not is_needed:
         return ""
     if text is not None and file is not None:
@@ -201,13 +211,15 @@ def _read_text(text: str | None, file: Path | None, *, is_needed: bool) -> str:
         return text
     try:
         if file is not None:
-            return read_text(file, may_be_pipe=True)
+            return file.read()
         if text is None and sys.stdin.isatty():
             raise InputError('there is no text to speak; add one: tts2face "Hello there." --out hello.mp4')
         source = "standard input"
         return decode_utf8(read_bounded(sys.stdin.buffer, source, LARGEST_TEXT_BYTES), source)
     except OSError as refused:
-        raise InputError(f"cannot read the text from {file}: {refused.strerror}; check the path") from refused
+        raise InputError(
+            f"cannot read the text from {file and file.path}: {refused.strerror}; check the path"
+        ) from refused
     except DataError as wrong:  # the text is part of the request
         raise InputError(str(wrong)) from wrong
 

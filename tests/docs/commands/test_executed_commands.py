@@ -24,6 +24,7 @@ from tests.docs.blocks import (
     shell_lines,
 )
 from tests.interchange.characters.made import write_character_file, write_landmarks
+from tests.interchange.transcripts.grids import textgrid
 from tests.photo.pictures import SMILE, still
 from tts2face import Picture, Project, Request, export, import_face, save_face, save_project
 from tts2face.models.palette import Palette
@@ -96,6 +97,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("inputs")
     (folder / "chapter.txt").write_text("Chapter one. It was late.", encoding="utf-8")
     (folder / "speech.txt").write_text("Hello there.", encoding="utf-8")
+    (folder / "speech.TextGrid").write_text(textgrid(words=[(0, 0.3, "Hello"), (0.3, 0.6, "there")]))
     (folder / "words.txt").write_text("gif  JH IH1 F\n", encoding="utf-8")
     save_project(
         Project(request=Request(text="Hello.", voice="espeak", fps=5), picture=Picture(size="64x64")),

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from tests.interchange.transcripts.grids import PHONES, WORDS, textgrid
 from tests.serving.service.in_process import another_client, decoding_here
 from tests.serving.studio.server.test_comparison_http import compare
 from tests.serving.studio.server.test_projects_http import TEXT, create, edit, preview, project_file, wait_until_saved
@@ -131,6 +132,22 @@ def test_imported_subtitles_say_what_was_guessed_and_is_not_spoken(studio: TestC
     assert project["request"]["text"] == "bouchnutí ANNA: Můžete přijít?"
     refused = studio.post("/api/imports", files={"file": ("x.srt", content)}, data={"keep": "noises"})
     assert "keep must be of annotations" in refused.json()["error"]["message"]
+
+
+def test_words_of_other_programs_are_imported(studio: TestClient) -> None:
+    grid = textgrid(phones=PHONES, Anna_words=WORDS, Ben_words=[(0, 1, "hello")])
+    table = "0.5\t0.9\tbin\n0.9\t1.2\tred\n"
+    found = {}
+    for name, content, choices in (
+        ("a.TextGrid", grid, {}), ("a.txt", grid, {"tier": "Ben words"}), ("b.txt", table, {}),
+        ("c.txt", "bin red", {}),
+    ):  # fmt: skip
+        answer = studio.post("/api/imports", files={"file": (name, content.encode())}, data=choices).json()
+        project = studio.get(f"/api/projects/{answer['id']}/project.json").json()
+        found[name, *choices] = project["request"]["text"], len(answer["notes"])
+    assert list(found.values()) == [("bin red by k seven now", 1), ("hello", 0), ("bin red", 0), ("bin red", 0)]
+    wrong = studio.post("/api/imports", files={"file": ("x.eaf", b"<html/>")})
+    assert wrong.json()["error"]["message"].startswith("x.eaf is no file of ELAN")
 
 
 def test_what_cannot_be_compared_is_refused(studio: TestClient) -> None:

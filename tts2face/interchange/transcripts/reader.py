@@ -51,6 +51,14 @@ READERS: Mapping[str, ReadTiers] = MappingProxyType(
         ".lab": read_lab,
     }
 )
+_MARKS: Mapping[str, ReadTiers] = MappingProxyType(
+    {
+        "<ANNOTATION_DOCUMENT": read_eaf,
+        "<basic-transcription": read_exb,
+        "@Begin\n": read_cha,
+    }
+)
+HEAD_CHARACTERS = 2000  # within which a mark stands
 
 
 def read_transcript(path: Path, tier: str | None = None) -> Transcript:
@@ -100,9 +108,13 @@ def find_reader(path: Path) -> ReadTiers | None:
 
 
 def find_reader_of_text(text: str) -> ReadTiers | None:
-    """The reader of a TextGrid, a table of labels or a prompt of TIMIT, whatever its name; None for plain text."""
+    """The reader of a file that shows what it is, whatever its name; None for plain text."""
     if is_textgrid(text):
         return read_textgrid
+    head = text.lstrip("\ufeff \t\r\n")[:HEAD_CHARACTERS]
+    for mark, read in _MARKS.items():
+        if mark in head:
+            return read
     if is_timit_prompt(text):
         return read_timit
     return read_label_table if is_label_table(text) else None

@@ -1,19 +1,22 @@
 """New projects: from a text, a recording, subtitles, a project file, or as an example."""
 
 import asyncio
+import shutil
 import tempfile
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from lexicon.errors import InputError
+from lexicon.errors import DataError, InputError
 from lexicon.values.json_text import parse_json
 from tts2face.gestures.elements import StyleSpan
 from tts2face.gestures.timeline import Timeline
 from tts2face.interchange.subtitles.formats import SUFFIXES
 from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.interchange.subtitles.reader import read_subtitles
+from tts2face.interchange.transcripts.reader import READERS, find_reader, find_reader_of_text, read_transcript
+from tts2face.interchange.transcripts.spoken import Transcript
 from tts2face.request import Request
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
@@ -28,7 +31,8 @@ SOUND_SUFFIXES = (
     ".wav", ".mp3", ".ogg", ".oga", ".opus", ".flac", ".aac", ".m4a", ".mp4", ".mov", ".webm", ".mkv", ".aiff",
     ".ts", ".mpg", ".mpeg", ".avi", ".m4v", ".ac3", ".wma", ".caf",
 )  # fmt: skip
-TEXT_SUFFIXES = (".txt", ".ssml", ".md")
+PLAIN_SUFFIXES = (".ssml", ".md")
+TEXT_SUFFIXES = (".txt", *PLAIN_SUFFIXES)
 RECORDING = "recording.wav"
 SAMPLE_TEXT = "Hello! This face was learnt from a real talker. Paint a style on the timeline, and watch it change."
 SAMPLE_TIMELINE = Timeline(
@@ -61,11 +65,15 @@ class Imported:
 
 @dataclass(frozen=True, slots=True)
 class ImportChoices:
-    """How a file is read: words of a recording if they are known; encoding and other choices of subtitles."""
+    """How a file is read: words of a recording if they are known; encoding and other choices of subtitles.
+
+    ``tier`` names the tier of the words in a TextGrid or another file of tiers.
+    """
 
     transcript: str = ""
     encoding: str | None = None
     subtitles: SubtitleOptions = field(default_factory=SubtitleOptions)
+    tier: str | None = None
 
 
 NO_CHOICES = ImportChoices()
@@ -86,7 +94,10 @@ async def import_file(
     suffix, title = Path(name).suffix.lower(), _title(Path(name).stem)
     if suffix == ".json":
         return Imported(await _import_project(studio, key, path))
-    if suffix in TEXT_SUFFIXES:
+    if suffix in READERS or suffix in TEXT_SUFFIXES:
+        words = await asyncio.to_thread(_timed_words, path, name, choices.tier)
+        if words is not None:
+            return Imported(await import_text(studio, key, words.text, title), words.notes)
         return Imported(await import_text(studio, key, _read_text(path, name), title))
     if suffix in SUFFIXES:
         async with _decoded(studio.state, key, (SUBTITLES, path, suffix), choices.encoding) as checked:
@@ -96,9 +107,41 @@ async def import_file(
         return Imported(await import_text(studio, key, text, title), notes)
     if suffix in SOUND_SUFFIXES:
         async with _decoded(studio.state, key, (SOUND, path, ".wav")) as checked:
-            return Imported(await add_recording(studio, key, checked, title, choices.transcript))
-    kinds = (*TEXT_SUFFIXES, *SUFFIXES, *SOUND_SUFFIXES, ".json")
+            words = await asyncio.to_thread(_words_of_text, choices.transcript, choices.tier)
+            text, notes = (choices.transcript, ()) if words is None else (words.text, words.notes)
+            return Imported(await add_recording(studio, key, checked, title, text), notes)
+    kinds = (*TEXT_SUFFIXES, *READERS, *SUFFIXES, *SOUND_SUFFIXES, ".json")
     raise InputError(f"a file {name[-40:]!r} cannot be imported; give one that ends in {', '.join(kinds)}")
+
+
+def _timed_words(path: Path, name: str, tier: str | None) -> Transcript | None:
+    """Words of an uploaded file of another program; None for plain text.
+
+    Raises
+    ------
+    InputError
+        The file is too large, cannot be read, or has no such tier or no word.
+    """
+    _check_size(path, name)
+    suffix = Path(name).suffix.lower()
+    with tempfile.TemporaryDirectory(prefix="tts2face-upload-") as folder:
+        named = Path(folder, f"transcript{suffix}")
+        shutil.copyfile(path, named)
+        try:
+            return None if suffix in PLAIN_SUFFIXES or find_reader(named) is None else read_transcript(named, tier)
+        except (DataError, InputError) as wrong:
+            # the place on the server is nobody's business
+            raise InputError(str(wrong).replace(str(named), name[-40:])) from wrong
+
+
+def _words_of_text(text: str, tier: str | None) -> Transcript | None:
+    """Words of a text that is a table of labels or a TextGrid; None for plain text."""
+    if find_reader_of_text(text) is None:
+        return None
+    with tempfile.TemporaryDirectory(prefix="tts2face-upload-") as folder:
+        path = Path(folder, "transcript.txt")
+        path.write_text(text, encoding="utf-8", newline="")
+        return _timed_words(path, path.name, tier)
 
 
 async def _import_project(studio: StudioHost, key: ApiKey, path: Path) -> str:
@@ -136,9 +179,13 @@ async def _decoded(
         yield target
 
 
-def _read_text(path: Path, name: str) -> str:
+def _check_size(path: Path, name: str) -> None:
     if path.stat().st_size > MAX_TEXT_BYTES:
         raise InputError(f"{name[-40:]} has more than {MAX_TEXT_BYTES} bytes; divide it")
+
+
+def _read_text(path: Path, name: str) -> str:
+    _check_size(path, name)
     try:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as wrong:

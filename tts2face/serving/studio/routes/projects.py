@@ -72,10 +72,15 @@ async def import_upload(  # noqa: PLR0913 - one parameter a field of the form
     language: Annotated[str | None, Form(max_length=40)] = None,
     keep: Annotated[list[str] | None, Form()] = None,
     speakers: Annotated[bool, Form()] = True,
+    tier: Annotated[str | None, Form(max_length=200)] = None,
 ) -> dict[str, Any]:
-    """A new project from a file; the last four fields are of subtitles, as the options of ``tts2face batch``."""
+    """A new project from a file.
+
+    ``tier`` names the tier of the words in TextGrids and other files of tiers; the four fields before it are of
+    subtitles, as the options of ``tts2face batch``.
+    """
     subtitles = SubtitleOptions(language=language, keep=tuple(keep or ()), speakers=speakers)
-    choices = ImportChoices(transcript, encoding, subtitles)
+    choices = ImportChoices(transcript, encoding, subtitles, tier)
     with tempfile.TemporaryDirectory(prefix="tts2face-upload-") as folder:
         path = Path(folder, "upload")
         with path.open("wb") as saved:
