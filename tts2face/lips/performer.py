@@ -1,4 +1,4 @@
-"""Retargeting of a performer to a face: lips by least squares on landmarks, eyes and brows by blendshape scores."""
+"""Retargeting of a performer to a face: lips, lids and brows by landmarks, gaze by blendshape scores."""
 
 from dataclasses import dataclass
 
@@ -9,6 +9,7 @@ from lexicon.errors import DataError
 from tts2face.face.lip_constraints import MIDDLE_PAIR
 from tts2face.lips.retargeting import MAX_CONTACT_MM, Retargeter, build_retargeter
 from tts2face.lips.score_matching import scaled_scores
+from tts2face.lips.upper_face import READ_SHAPES, read_upper_face
 from tts2face.models.face import Face
 from tts2face.models.landmarks import EYELID_LANDMARKS, MOUTH_REGION, N_LANDMARKS, eye_aperture, inner_lip_gaps
 from tts2face.models.score_map import SCORE_SHAPES, mouth_scores
@@ -22,6 +23,11 @@ SMILE = "mouthSmile"
 CLOSED_FRAME_SHARE = 0.15  # share of the frames that count as having closed lips
 SCORE_DRIVEN_SHAPES = ("eye", "brow", "nose", "cheek")  # name prefixes of the shapes that follow scores
 SCORE_DEAD_ZONE = 0.04  # amplitude of the noise of scores
+BLINK_CLOSURE, MAX_BLINK_SHARE = (
+    0.7,
+    0.5,
+)  # closure in a blink; share of frames above which eyes are closed, not blinking
+READ_DEAD_ZONE = 0.12  # of weights from landmarks: most of what blinks and other motions give
 OPEN_LID_QUANTILE, CLOSED_LID_SHARE = 0.9, 0.25  # aperture quantile of an open eye; share of it of a closed eye
 
 
@@ -30,8 +36,9 @@ class PerformerRetargeter:
     """Mapping from a performer's landmarks and scores to the weights of a face; built by `build_performer_retargeter`.
 
     ``open_apertures`` holds the aperture of each open eye over its width, ``neutral_scores`` (B,) the median scores,
-    ``rest_scores`` (n,) those of `mouth_scores` with closed lips. A smile that is held throughout is no rest: the face
-    smiles, too.
+    ``rest_scores`` (n,) those of `mouth_scores` with closed lips, ``usual`` (478, 3) the median landmarks, and
+    ``of_blinks`` (R,) what `read_upper_face` reads more where the person blinks. A smile that is held throughout is no
+    rest: the face smiles, too.
     """
 
     model: ShapeModel
@@ -39,6 +46,8 @@ class PerformerRetargeter:
     face: Face
     open_apertures: dict[str, float]
     neutral_scores: NDArray[np.float32]
+    usual: NDArray[np.float32]
+    of_blinks: FloatArray
     rest_scores: FloatArray
 
     def weights(self, landmarks: NDArray[np.floating], scores: Trajectory, *, gain: float = 1.0) -> Trajectory:
@@ -57,11 +66,16 @@ class PerformerRetargeter:
         mouth = scaled_scores(mouth_scores(scores), self.rest_scores, gain)
         weights = np.array(self.lips.retarget(speech, mouth).values)
         lids = {side: self._lid_closure(landmarks, side) for side in EYELID_LANDMARKS}
+        closed = np.mean(list(lids.values()), axis=0)
+        seen = read_upper_face(landmarks, self.usual) - closed[:, None] * self.of_blinks
         for column, name in enumerate(self.face.shape_names):
             if not name.startswith(SCORE_DRIVEN_SHAPES) or name not in scores.channels:
                 continue
             at = scores.channels.index(name)
             weight = np.maximum(scores.values[:, at] - self.neutral_scores[at] - SCORE_DEAD_ZONE, 0.0)
+            if name in READ_SHAPES:
+                # scores of brows are full at rest or do not rise (decision 237)
+                weight = np.maximum(seen[:, READ_SHAPES.index(name)] - READ_DEAD_ZONE, 0.0) / (1.0 - READ_DEAD_ZONE)
             if name.startswith("eyeBlink"):
                 weight = lids[name.removeprefix("eyeBlink")]
             elif not name.startswith("eye"):
@@ -76,8 +90,7 @@ class PerformerRetargeter:
         return Trajectory(speech_channels(self.model), values, fps)
 
     def _lid_closure(self, landmarks: NDArray[np.floating], side: str) -> FloatArray:
-        opened = self.open_apertures[side]
-        return np.clip((opened - eye_aperture(landmarks, side)) / (opened * (1.0 - CLOSED_LID_SHARE)), 0.0, 1.0)
+        return _closure(landmarks, side, self.open_apertures[side])
 
 
 def build_performer_retargeter(landmarks: NDArray[np.floating], scores: Trajectory, face: Face) -> PerformerRetargeter:
@@ -104,16 +117,36 @@ def build_performer_retargeter(landmarks: NDArray[np.floating], scores: Trajecto
     lips = build_retargeter(
         talker, face, contact=contact, rest_scores=np.where(is_smile & bool(smile), 0.0, rest_scores)
     )
+    opened = {side: float(np.quantile(eye_aperture(landmarks, side), OPEN_LID_QUANTILE)) for side in EYELID_LANDMARKS}
+    usual = np.median(landmarks, axis=0).astype(np.float32)
     return PerformerRetargeter(
         model=model,
         lips=lips.with_held_smile(smile) if smile else lips,
         face=face,
-        open_apertures={
-            side: float(np.quantile(eye_aperture(landmarks, side), OPEN_LID_QUANTILE)) for side in EYELID_LANDMARKS
-        },
+        open_apertures=opened,
         neutral_scores=np.median(scores.values, axis=0),
+        usual=usual,
+        of_blinks=_read_in_blinks(landmarks, usual, opened),
         rest_scores=rest_scores,
     )
+
+
+def _closure(landmarks: NDArray[np.floating], side: str, opened: float) -> FloatArray:
+    """(T,) closures of an eye, 0 to 1, whose aperture over its width is `opened` when it is open."""
+    return np.clip((opened - eye_aperture(landmarks, side)) / (opened * (1.0 - CLOSED_LID_SHARE)), 0.0, 1.0)
+
+
+def _read_in_blinks(
+    landmarks: NDArray[np.floating], usual: NDArray[np.floating], opened: dict[str, float]
+) -> FloatArray:
+    """(R,) weights that a blink adds to the reading of the upper face: a tracker moves brows with it."""
+    closed = np.mean([_closure(landmarks, side, opened[side]) for side in EYELID_LANDMARKS], axis=0)
+    seen = read_upper_face(landmarks, usual)
+    blinks = closed > BLINK_CLOSURE
+    if not blinks.any() or blinks.mean() > MAX_BLINK_SHARE:
+        return np.zeros(seen.shape[1])
+    added: FloatArray = np.maximum(np.median(seen[blinks], axis=0) - np.median(seen[~blinks], axis=0), 0.0)
+    return added
 
 
 def held_smile(landmarks: NDArray[np.floating], scores: Trajectory) -> dict[str, float]:

@@ -189,7 +189,7 @@ class MeshFace:
         return self.retargeter.retarget(speech)
 
     def motion_of_take(self, take: "Take", *, gain: float = 1.0) -> Trajectory:
-        """Shape weights (T, K) of a performer: lips by least squares on landmarks, eyes and brows from scores."""
+        """Shape weights (T, K) of a performer: lips, lids and brows from landmarks, gaze from scores."""
         retargeter = build_performer_retargeter(take.landmarks, take.scores, self.face)
         return retargeter.weights(take.landmarks, take.scores, gain=gain)
 
