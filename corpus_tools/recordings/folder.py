@@ -12,6 +12,7 @@ from lexicon.errors import DataError, InputError
 from lexicon.function_words import fitting_forms
 from lexicon.normalize import normalize
 from lexicon.values.tables import read_table
+from tts2face.interchange.subtitles.film_track import has_text_track
 from tts2face.sound.word_lattice import PronouncedWords, Pronunciations
 
 VIDEO_SUFFIXES = frozenset({".mkv", ".mp4", ".mov", ".webm", ".avi", ".mpg", ".mpeg", ".m4v", ".ts", ".mts"})
@@ -105,7 +106,11 @@ def recording_notes(recordings: Sequence[Recording]) -> tuple[str, ...]:
         for recording in recordings
         if not isinstance(recording.transcript, str) or recording.span is not None
     }
-    notes: dict[str, None] = dict.fromkeys(note for video in with_files for note in subtitle_notes(video))
+    # recordings with times but no file have those of the video's own track
+    tracks = {recording.video for recording in recordings if recording.span is not None}
+    notes: dict[str, None] = dict.fromkeys(
+        note for video in with_files for note in subtitle_notes(video, has_track=video in tracks)
+    )
     for recording in recordings:
         try:
             notes.update(dict.fromkeys(_written(recording).notes))
@@ -175,14 +180,17 @@ def _recordings_from_manifest(folder: Path, manifest: Path) -> tuple[Recording, 
 def _recordings_in_video(video: Path, tier: str | None) -> Iterator[Recording]:
     """Recordings of a video: one for each cue of its subtitles, or the whole; damaged files are reported on reading."""
     subtitles = find_subtitles(video)
+    transcript = None if subtitles else find_transcript(video)
+    has_track = subtitles is None and transcript is None and has_text_track(video)
+    source = video if has_track else subtitles
     try:
-        cues = read_cues(subtitles) if subtitles else ()
+        cues = read_cues(source) if source else ()
     except DataError:
         cues = ()
     for number, cue in enumerate(cues, start=1):
         yield Recording(f"{video.stem}-{number:04d}", video, cue.text, span=(cue.start, cue.end))
     if not cues:
-        yield Recording(video.stem, video, subtitles or find_transcript(video), tier=tier)
+        yield Recording(video.stem, video, subtitles or transcript, tier=tier)
 
 
 def _list_videos(folder: Path) -> list[Path]:

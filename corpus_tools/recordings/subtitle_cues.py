@@ -47,16 +47,21 @@ def read_beside(path: Path) -> Subtitles:
     return read_subtitles(path, options=SubtitleOptions(fps=film.fps, film_s=film.seconds))
 
 
-def subtitle_notes(video: Path) -> tuple[str, ...]:
-    """Guesses and defects of the subtitles of a video, and what of them is not spoken; none without subtitles."""
-    path = find_subtitles(video)
+def subtitle_notes(video: Path, *, has_track: bool = False) -> tuple[str, ...]:
+    """Guesses and defects of the subtitles of a video, and what of them is not spoken; none without subtitles.
+
+    With `has_track` they are a track of the video itself, where none lie beside it.
+    """
+    path = find_subtitles(video) or (video if has_track else None)
     if path is None:
         return ()
     try:
         read = read_beside(path)
     except DataError as wrong:
         return (f"{wrong}; the subtitles are not used",)
-    return tuple(f"{path.name}, line {note.line}: {note.message}" for note in (*read.warnings, *read.notes))
+    stated = (f"the subtitles of {video.name} are those of its own track",) if path == video else ()
+    found = (f"{path.name}, line {note.line}: {note.message}" for note in (*read.warnings, *read.notes))
+    return (*stated, *found)
 
 
 def _joined(cues: Sequence[Cue]) -> list[tuple[float, float, str]]:

@@ -172,6 +172,23 @@ def test_frames_have_the_rate_of_the_video(write, tmp_path):
     assert subtitle_notes(tmp_path / "take.mp4") == ()
 
 
+def test_the_track_of_a_video_without_a_transcript_is_read(tmp_path):
+    (tmp_path / "a.srt").write_text("1\n00:00:01,000 --> 00:00:02,000\nPlace blue.\n")
+    with av.open(str(tmp_path / "take.mkv"), "w") as film, av.open(str(tmp_path / "a.srt")) as subtitles:
+        (source,) = subtitles.streams.subtitles
+        track = film.add_stream_from_template(source)
+        for packet in subtitles.demux(source):
+            if packet.size:
+                packet.stream = track
+                film.mux(packet)
+    (recording,) = find_recordings(tmp_path)
+    assert (recording.name, recording.transcript) == ("take-0001", "Place blue.")
+    assert "the subtitles of take.mkv are those of its own track" in recording_notes([recording])
+    (tmp_path / "take.txt").write_text("set red")
+    (recording,) = find_recordings(tmp_path)
+    assert recording.transcript == tmp_path / "take.txt"
+
+
 def test_guesses_about_subtitles_are_said(write, tmp_path):
     (tmp_path / "take.mp4").touch()
     write(".srt", "1\n00:00:01,000 --> 00:00:02,000\nMůžete přijít\n".encode("cp1250"))

@@ -50,6 +50,17 @@ def film_facts(path: Path) -> Film:
         return Film()
 
 
+def has_text_track(path: Path) -> bool:
+    """Whether a file is a film with a track of subtitles of text."""
+    import av
+
+    try:
+        with av.open(str(path)) as container:
+            return any(_codec(stream) in _TEXT for stream in container.streams.subtitles)
+    except (OSError, ValueError):
+        return False
+
+
 def read_film(
     path: Path, language: str | None, track: str | None
 ) -> tuple[list[WrittenCue], list[SubtitleWarning], float | None]:
