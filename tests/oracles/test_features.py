@@ -123,3 +123,15 @@ def test_the_level_is_that_of_the_sound() -> None:
 def test_what_cannot_be_measured_is_refused(kind: str, rate: int, reason: str) -> None:
     with pytest.raises(InputError, match=reason):
         speech_features(Waveform(np.zeros(8000), rate), kind, fps=25, n_frames=10)
+
+
+def test_silence_before_the_speech_does_not_count_into_its_mean() -> None:
+    speech = np.random.default_rng(4).normal(0.0, 0.1, 3 * FEATURE_RATE).astype(np.float32)
+    muted = np.concatenate([np.zeros(20 * FEATURE_RATE, np.float32), speech])
+    plain, late = (
+        speech_features(Waveform(samples, FEATURE_RATE), "mel", fps=25, n_frames=75, start=start).values
+        for samples, start in ((speech, 0.0), (muted, 20.0))
+    )
+    whole = speech_features(Waveform(muted, FEATURE_RATE), "mel", fps=25, n_frames=575).values
+    np.testing.assert_allclose(whole[505:], plain[5:], atol=1e-3)
+    np.testing.assert_allclose(late[5:], plain[5:], atol=1e-3)
