@@ -55,12 +55,13 @@ class WholeFrames:
                 n_samples = self._n_samples(n_frames, sound.rate)
         self.frame += n_frames
         if n_samples < len(sound.samples):
-            voice, rest = (one.part(n_samples, len(one.samples)) for one in (whole.speech.waveform, sound))
+            voice = whole.speech.waveform.part(n_samples, len(sound.samples))
+            rest = sound.part(n_samples, len(sound.samples))
             self._rest = SpokenSentence(Speech.without_phones(voice), Timeline(), (), rest)
         return _with_length(whole, n_samples), n_frames
 
     def finish(self) -> SpokenSentence | None:
-        """What is left of the last part, where it was not known to be the last."""
+        """The rest of the last part, where it was not known to be the last."""
         rest, self._rest = self._rest, None
         return rest
 

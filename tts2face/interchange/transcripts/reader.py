@@ -1,13 +1,11 @@
 """Reading of transcripts with times: the words of one tier, without silences, in the order of time.
 
-How the next format is made:
+How the next format is made (the choice of the tier, silences, overlaps and the times of words in utterances are shared):
 
 1. A function from the path of a file to its `Tier` objects, with seconds, in a module of its own here, as
    `tts2face.interchange.transcripts.label_table` does; a DataError only where nothing can be read.
 2. Its row in `READERS`, by its ending; beside videos, files are preferred in the order of the rows.
 3. Its name in docs/recordings.md, its row in docs/compatibility.md, and its file in tests/interchange/transcripts.
-
-The choice of the tier, silences, overlaps and the times of words in utterances are the same for all formats.
 """
 
 from collections import Counter
