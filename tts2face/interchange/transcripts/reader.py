@@ -1,6 +1,6 @@
 """Reading of transcripts with times: the words of one tier, without silences, in the order of time.
 
-How the next format is made (the choice of the tier, silences, overlaps and the times of words in utterances are shared):
+How the next format is made (the choice of the tier, silences, overlaps and times within utterances are shared):
 
 1. A function from the path of a file to its `Tier` objects, with seconds, in a module of its own here, as
    `tts2face.interchange.transcripts.label_table` does; a DataError only where nothing can be read.
