@@ -6,7 +6,7 @@ from pathlib import Path
 
 from corpus_tools.recordings.subtitle_cues import SUBTITLE_SUFFIXES, read_cues
 from tts2face.interchange.subtitles.decoding import read_text
-from tts2face.interchange.transcripts.reader import READERS, TEXT_SUFFIX, find_reader
+from tts2face.interchange.transcripts.reader import READERS, TEXT_SUFFIX, encoding_note, find_reader
 from tts2face.interchange.transcripts.reader import read_transcript as read_timed
 
 # in order of preference: the words of a person before tables of programs
@@ -42,7 +42,8 @@ def read_transcript(transcript: Path, tier: str | None = None) -> WrittenWords:
     if transcript.suffix.lower() in SUBTITLE_SUFFIXES:
         return WrittenWords(" ".join(cue.text for cue in read_cues(transcript)))
     if find_reader(transcript) is None:
-        return WrittenWords(read_text(transcript))
+        note = encoding_note(transcript)
+        return WrittenWords(read_text(transcript), (note,) if note else ())
     found = read_timed(transcript, tier)
     return WrittenWords(found.text, found.notes)
 

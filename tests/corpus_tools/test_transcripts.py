@@ -217,6 +217,13 @@ def test_what_lies_beside_a_video_and_is_not_read_is_named(write, tmp_path):
     assert not any("not read" in note for note in recording_notes(find_recordings(tmp_path)))
 
 
+@pytest.mark.parametrize(("suffix", "content"), [(".txt", "Můžete přijít"), (".ctm", "take 1 0.5 0.5 můžete\n")])
+def test_a_guessed_encoding_of_words_is_said(write, suffix, content):
+    (note,) = read_transcript(write(suffix, content, "cp1250")).notes
+    assert note.startswith(f"the encoding of take{suffix} is not stated and was guessed as ")
+    assert read_transcript(write(suffix, content)).notes == ()
+
+
 def test_a_tier_is_named_for_all_recordings(tmp_path):
     (tmp_path / "take.mp4").touch()
     (tmp_path / "take.TextGrid").write_text(LONG_GRID)

@@ -11,7 +11,7 @@ NO_WORDS = [
     "", " ", "<eps>", "{SL}", "[noise]", "spn", "SPN", "<unk>", "sp", "pau", "#", "<p:>", "<usb>", "SIL", "brth", "xxx",
     "yyy", "&=laughs", "*", "%", "h#", "epi", "nsn", "lau", "(laughs)", "((laughs))", "[bracketed words]",
     "<sil> [noise]", "++UM++",
-    "+noise+", "*cough*", "<VOCNOISE>", "dummy", "@", "...", "{laugh}", "-", "sil", "!SIL", "[]", "<s>",
+    "+noise+", "_noise_", "*cough*", "<VOCNOISE>", "dummy", "@", "...", "{laugh}", "-", "sil", "!SIL", "[]", "<s>",
 ]  # fmt: skip
 
 

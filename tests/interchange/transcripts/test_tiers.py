@@ -47,6 +47,18 @@ def test_the_tier_of_the_words_is_found(read, tiers):
     assert [round(found.words[0].start, 3), round(found.words[-1].end, 3)] in ([0.55, 2.3], [0.5, 2.4])
 
 
+def test_points_are_words_where_nothing_else_is(read, tmp_path):
+    points = textgrid(x=[]).replace("IntervalTier", "TextTier").replace("intervals: size = 0", "points: size = 1")
+    points += '        points [1]:\n            number = 0.5\n            mark = "container"\n'
+    (tmp_path / "v.TextGrid").write_text(points)
+    assert read_transcript(tmp_path / "v.TextGrid").text == "container"
+    body = textgrid(y=WORDS).partition("item []:\n")[2]
+    (tmp_path / "v.TextGrid").write_text(points.replace("size = 1\nitem", "size = 2\nitem") + body)
+    assert read_transcript(tmp_path / "v.TextGrid").text == SAID
+    with pytest.raises(DataError, match="has no tier with words"):
+        read(z=[(0, 1, "silent"), (1, 2, "sounding")])
+
+
 def test_the_choice_is_said_with_the_others(read):
     assert read(PhonAlign=PHONES, TokensAlign=WORDS).notes == (
         "the words of v.TextGrid are those of its tier 'TokensAlign'; --tier names another",

@@ -15,7 +15,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from lexicon.errors import DataError
-from tts2face.interchange.subtitles.decoding import read_text
+from tts2face.interchange.subtitles.decoding import decode_file, read_text
 from tts2face.interchange.transcripts.chat import read_cha
 from tts2face.interchange.transcripts.ctm import read_ctm
 from tts2face.interchange.transcripts.elan import read_eaf
@@ -86,6 +86,7 @@ def read_transcript(path: Path, tier: str | None = None) -> Transcript:
         raise DataError(f"{path} contains no word; check the file")
     words, shared = shared_words(spoken)
     notes = (
+        encoding_note(path),
         choice,
         *chosen.notes,
         _overlap_note(path, spoken),
@@ -93,6 +94,17 @@ def read_transcript(path: Path, tier: str | None = None) -> Transcript:
         shared and f"{path.name}: {shared}",
     )
     return Transcript(words, tuple(note for note in notes if note))
+
+
+def encoding_note(path: Path) -> str:
+    """A sentence about the encoding of a text, if it was guessed; empty if it was not."""
+    try:
+        decoded = decode_file(path)
+    except DataError:
+        return ""  # a binary TextGrid; what cannot be read is said where it is read
+    if not decoded.is_guess:
+        return ""
+    return f"the encoding of {path.name} is not stated and was guessed as {decoded.encoding}; save it as UTF-8"
 
 
 def find_reader(path: Path) -> ReadTiers | None:

@@ -8,9 +8,9 @@ import functools
 import re
 from importlib import resources
 
-# <eps>, {SL}, [noise], (laughs); several in a row; ++UM++, +noise+ (CMU Sphinx); *cough*; &=laughs (CHAT)
+# <eps>, {SL}, [noise], (laughs); several in a row; ++UM++, +noise+ (CMU Sphinx); *cough*; _noise_; &=laughs (CHAT)
 _MARKED = re.compile(
-    r"(?:<[^<>]*>|\{[^{}]*\}|\[[^\[\]]*\]|\(\([^()]*\)\)|\([^()]*\)|\+{1,2}\w+\+{1,2}|\*\w+\*|&=\S+|\s)+"
+    r"(?:<[^<>]*>|\{[^{}]*\}|\[[^\[\]]*\]|\(\([^()]*\)\)|\([^()]*\)|\+{1,2}\w+\+{1,2}|\*\w+\*|_\w+_|&=\S+|\s)+"
 )
 # <LAUGH-yeah> (Buckeye), [laughter-yeah] (Switchboard): a word, and how it is said
 _SAID_LAUGHING = re.compile(r"[<\[](?:laughter|laugh|cry|yawn|ext|hes)-([^\W\d][\w'’_-]*)[>\]]", re.IGNORECASE)

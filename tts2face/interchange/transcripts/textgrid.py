@@ -15,6 +15,7 @@ TEXT_MARK = "ooTextFile"
 CHRONOLOGICAL_MARK = "Praat chronological TextGrid text file"
 BINARY_MARK = b"ooBinaryFile"
 INTERVALS, POINTS = "IntervalTier", "TextTier"
+ROUNDING_S = 1e-6  # by which programs write the end of an empty interval before its start
 LONG_TEXT = 0xFFFF  # length of a text that holds more than ASCII (Praat, abcio.cpp, binputw16)
 
 
@@ -81,9 +82,9 @@ def _read_tier(items: PraatItems, kind: str, name: str) -> Tier:
 
 
 def _label(start: float, end: float, text: str) -> SpokenCue:
-    if not (math.isfinite(start) and math.isfinite(end)) or start > end:
+    if not (math.isfinite(start) and math.isfinite(end)) or start > end + ROUNDING_S:
         raise DamagedError(f"the label {text[:40]!r} lies from {start} s to {end} s")
-    return SpokenCue(start, end, text.strip())
+    return SpokenCue(start, max(start, end), text.strip())
 
 
 def _read_chronological(items: PraatItems) -> list[Tier]:

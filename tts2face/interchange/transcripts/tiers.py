@@ -37,7 +37,8 @@ _PUNCTUATION = ".,;:!?\"'()"
 _WORDS_OF_ONE_LETTER = frozenset("aAI")
 _MARKS = re.compile(r"[0-9ːˑˈˌ:~^_\"'`\\\u0300-\u036f]")
 
-RANK_WORDS, RANK_TEXTS, RANK_KNOWN, RANK_UNKNOWN, RANK_OTHERS, RANK_PHONES = range(6)
+RANK_WORDS, RANK_TEXTS, RANK_KNOWN, RANK_UNKNOWN, RANK_POINTS, RANK_OTHERS, RANK_PHONES = range(7)
+SOUNDS = frozenset({"silent", "sounding"})  # "To TextGrid (silences)" of Praat
 
 
 def choose_tier(path: str, tiers: Sequence[Tier], name: str | None = None) -> tuple[Tier | None, str]:
@@ -87,10 +88,12 @@ def tier_rank(tier: Tier) -> int:
         return RANK_WORDS
     by_name = _rank_of_name(tier.name)
     by_name = _rank_of_name(tier.kind) if by_name is None else by_name
-    if by_name == RANK_PHONES or has_phones(tier):
+    if by_name == RANK_PHONES or has_phones(tier) or SOUNDS.issuperset(label.text for label in tier.labels):
         return RANK_PHONES
     if by_name is not None:
         return by_name
+    if tier.has_points:
+        return RANK_POINTS
     return RANK_KNOWN if _share_known(tier) >= LEAST_KNOWN else RANK_UNKNOWN
 
 

@@ -118,7 +118,10 @@ TALKER_KIND = JobKind(
     TalkerRequest,
     {
         "video": FormPart("Recording of a person who speaks, with sound.", add_video),
-        "transcript": FormPart("Spoken words, UTF-8 text; without words, phones are recognised.", add_words),
+        "transcript": FormPart(
+            "Spoken words, UTF-8 text, also a TextGrid or a table of labels; without words, phones are recognised.",
+            add_words,
+        ),
         "subtitles": FormPart("Spoken words with their times: SubRip or WebVTT.", add_words, is_list=True),
     },
     prepare_talker,
