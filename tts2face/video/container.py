@@ -152,8 +152,14 @@ def decode_frames(container: "InputContainer", stream: Any, path: Path, start: f
         raise DataError(f"{path} holds a {stream.type} track without a frame; copy or record it again")
     stated = (container.duration or 0) / 1e6
     is_short = max(end, end - start) < stated - MAX_SHORTFALL_S
-    if is_short and not STATE_DURATION.isdisjoint(container.format.name.split(",")) and not _is_whole_riff(path):
+    if is_short and _states_duration(container) and not _is_whole_riff(path):
         raise DataError(f"{path} is truncated: it ends at {end - start:.2f} s of {stated:.2f} s; copy it again")
+
+
+def _states_duration(container: "InputContainer") -> bool:
+    """Whether a file states how long it is; an MP3 does so with the header of LAME, by which it starts late."""
+    name = container.format.name
+    return not STATE_DURATION.isdisjoint(name.split(",")) or (name == "mp3" and bool(container.start_time))
 
 
 def decode_packets(packets: "Iterable[Packet[Any]]", path: Path, start: float) -> Iterator[Any]:
