@@ -116,11 +116,11 @@ def recording_notes(recordings: Sequence[Recording]) -> tuple[str, ...]:
             notes.update(dict.fromkeys(_written(recording).notes))
         except DataError:
             continue  # said where the recording is read
-    transcripts = [
-        recording.transcript if isinstance(recording.transcript, Path) else find_subtitles(recording.video)
-        for recording in recordings
-    ]
-    over = passed_over({recording.video for recording in recordings}, [path for path in transcripts if path])
+    read: set[Path | None] = {
+        recording.transcript for recording in recordings if isinstance(recording.transcript, Path)
+    }
+    read |= {find_subtitles(recording.video) for recording in recordings if recording.span is not None}
+    over = passed_over({recording.video for recording in recordings}, [path for path in read if path])
     left = len(notes) - MAX_NOTES
     more = (f"the same of {left} more",) if left > 0 else ()
     return (*[*notes][:MAX_NOTES], *more, *([over] if over else []))

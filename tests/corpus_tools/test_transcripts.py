@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from corpus_tools.recordings.folder import find_recordings, pronounce_recording, recording_notes
+from corpus_tools.recordings.observe import recordings_to_check
 from corpus_tools.recordings.subtitle_cues import find_subtitles, read_cues, subtitle_notes
 from corpus_tools.recordings.transcripts import find_transcript, read_transcript
 from lexicon.errors import DataError
@@ -229,6 +230,15 @@ def test_a_tier_is_named_for_all_recordings(tmp_path):
     (tmp_path / "take.TextGrid").write_text(LONG_GRID)
     (recording,) = find_recordings(tmp_path, "phones")
     assert [word for word, _ in pronounce_recording(recording)] == ["b"]
+
+
+def test_a_text_in_place_of_a_file_leaves_it_unread_and_cues_do_not(write, tmp_path):
+    (tmp_path / "take.mp4").touch()
+    write(".srt", SRT)
+    assert not any("not read" in note for note in recording_notes(find_recordings(tmp_path)))
+    (instead,) = recordings_to_check(tmp_path / "take.mp4", "bin blue")
+    (note,) = recording_notes([instead])
+    assert note.startswith("take.srt lies beside a video and is not read")
 
 
 def test_a_table_of_labels_is_not_read_aloud(write, tmp_path):
