@@ -4,6 +4,7 @@ Only what stands free has a meaning: numbers, texts in quotes and flags in angle
 and so is the rest of a line behind an exclamation mark (Praat manual, "TextGrid file formats").
 """
 
+import math
 import re
 from collections.abc import Iterator
 
@@ -81,7 +82,7 @@ class PraatItems:
     def count(self) -> int:
         """The next number, of items."""
         number = self.number()
-        if number != int(number) or number < 0:
+        if not math.isfinite(number) or number != int(number) or number < 0:
             raise DamagedError(f"line {self.line}: {number} is no number of items")
         return int(number)
 
