@@ -66,10 +66,10 @@ def fitting_forms(
     found = []
     for at, (word, forms) in enumerate(words):
         following = words[at + 1][1] if at + 1 < len(words) else ()
-        begins = {PHONES[phones[0]].is_vowel for phones in following if phones}
+        first_is_vowel = {PHONES[phones[0]].is_vowel for phones in following if phones}
         barred: frozenset[str] = frozenset()
-        if len(begins) == 1:
-            table = _NOT_BEFORE_VOWEL if True in begins else _NOT_BEFORE_CONSONANT
+        if len(first_is_vowel) == 1:
+            table = _NOT_BEFORE_VOWEL if True in first_is_vowel else _NOT_BEFORE_CONSONANT
             barred = table.get(word_key(word), barred)
         # what a user's dictionary says stays, whatever follows
         fitting = tuple(form for form in forms if form[-1] not in barred)

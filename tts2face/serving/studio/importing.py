@@ -115,13 +115,7 @@ async def import_file(
 
 
 def _timed_words(path: Path, name: str, tier: str | None) -> Transcript | None:
-    """Words of an uploaded file of another program; None for plain text.
-
-    Raises
-    ------
-    InputError
-        The file is too large, cannot be read, or has no such tier or no word.
-    """
+    """Words of an uploaded file of another program; None for plain text."""
     _check_size(path, name)
     suffix = Path(name).suffix.lower()
     with tempfile.TemporaryDirectory(prefix="tts2face-upload-") as folder:
