@@ -17,7 +17,9 @@ ROW = re.compile(
     re.MULTILINE,
 )
 TOLERANCES = (0, 500, 500)  # by which they may differ, so that few commits have to renew them
-MOST_STATEMENTS = 56_967  # of all packages: as many as they had before the files were divided by subject
+# Of all packages. They had 56,843 when the files had been divided by subject, 56,967 before it; since then came readers
+# of subtitles, transcripts, captures and films of other programs, and what says how they were read (2,700).
+MOST_STATEMENTS = 59_700
 
 
 class Size(NamedTuple):

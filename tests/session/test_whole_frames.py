@@ -118,3 +118,17 @@ def test_measured_speech_is_that_of_the_clip() -> None:
         times = word_times(pieces)
         assert (span.begin, span.end) == pytest.approx((times[0][1], times[-1][2]), abs=1e-4)
         assert span.total == pytest.approx(len(sound_of(pieces)) / LetterVoice().sample_rate)
+
+
+def test_the_phones_of_a_sentence_are_those_that_were_spoken() -> None:
+    """So edges that are corrected by hand at one frame rate fit at another one."""
+    expected = [piece.sentence for piece in pieces_of(TEXTS[1], 30.0, AbruptVoice())]
+    for fps in RATES:
+        pieces = pieces_of(TEXTS[1], fps, AbruptVoice())
+        for piece, phones in zip(pieces, expected, strict=True):
+            assert piece.sentence is not None
+            assert phones is not None
+            assert piece.sentence.phones == phones.phones
+            np.testing.assert_allclose(
+                piece.sentence.edges - piece.sentence.start, phones.edges - phones.start, atol=1e-9
+            )

@@ -9,7 +9,7 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from lexicon.values.fields import check_fields
 
 RECORDING = ""  # text of the one sentence of a recording
-MAX_END_CHANGE_S = 0.05  # the last edge is the end of the sound, padded to a whole number of frames
+MAX_END_CHANGE_S = 0.05  # the last edge is the end of the sound; older projects padded it to a whole frame
 EQUAL_EDGES_S = 1e-3  # by which edges of one sound differ, as its start is cut at a sample
 
 

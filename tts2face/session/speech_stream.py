@@ -35,7 +35,7 @@ from tts2face.session.speech import (
     text_of,
     without_long_silence,
 )
-from tts2face.session.whole_frames import WholeFrames, end_in_silence
+from tts2face.session.whole_frames import FramedPart, WholeFrames, end_in_silence
 from tts2face.sound.pauses import speech_onset
 from tts2face.sound.voice_pool import require_installed
 from tts2face.storage.memory import NO_MEMORY, ResultMemory
@@ -86,6 +86,9 @@ class Piece:
         Words that the recording probably does not contain and that start in this piece; in seconds of the whole clip.
     text
         Written sentence without its marks; empty for a recording and for idle animation.
+    sentence
+        Phones as they were spoken, in seconds of the piece: the sentence may begin within the first frame, behind the
+        rest of the one before it, and end behind the last frame. None for a recording.
     transcript
         Phones of the whole recording, with its first piece; None for all other pieces.
     voice_sound
@@ -102,6 +105,7 @@ class Piece:
     explain: "Callable[[], tuple[PhoneExplanation, ...]]" = tuple
     mismatches: "tuple[TextMismatch, ...]" = ()
     text: str = ""
+    sentence: PhoneSequence | None = None
     transcript: PhoneSequence | None = None
     voice_sound: Waveform | None = None
     drawn: "Future[Any] | None" = None
@@ -179,26 +183,23 @@ def spoken_pieces(
     """
     frames = WholeFrames(first_frame, prepared.fps, ends_on_frame=ends_on_frame)
     for spoken, n_steps, text, is_last in speak_sentences(prepared, models, has_phones=has_phones):
-        start = frames.frame
-        whole, n_frames = frames.add(spoken, is_last=is_last)
-        yield _piece(whole, (start, n_frames), prepared.fps, n_steps, text)
-    if (rest := frames.finish()) is not None:  # the sentences after it were silent
-        start = frames.frame
-        whole, n_frames = frames.add(rest, is_last=True)
-        yield _piece(whole, (start, n_frames), prepared.fps)
+        yield _piece(frames.add(spoken, is_last=is_last), prepared.fps, n_steps, text)
+    # the sentences after it were silent
+    if (rest := frames.finish()) is not None:
+        yield _piece(frames.add(rest, is_last=True), prepared.fps)
 
 
-def _piece(spoken: SpokenSentence, frames: tuple[int, int], fps: Fraction, n_steps: int = 0, text: str = "") -> Piece:
-    """Piece of a spoken part, with its first frame and its number of frames."""
-    first, n_frames = frames
-    start, speech = float(first / fps), spoken.speech
+def _piece(part: FramedPart, fps: Fraction, n_steps: int = 0, text: str = "") -> Piece:
+    spoken = part.spoken
+    start, speech = float(part.first / fps), spoken.speech
     return Piece(
-        Clip.at_rest(n_frames, float(fps), replace(speech, waveform=spoken.sound)),
+        Clip.at_rest(part.n_frames, float(fps), replace(speech, waveform=spoken.sound)),
         start,
         n_steps,
         spoken.timeline.restrict(0.0, speech.waveform.duration).shift(start),
         tuple(replace(mark, seconds=mark.seconds + start) for mark in spoken.marks),
         text=text,
+        sentence=part.phones,
         voice_sound=speech.waveform,
     )
 
@@ -215,7 +216,7 @@ def spoken_ahead(pieces: Iterator[Piece], timeline: Timeline, yield_turn: YieldT
             timeline.check_duration(seconds)
             break
         waiting.append(piece)
-        seconds += piece.speech.waveform.duration
+        seconds += piece.clip.motion.duration
         yield_turn()
     while waiting:
         yield waiting.popleft()
@@ -239,7 +240,7 @@ def timed_speech(prepared: PreparedRequest, models: SpeechModels, *, has_phones:
 def _within_clip(pieces: Iterator[Piece], timeline: Timeline, yield_turn: YieldTurn) -> Iterator[Piece]:
     seconds = 0.0
     for piece in spoken_ahead(pieces, timeline, yield_turn):
-        seconds += piece.speech.waveform.duration
+        seconds += piece.clip.motion.duration
         yield piece
     timeline.check_duration(seconds)
 

@@ -6,15 +6,29 @@ any frame rate at which a frame is no longer than the silence at the end of a se
 
 from dataclasses import replace
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 
+from lexicon.sequence import PhoneSequence
 from tts2face.gestures.timeline import Timeline
 from tts2face.session.joining import last_audible, with_length
 from tts2face.session.speech import SpokenSentence
 from tts2face.types import Speech, Waveform, concatenate_speech, first_sample, frame_count
 
 TAIL_S = 0.05  # of silence at least at the end of a sentence: a frame from 20 a second on, so that no sound is cut
+
+
+class FramedPart(NamedTuple):
+    """A spoken part in whole frames: its first frame, their number, and the phones of the part as it was spoken.
+
+    These are in seconds of the frames: they begin behind the rest of the part before, and may end behind the frames.
+    """
+
+    spoken: SpokenSentence
+    first: int
+    n_frames: int
+    phones: PhoneSequence
 
 
 class WholeFrames:
@@ -39,10 +53,12 @@ class WholeFrames:
         self._ends_on_frame = ends_on_frame
         self._rest: SpokenSentence | None = None
 
-    def add(self, spoken: SpokenSentence, *, is_last: bool) -> tuple[SpokenSentence, int]:
-        """A part with what is left of the part before it, and its number of frames."""
-        whole = spoken if self._rest is None else _joined(self._rest, spoken)
-        self._rest = None
+    def add(self, spoken: SpokenSentence, *, is_last: bool) -> FramedPart:
+        """A part with what is left of the part before it, in whole frames, unless it is the last."""
+        first, rest = self.frame, self.finish()
+        whole = spoken if rest is None else _joined(rest, spoken)
+        own, before_s = spoken.speech.phones, 0.0 if rest is None else rest.sound.duration
+        phones = PhoneSequence(own.phones, own.edges + before_s)
         sound = whole.sound
         if is_last:
             n_frames = frame_count(sound.duration, float(self._fps))
@@ -56,9 +72,9 @@ class WholeFrames:
         self.frame += n_frames
         if n_samples < len(sound.samples):
             voice = whole.speech.waveform.part(n_samples, len(sound.samples))
-            rest = sound.part(n_samples, len(sound.samples))
-            self._rest = SpokenSentence(Speech.without_phones(voice), Timeline(), (), rest)
-        return _with_length(whole, n_samples), n_frames
+            silence = sound.part(n_samples, len(sound.samples))
+            self._rest = SpokenSentence(Speech.without_phones(voice), Timeline(), (), silence)
+        return FramedPart(_with_length(whole, n_samples), first, n_frames, phones)
 
     def finish(self) -> SpokenSentence | None:
         """The rest of the last part, where it was not known to be the last."""

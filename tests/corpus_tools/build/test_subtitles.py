@@ -63,7 +63,10 @@ def test_subtitles_with_sound_descriptions_only_are_refused(tmp_path: Path) -> N
 def test_a_file_without_subtitles_is_refused(content: bytes, tmp_path: Path) -> None:
     path = tmp_path / "a.srt"
     path.write_bytes(content)
-    with pytest.raises(DataError, match=r"export them again|save it as UTF-8"):
+    with pytest.raises(
+        DataError,
+        match=r"no subtitles of a format that is read \(SubRip, .*\); convert it|save it as UTF-8",
+    ):
         read_cues(path)
 
 

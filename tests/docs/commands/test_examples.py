@@ -36,7 +36,8 @@ def test_a_clip(tmp_path: Path) -> None:
     printed = run_example("clip", tmp_path)
     n_frames = n_pictures(tmp_path / "hello.mp4")
     assert f"{n_frames} frames" in printed
-    assert len(csv_rows(tmp_path / "hello.csv")) == 1 + 2 * n_frames  # Live Link Face has 60 frames a second, not 30
+    n_rows = len(csv_rows(tmp_path / "hello.csv")) - 1
+    assert n_rows in {2 * n_frames - 1, 2 * n_frames}  # Live Link Face has 60 frames a second, not 30
     sentences = re.findall(r"^[A-Z].*$", (tmp_path / "hello.srt").read_text(), re.MULTILINE)
     assert sentences == ["Hello there.", "We were away a year ago.", "Good bye."]
     words = re.findall(r"^ *([\d.]+) s  (\w+) +(\S.*)$", printed, re.MULTILINE)

@@ -3,7 +3,7 @@
 import pytest
 
 from tests.interchange.subtitles.conftest import ReadText, srt
-from tts2face.interchange.subtitles.encodings import encoding_of_language
+from tts2face.interchange.subtitles.encodings import encoding_of_language, guess_encoding
 
 TEXTS = {
     "cs": ("cp1250", "Dobrý den, můžeme začít? Příště přijďte dřív."),
@@ -84,3 +84,10 @@ def test_damaged_utf_8_stays_utf_8(read: ReadText) -> None:
 )
 def test_encodings_of_languages(language: str | None, name: str | None) -> None:
     assert encoding_of_language(language) == name
+
+
+@pytest.mark.parametrize("text", ["It is £5.", "It cost me £ 20 then.", "Only 5£!", "He paid ¥300 for it."])
+def test_money_is_no_letter(text: str) -> None:
+    found = guess_encoding(text.encode("cp1252"))
+    assert found is not None
+    assert (found.text, found.encoding) == (text, "cp1252")

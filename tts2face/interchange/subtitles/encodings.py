@@ -72,6 +72,8 @@ _CANDIDATES = (
 )
 _WORD = re.compile(r"[^\W\d_]+")
 _HIGH = re.compile(r"[^\x00-\x7f]")
+_MONEY = re.compile(r"[£¥¢](?=\s?\d)|(?<=\d)[£¥¢]")
+_BY_DIGIT = re.compile(r"(?<=\d)(?![\x00-\x7f])[^\W\d_]|(?![\x00-\x7f])[^\W\d_](?=\d)")  # "Ł5" is no word, but £5
 _NEUTRAL = frozenset("–—‘’‚“”„†•…‹›«»€™©®°§·\u00a0♪¿¡№")
 MIN_SCORE = 0.6
 MIN_NAMED_SCORE = 0.3  # of the encoding of a language that is known: its words may have names of others
@@ -145,8 +147,10 @@ def _score(text: str, name: str) -> float:
         if script == name:
             share = len(letters.findall(text.lower())) / len(high)
             return share - wrong + _share_of(text, frequent_words)
+    in_words = "".join(_HIGH.findall(_BY_DIGIT.sub("", text))).lower()
+    n_money = len(_MONEY.findall(text))
     scores = [
-        sum(character in alphabet for character in "".join(high).lower()) / len(high)
+        (sum(character in alphabet for character in in_words) + n_money) / len(high)
         - wrong
         + _share_of(text, frequent_words)
         - 0.002 * order

@@ -155,7 +155,7 @@ def _timing(preview: Preview) -> dict[str, Any]:
         first_s = piece["begin"]
         if not (is_recording and sentences):
             timed = piece.get("transcript", piece)
-            end = preview.duration if is_recording else first_s + piece["seconds"]
+            end = preview.duration if is_recording else first_s + timed["edges"][-1]
             at = len(sentences)
             sentences.append([piece["text"], piece["occurrence"], round(first_s, 6), round(end, 6)])
             phones += [

@@ -95,7 +95,7 @@ def _pieces(session: "Session", project: Project, have: frozenset[str]) -> Itera
         digest = digest_of(parts)
         event = {
             "type": "piece", "number": number, "text": piece.text, "occurrence": said[piece.text],
-            "begin": piece.begin, "seconds": clip.speech.waveform.duration, "rate": clip.speech.waveform.rate,
+            "seconds": clip.speech.waveform.duration, "rate": clip.speech.waveform.rate,
             "n_frames": len(motion), "n_samples": len(samples), "digest": digest,
             **_timing(piece), "notes": [mismatch.sentence for mismatch in piece.mismatches],
         }  # fmt: skip
@@ -108,14 +108,16 @@ def _pieces(session: "Session", project: Project, have: frozenset[str]) -> Itera
 
 
 def _timing(piece: "Piece") -> dict[str, Any]:
-    phones, words = piece.clip.speech.phones, piece.clip.speech.words
-    edges = phones.edges
+    """Start of the sentence in the clip, and its phones and words in seconds of the sentence."""
+    speech = piece.speech
+    edges = speech.phones.edges
+    phones = piece.sentence or speech.phones
+    start = phones.start
+    times = [(word, float(edges[word.first]) - start, float(edges[word.last]) - start) for word in speech.words]
     return {
-        **_phones(phones),
-        "words": [
-            [word.text, round(float(edges[word.first]), 6), round(float(edges[word.last]), 6), word.is_doubtful]
-            for word in words
-        ],
+        "begin": piece.begin + start,
+        **_phones(PhoneSequence(phones.phones, phones.edges - start)),
+        "words": [[word.text, round(begin, 6), round(end, 6), word.is_doubtful] for word, begin, end in times],
     }
 
 
