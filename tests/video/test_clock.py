@@ -16,6 +16,8 @@ from tts2face.storage.wave_files import wave_bytes
 from tts2face.video.container import start_time
 from tts2face.video.media import read_frames, read_media_info, read_sound, sound_blocks
 
+pytestmark = pytest.mark.formats
+
 RATE = 48_000
 LATENCY_S = 0.005  # by which a word may be off
 FPS, SECONDS = 25, 2.0

@@ -12,6 +12,8 @@ from tests.interchange.subtitles.conftest import ReadText, srt
 from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.interchange.subtitles.reader import read_subtitles
 
+pytestmark = pytest.mark.formats
+
 BOTH = [(1.0, 3.0, "The train was late. Again."), (4.0, 6.0, "We walked home.")]
 SAMI = """<SAMI><HEAD><STYLE TYPE="text/css"><!--
 .ENCC { Name: English; lang: en-US; } .DECC { Name: Deutsch; lang: de-DE; }

@@ -12,6 +12,8 @@ from lexicon.errors import DataError
 from tests.interchange.transcripts.grids import PHONES, WORDS, textgrid
 from tts2face.interchange.transcripts.textgrid import read_textgrid
 
+pytestmark = pytest.mark.formats
+
 SAVED = ("Save as text file...", "Save as short text file...", "Save as chronological text file...",
          "Save as binary file...")  # fmt: skip
 LABELS = ("", "say", 'say ""hi"" there', "1e-05", "12 seconds", "! no comment", "ñandú", "東京", "😀 up", "a\nb",
