@@ -41,6 +41,8 @@ def film_facts(path: Path) -> Film:
     """Length and rate of a film or recording; none of a file that cannot be read as one."""
     import av
 
+    if not path.is_file():  # FFmpeg would wait for the writer of a pipe
+        return Film()
     try:
         with av.open(str(path)) as container:
             video = next(iter(container.streams.video), None)
@@ -54,6 +56,8 @@ def has_text_track(path: Path) -> bool:
     """Whether a file is a film with a track of subtitles of text."""
     import av
 
+    if not path.is_file():
+        return False
     try:
         with av.open(str(path)) as container:
             return any(_codec(stream) in _TEXT for stream in container.streams.subtitles)
