@@ -38,10 +38,18 @@ def test_a_take_must_be_long_enough(tmp_path: Path, seconds: float, found: str) 
     assert "".join(one.severity for one in report.findings) == found
 
 
-def test_a_damaged_take_says_what_is_wrong(tmp_path: Path) -> None:
+def test_a_take_with_a_damaged_cell_is_read_and_says_so(tmp_path: Path) -> None:
     report = check_gesture_take(write_table(tmp_path / "take.csv", 3, broken=True), RunOptions(tmp_path, 1), print)
+    assert report.seconds == pytest.approx(3.0)
+    assert {finding.severity for finding in report.findings} == {"warning"}
+    assert "cells without a number, which are interpolated: 1" in {finding.message for finding in report.findings}
+
+
+def test_a_take_of_damaged_rows_says_what_is_wrong(tmp_path: Path) -> None:
+    (tmp_path / "take.csv").write_text("\n".join([HEADER, *["00:00:00:xx.000,61,a,b,c,d,e,f,g"] * 90]))
+    report = check_gesture_take(tmp_path / "take.csv", RunOptions(tmp_path, 1), print)
     assert (report.seconds, report.findings[0].severity) == (0.0, "refusal")
-    assert "line 7 of" in report.findings[0].message
+    assert "fewer than two frames with a time and a face (0)" in report.findings[0].message
 
 
 def test_another_kind_of_file(tmp_path: Path) -> None:
