@@ -94,7 +94,8 @@ class Interruption:
 
     An exception that a signal raises inside a callback of compiled code is dropped there, and so may be one inside a
     library that catches everything. The interruption is then raised again, a moment later. Compiled code that does not
-    return ends with the process after two seconds; a second signal ends it at once, even while the clean-up hangs.
+    return ends with the process after two seconds, as does a thread for which Python waits at its exit; a second signal
+    ends it at once, even while the clean-up hangs.
 
     Attributes
     ----------
@@ -157,6 +158,9 @@ class Interruption:
         first, first_s = 0, 0.0
         while True:
             if not select.select([reader], [], [], HANDLED_S if first else None)[0]:
+                # the interruption may part a pool from the thread that it has just started: nothing would end it
+                if self._is_over and self.number:
+                    os._exit(128 + self.number)
                 # as long as the exception lives, its clean-up runs, however long
                 if not self._is_over and (self._raised is None or self._raised() is None):
                     _exit_at_once(first)

@@ -35,7 +35,7 @@ if __name__ == "__main__":
 """
 
 COMPILER = """
-import ctypes, os, signal, sys, time
+import ctypes, os, signal, sys, threading, time
 from pathlib import Path
 from cli.main import app, main
 from tts2face.storage.temporary import Temporary
@@ -65,6 +65,13 @@ def replaced(number: int):
         time.sleep(600)
     finally:
         raise RuntimeError("no compiled object yet")
+
+@app.command
+def parted(number: int):
+    "A thread that nothing ends, as one that its pool does not know yet when the exception comes."
+    threading.Thread(target=threading.Event().wait).start()
+    os.kill(os.getpid(), number)
+    time.sleep(600)
 
 @app.command
 def stuck():
@@ -125,7 +132,7 @@ def test_a_signal_whose_exception_is_dropped_or_replaced_ends_the_command(tmp_pa
     started = [
         (number, run_script(tmp_path, command, str(int(number))))
         for number in numbers
-        for command in ("dropped", "replaced")
+        for command in ("dropped", "replaced", "parted")
     ]
     wrong = []
     for number, process in started:
