@@ -1,5 +1,6 @@
 """Sentences end where their sound ends, and frames follow: the sound of a text is the same at any frame rate."""
 
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -7,7 +8,9 @@ import pytest
 
 from lexicon.sequence import SILENCE
 from tests.tones import LetterVoice
-from tts2face.request import Request
+from tts2face.gestures.elements import Nod
+from tts2face.gestures.timeline import Timeline
+from tts2face.request import Idle, Listening, Request
 from tts2face.session.prepared import prepare
 from tts2face.session.speech_stream import Piece, SpeechModels, measure_speech, spoken_pieces
 from tts2face.session.whole_frames import TAIL_S
@@ -112,12 +115,13 @@ def test_a_style_that_reaches_the_end_of_a_sentence_goes_on_at_the_next_frame() 
 
 
 def test_measured_speech_is_that_of_the_clip() -> None:
-    for fps in (23.976, 30.0):
-        pieces = pieces_of(TEXTS[1], fps, LetterVoice())
-        span = measure_speech(prepare(Request(text=TEXTS[1], fps=fps)), SpeechModels(lambda *_: LetterVoice()))
-        times = word_times(pieces)
-        assert (span.begin, span.end) == pytest.approx((times[0][1], times[-1][2]), abs=1e-4)
-        assert span.total == pytest.approx(len(sound_of(pieces)) / LetterVoice().sample_rate)
+    for fps in (1.0, 2.0, 5.0, 12.0, 23.976, 30.0):
+        for voice in (LetterVoice(), AbruptVoice()):
+            pieces = pieces_of(TEXTS[1], fps, voice)
+            span = measure_speech(prepare(Request(text=TEXTS[1], fps=fps)), SpeechModels(lambda *_, voice=voice: voice))
+            times = word_times(pieces)
+            assert (span.begin, span.end) == pytest.approx((times[0][1], times[-1][2]), abs=1e-4)
+            assert span.total == pytest.approx(len(sound_of(pieces)) / voice.sample_rate, abs=1e-3)
 
 
 def test_the_phones_of_a_sentence_are_those_that_were_spoken() -> None:
@@ -132,3 +136,25 @@ def test_the_phones_of_a_sentence_are_those_that_were_spoken() -> None:
             np.testing.assert_allclose(
                 piece.sentence.edges - piece.sentence.start, phones.edges - phones.start, atol=1e-9
             )
+
+
+@pytest.mark.parametrize("fps", [23.976, 27.3, 29.97, 30.0, 59.94])
+@pytest.mark.parametrize("n_frames", [8, 9, 13])
+def test_parts_without_an_end_do_not_drift(fps: float, n_frames: int) -> None:
+    """Hundreds of waits in a live clip last as long as was asked for."""
+    exact, frame = exact_rate(fps), 0
+    prepared = prepare(Request(source=Idle(float(n_frames / exact)), fps=fps))
+    for _ in range(100):
+        pieces = list(spoken_pieces(prepared, SpeechModels(lambda *_: LetterVoice()), frame, ends_on_frame=True))
+        frame += sum(len(piece.clip.motion) for piece in pieces)
+    assert frame == 100 * n_frames
+
+
+@pytest.mark.parametrize("fps", [20.0, 23.976, 24.0, 25.0, 30.0, 60.0])
+def test_a_nod_in_the_last_part_of_a_frame_comes_with_the_next_piece(fps: float) -> None:
+    nods = [Nod(at / 100) for at in range(5, 2500, 3)]
+    prepared = replace(prepare(Request(source=Listening(25.0), fps=fps)), listening=Timeline(nods=tuple(nods)))
+    pieces = list(spoken_pieces(prepared, SpeechModels(lambda *_: LetterVoice())))
+    assert len(pieces) > 2
+    found = [nod.time for piece in pieces for nod in piece.timeline.nods]
+    assert found == pytest.approx([nod.time for nod in nods], abs=1e-9)

@@ -151,14 +151,14 @@ class _PcmEncoder:
         return rest
 
     def _written(self, samples: NDArray[np.float32]) -> bytes:
-        content = self._header + pcm_bytes(samples.clip(-1.0, 1.0))
-        self._n_bytes += len(content) - len(self._header)
-        self._header = b""
+        content = pcm_bytes(samples.clip(-1.0, 1.0))
+        # the size has 32 bits
+        if self._file is not None and self._has_header and self._n_bytes + len(content) > UNKNOWN_BYTES - HEAD_BYTES:
+            raise InputError("a .wav file has at most 4 GB of sound; choose flac, or divide the text")
+        self._n_bytes += len(content)
+        content, self._header = self._header + content, b""
         if self._file is None:
             return content
-        # the size has 32 bits
-        if self._has_header and self._n_bytes > UNKNOWN_BYTES - HEAD_BYTES:
-            raise InputError("a .wav file has at most 4 GB of sound; choose flac, or divide the text")
         self._file.write(content)
         return b""
 

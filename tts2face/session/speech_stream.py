@@ -149,15 +149,24 @@ def measure_speech(prepared: PreparedRequest, models: SpeechModels) -> SpeechSpa
     start = 0.0
     end = 0.0
     total = 0.0
-    for part in speak_sentences(prepared, models):
-        speech = part.spoken.speech
-        phones = speech.phones
+    for part, _ in _framed(prepared, models, WholeFrames(0, prepared.fps, ends_on_frame=False)):
+        at, phones = float(part.first / prepared.fps), part.phones
         voiced = [number for number, phone in enumerate(phones.phones) if phone != SILENCE]
         if voiced:
-            start = start if end else total + float(phones.edges[voiced[0]])
-            end = total + float(phones.edges[voiced[-1] + 1])
-        total += speech.waveform.duration
+            start = start if end else at + float(phones.edges[voiced[0]])
+            end = at + float(phones.edges[voiced[-1] + 1])
+        total = at + part.spoken.sound.duration
     return SpeechSpan(start, end, total)
+
+
+def _framed(
+    prepared: PreparedRequest, models: SpeechModels, frames: WholeFrames, *, has_phones: bool = True
+) -> Iterator[tuple[FramedPart, SpokenPart | None]]:
+    """Spoken parts in whole frames, and as they were spoken; None where the sentences after the last one are silent."""
+    for part in speak_sentences(prepared, models, has_phones=has_phones):
+        yield frames.add(part.spoken, is_last=part.is_last), part
+    if (rest := frames.finish()) is not None:
+        yield frames.add(rest, is_last=True), None
 
 
 def spoken_pieces(
@@ -182,11 +191,8 @@ def spoken_pieces(
         Whether the last one does so, too.
     """
     frames = WholeFrames(first_frame, prepared.fps, ends_on_frame=ends_on_frame)
-    for spoken, n_steps, text, is_last in speak_sentences(prepared, models, has_phones=has_phones):
-        yield _piece(frames.add(spoken, is_last=is_last), prepared.fps, n_steps, text)
-    # the sentences after it were silent
-    if (rest := frames.finish()) is not None:
-        yield _piece(frames.add(rest, is_last=True), prepared.fps)
+    for framed, part in _framed(prepared, models, frames, has_phones=has_phones):
+        yield _piece(framed, prepared.fps) if part is None else _piece(framed, prepared.fps, part.n_steps, part.text)
 
 
 def _piece(part: FramedPart, fps: Fraction, n_steps: int = 0, text: str = "") -> Piece:

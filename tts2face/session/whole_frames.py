@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lexicon.sequence import PhoneSequence
+from tts2face.gestures.kinds import KINDS
 from tts2face.gestures.timeline import Timeline
 from tts2face.session.joining import last_audible, with_length
 from tts2face.session.speech import SpokenSentence
@@ -59,22 +60,23 @@ class WholeFrames:
         whole = spoken if rest is None else _joined(rest, spoken)
         own, before_s = spoken.speech.phones, 0.0 if rest is None else rest.sound.duration
         phones = PhoneSequence(own.phones, own.edges + before_s)
-        sound = whole.sound
+        n_frames, n_samples = self._length(whole.sound, is_last=is_last)
+        self.frame += n_frames
+        if not is_last and n_samples < len(whole.sound.samples):
+            self._rest = _after(whole, n_samples)
+        return FramedPart(_with_length(whole, n_samples), first, n_frames, phones)
+
+    def _length(self, sound: Waveform, *, is_last: bool) -> tuple[int, int]:
+        """Frames and samples of a part."""
         if is_last:
             n_frames = frame_count(sound.duration, float(self._fps))
-            n_samples = self._n_samples(n_frames, sound.rate) if self._ends_on_frame else len(sound.samples)
-        else:
-            n_frames = self._n_whole(len(sound.samples), sound.rate)
-            n_samples = self._n_samples(n_frames, sound.rate)
-            if n_frames == 0 or n_samples < last_audible(sound):  # a frame longer than the silence at the end
-                n_frames += 1
-                n_samples = self._n_samples(n_frames, sound.rate)
-        self.frame += n_frames
-        if n_samples < len(sound.samples):
-            voice = whole.speech.waveform.part(n_samples, len(sound.samples))
-            silence = sound.part(n_samples, len(sound.samples))
-            self._rest = SpokenSentence(Speech.without_phones(voice), Timeline(), (), silence)
-        return FramedPart(_with_length(whole, n_samples), first, n_frames, phones)
+            # a hundredth of a frame, which is rounding, is left out where more may follow
+            return n_frames, self._n_samples(n_frames, sound.rate) if self._ends_on_frame else len(sound.samples)
+        n_frames = self._n_whole(len(sound.samples), sound.rate)
+        # a frame may be longer than the silence at the end
+        if n_frames == 0 or self._n_samples(n_frames, sound.rate) < last_audible(sound):
+            n_frames += 1
+        return n_frames, self._n_samples(n_frames, sound.rate)
 
     def finish(self) -> SpokenSentence | None:
         """The rest of the last part, where it was not known to be the last."""
@@ -101,12 +103,25 @@ def end_in_silence(spoken: SpokenSentence) -> SpokenSentence:
     return spoken if n_samples <= len(spoken.sound.samples) else _with_length(spoken, n_samples)
 
 
+def _after(spoken: SpokenSentence, n_samples: int) -> SpokenSentence:
+    """Silence at the end of a part, from a sample on, with the instants of its timeline there."""
+    voice, sound = spoken.speech.waveform, spoken.sound
+    at = n_samples / sound.rate
+    instants = {
+        name: tuple(element for element in getattr(spoken.timeline, name) if element.time >= at)
+        for name, kind in KINDS.items()
+        if kind.shape == "instant"
+    }
+    silence = Speech.without_phones(voice.part(n_samples, len(sound.samples)))
+    return SpokenSentence(silence, Timeline(**instants).shift(-at), (), sound.part(n_samples, len(sound.samples)))
+
+
 def _joined(rest: SpokenSentence, spoken: SpokenSentence) -> SpokenSentence:
     """A part that begins with the rest of another one."""
     seconds = rest.sound.duration
     return SpokenSentence(
         concatenate_speech([rest.speech, spoken.speech]),
-        spoken.timeline.shift(seconds, holds_start=True),
+        rest.timeline.merge(spoken.timeline.shift(seconds, holds_start=True)),
         tuple(replace(mark, seconds=mark.seconds + seconds) for mark in spoken.marks),
         Waveform(np.concatenate([rest.sound.samples, spoken.sound.samples]), spoken.sound.rate),
     )
