@@ -11,6 +11,7 @@ from tts2face.sound.pauses import (
     _window_levels,
     cut_at_pauses,
     find_pauses,
+    is_near_speech,
     speech_level,
     speech_onset,
 )
@@ -108,3 +109,13 @@ def test_long_silence_is_cut_beside_the_speech() -> None:
     sound = in_silence(speech_with_pauses(3.0, 0.3, 3.0), 30.0)
     spans = cut_at_pauses(sound, 20.0)
     assert any(start <= 30.0 and end >= 36.3 for start, end in spans)
+
+
+@pytest.mark.parametrize("softer_db", [20.0, 26.0, 29.0, 32.0])
+def test_speech_behind_a_jingle_is_no_silence(softer_db: float) -> None:
+    speech = speech_with_pauses(*[1.0, 0.5] * 12, 1.0)
+    loud = np.random.default_rng(0).uniform(-0.8, 0.8, 2 * speech.rate).astype(np.float32)
+    samples = np.concatenate([loud, speech.samples / np.abs(speech.samples).max() * 0.8 * 10.0 ** (-softer_db / 20.0)])
+    levels = 10.0 * np.log10(np.square(samples.reshape(-1, speech.rate // 100)).mean(axis=1) + 1e-12)
+    counted = is_near_speech(levels, 0.01)
+    assert counted[3 * 100 :].mean() > 0.9

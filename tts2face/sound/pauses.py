@@ -28,6 +28,7 @@ MIN_STRETCH_SHARE = 0.5  # least length of a part, relative to the largest one; 
 LOUD_S, LOUD_RANGE_DB = 0.5, 30.0  # what is at most so far below the loudest half second is speech; a slam is shorter
 NEAR_SPEECH_S = 1.0  # of speech: the pauses between sentences belong to it
 NEAR_SOUND_S = 0.3  # of silence before and after sound
+SPEECH_RANGE_DB = 15.0  # least range of speech with its pauses; noise has half of it in windows of 10 ms
 SILENCE_DB = 60.0  # below the loudest half second: digital silence and noise of a converter, no room
 Span = tuple[float, float]
 
@@ -35,9 +36,16 @@ Span = tuple[float, float]
 def is_near_speech(levels: NDArray[np.floating], step_s: float) -> NDArray[np.bool_]:
     """Whether levels (T,) in dB, `step_s` apart, are of speech or its pauses, not of long silence or noise around it.
 
-    Measures of a whole recording are taken from these, so that they do not depend on how much else it holds.
+    Measures of a whole recording are taken from these, so that they do not depend on how much else it holds. Where most
+    of what sounds is softer, and has the range of speech, the loud part is a jingle or applause.
     """
-    return _is_near(levels >= loudest_level(levels, step_s) - LOUD_RANGE_DB, round(NEAR_SPEECH_S / step_s))
+    near = _is_near(levels >= loudest_level(levels, step_s) - LOUD_RANGE_DB, round(NEAR_SPEECH_S / step_s))
+    sounding = is_near_sound(levels, step_s)
+    softer = levels[sounding & ~near]
+    if 2 * len(softer) <= np.count_nonzero(sounding):
+        return near
+    low, high = np.quantile(softer, (NOISE_QUANTILE, SPEECH_QUANTILE))
+    return sounding if high - low >= SPEECH_RANGE_DB else near
 
 
 def is_near_sound(levels: NDArray[np.floating], step_s: float) -> NDArray[np.bool_]:
