@@ -45,7 +45,7 @@ SRT: dict[str, tuple[str, list[tuple[float, float, str]], list[int]]] = {
     "entities and invisible characters": (f"1\n{A}\n\u200eHi&nbsp;&amp;\u00a0all.\u200b\n\n2\n{B}\nBye.\n",
                                           [(1.0, 2.0, "Hi & all."), BYE], []),
     "a file that ends in the middle": (f"1\n{A}\nHi.\n\n2\n00:00:03,0", [(1.0, 2.0, "Hi. 2 00:00:03,0")], []),
-    "an arrow in the words": (f"1\n{A}\nA -> b.\n\n2\n{B}\nBye.\n", [(1.0, 2.0, ""), BYE], [3]),
+    "an arrow in the words": (f"1\n{A}\nA -> b.\n\n2\n{B}\nBye.\n", [(1.0, 2.0, "A -> b."), BYE], []),
     "a player's advertisement before the first cue": (f"Subtitles by x\n\n1\n{A}\nHi.\n\n2\n{B}\nBye.\n", BOTH, []),
 }  # fmt: skip
 

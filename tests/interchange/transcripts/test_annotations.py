@@ -126,11 +126,11 @@ def test_exmaralda_gives_the_transcription(read):
 
 def test_chat_gives_what_the_first_speaker_says(read):
     found = read("v.cha", CHA)
-    assert found.text == "I want I want the dog cause it's gonna go ."
+    assert found.text == "I want I want the dog cause it's gonna go"
     assert (found.words[0].start, found.words[-1].end) == (0.5, 2.5)
     assert "'MOT' also has words" in found.notes[0]
     mother = read("v.cha", CHA, "MOT")
-    assert mother.text == "uh no . well done"
+    assert mother.text == "uh no well done"
     assert 2.5 < mother.words[0].start < mother.words[1].end < 3.0
     assert mother.notes[0] == "1 lines of v.cha without times lie between the others"
 

@@ -27,6 +27,8 @@ def test_silence_and_noise_have_no_words(label):
         ("3 < x we get y > 0", "3 < x we get y > 0"), ("<LAUGH-yeah>", "yeah"), ("[laughter-yeah]", "yeah"),
         ("don't", "don't"), ("über", "über"), ("he said (quietly) no", "he said (quietly) no"), ("7", "7"),
         ("silence", "silence"), ("noise", "noise"), ("bin sp red", "bin red"),
+        ("das ist lau hier", "das ist lau hier"), ("you dummy", "you dummy"), ("SL 500", "SL 500"),
+        ("ja ((lacht)) gut", "ja gut"),
     ],
 )  # fmt: skip
 def test_words_stay(label, words):

@@ -1,5 +1,6 @@
 """SubRip and WebVTT: blocks of lines that begin with a line of times."""
 
+import html
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -52,7 +53,7 @@ def with_voice(cue: WrittenCue) -> WrittenCue:
     voice, language = _VOICE.search(cue.text), _LANGUAGE.search(cue.text)
     return replace(
         cue,
-        speaker=" ".join(voice["name"].split()) if voice else "",
+        speaker=" ".join(html.unescape(voice["name"]).split()) if voice else "",
         style=voice["classes"].lstrip(".") if voice else "",
         language=language[1] if language else None,
     )
@@ -114,7 +115,9 @@ def _take_label(block: _Block, following: _Block, *, are_ids_words: bool) -> Non
     has_blank_before = not lines[-2].strip() if len(lines) > 1 else block.begin_s is None
     is_number = _NUMBER.fullmatch(lines[-1]) is not None
     expected = None if block.number is None else block.number + 1
-    is_label = is_number and (has_blank_before or expected is None or int(lines[-1]) == expected)
+    # without numbers before, one that a blank line divides from the times is what somebody says
+    is_first = expected is None and not following.starts_after_blank
+    is_label = is_number and (has_blank_before or is_first or (expected is not None and int(lines[-1]) == expected))
     if is_label or (are_ids_words and has_blank_before):
         following.number = int(lines[-1]) if is_number else None
         following.starts_after_blank = has_blank_before

@@ -8,7 +8,14 @@ _CLOCK = r"(?:(-)\s*)?(?:(\d{1,6})\s*:\s*)?(\d{1,2})\s*:\s*(\d{1,2})(?:\s*[.,:;]
 CLOCK = re.compile(_CLOCK)
 _ARROW = r"\s*(?:-{1,3}\s*>|–+\s*>|—+\s*>|→)\s*"
 TIMING = re.compile(rf"^\s*{_CLOCK}{_ARROW}(?:{_CLOCK})?(.*)$")
-HAS_ARROW = re.compile(r"-{1,2}\s?>|[–—]>|→")
+# A line of times, also a damaged one: a clock on one side of the arrow, or a number on both.
+_ARROWS = r"(?:-{1,3}\s?>|[–—]\s?>|→)"
+HAS_ARROW = re.compile(
+    rf"^[^\S\n]{{0,20}}(?![\[{{])(?:\S{{0,20}}\d[^\S\n]{{0,3}}:[^\n]{{0,30}}?{_ARROWS}[^\S\n]{{0,9}}(?=[-\d]|$)"
+    rf"|\S{{0,20}}[^\S\n]{{0,9}}{_ARROWS}[^\S\n]{{0,9}}-?\d{{1,6}}:\d"
+    rf"|\d{{1,12}}[^\S\n]{{0,9}}{_ARROWS}[^\S\n]{{0,9}}\d{{1,12}}[^\S\n]{{0,9}}$)",
+    re.MULTILINE,
+)
 # An instant whose last part counts frames: 00:00:01:12, and 00:00:01;12 of drop-frame counting.
 _FRAMES = re.compile(r"(?<![\d:])(\d{1,3}):(\d\d):(\d\d)([:;])(\d\d)(?![\d:;])")
 

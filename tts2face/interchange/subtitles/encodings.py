@@ -17,6 +17,7 @@ _ENCODINGS = MappingProxyType({
 # Letters beyond ASCII and frequent short words of languages, by which a decoding makes words. Their order decides
 # between equal ones: languages of more files first.
 _LATIN = MappingProxyType({
+    "en": ("cp1252", "àâçèéêëîïôûñöü", "the and to of a in is you that it for i my do we he she"),
     "fr": ("cp1252", "àâçèéêëîïôùûüœæ", "le la les de des et est un une je tu il que pas vous nous ne pour"),
     "de": ("cp1252", "äöüß", "der die das und ist nicht ich du sie wir ein eine es zu den mit für"),
     "es": ("cp1252", "áéíñóúü¿¡", "el la los de que y no en un una es por qué lo se me te con para"),
@@ -71,6 +72,7 @@ _CANDIDATES = (
     *(name for name, _, _ in _WIDE),
 )
 _WORD = re.compile(r"[^\W\d_]+")
+_ASCII_LETTER = re.compile("[A-Za-z]")
 _HIGH = re.compile(r"[^\x00-\x7f]")
 _MONEY = re.compile(r"[£¥¢](?=\s?\d)|(?<=\d)[£¥¢]")
 _BY_DIGIT = re.compile(r"(?<=\d)(?![\x00-\x7f])[^\W\d_]|(?![\x00-\x7f])[^\W\d_](?=\d)")  # "Ł5" is no word, but £5
@@ -146,7 +148,8 @@ def _score(text: str, name: str) -> float:
     for script, letters, frequent_words in _SCRIPTS:
         if script == name:
             share = len(letters.findall(text.lower())) / len(high)
-            return share - wrong + _share_of(text, frequent_words)
+            mixed = sum(_ASCII_LETTER.search(word) is not None for word in words) / max(len(words), 1)
+            return share - wrong - mixed + _share_of(text, frequent_words)
     in_words = "".join(_HIGH.findall(_BY_DIGIT.sub("", text))).lower()
     n_money = len(_MONEY.findall(text))
     scores = [

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from lexicon.dictionary import word_set
 
 # A label at the start of a line, after a dash or >>, and its manner: `- Anna (off):`, `MAN #2:`, `[JOHN]:`.
-_LEAD = r"[^\S\n]*(?:(?:[-–—‐]|>>|•)[^\S\n]*)?(?:[(\[][^()\[\]\n:]{1,60}[)\]][^\S\n]+){0,2}"  # also after a noise
+_LEAD = r"[^\S\n]*(?:(?:[-–—‐]|>{2,3}|•)[^\S\n]*)?(?:[(\[][^()\[\]\n:]{1,60}[)\]][^\S\n]+){0,2}"  # also after a noise
 _LABEL = re.compile(
     r"^(?P<lead>" + _LEAD + r")(?P<label>[^\W\d_][^:：\n?!,;()\[\]]{0,40}?)[^\S\n]*"
-    r"(?P<manner>[(\[][^()\[\]\n:]{1,40}[)\]][^\S\n]*)?(?::(?=\s|$)|：)",
+    r"(?P<manner>[(\[][^()\[\]\n:]{1,40}[)\]][^\S\n]*)?(?::(?=\s|$)|(?<!\d)：|：(?!\d))",
     re.MULTILINE,
 )
 _BRACKETED = re.compile(
@@ -36,7 +36,8 @@ _ROLES = word_set(
     "teacher student pupil waiter waitress driver guard nurse soldier clerk crowd audience all both everyone everybody "
     "men women boys girls children kids people voice operator computer radio tv anchor presenter customer caller "
     "mann frau junge mädchen erzähler sprecher sprecherin alle beide homme femme garçon fille narrateur tous "
-    "hombre mujer niño niña narrador todos uomo donna tutti mom mum dad mommy daddy grandma grandpa"
+    "hombre mujer niño niña narrador todos uomo donna tutti mom mum dad mommy daddy grandma grandpa "
+    "旁白 记者 記者 主持人 男 女 ナレーター"
 )
 # Words before a colon that introduce what follows; nobody has these names.
 _NO_SPEAKERS = word_set(
@@ -57,13 +58,17 @@ _NO_SPEAKERS = word_set(
     "said says say asked told faq ad ads fun hinweis achtung warnung merke frage antwort beispiel wichtig ergebnis "
     "bemerkung notiz "
     "remarque avertissement réponse exemple nota aviso atención advertencia pregunta respuesta ejemplo "
-    "importante recuerda recuerden attenzione avviso domanda risposta esempio uwaga pytanie odpowiedź pozor pozn"
+    "importante recuerda recuerden attenzione avviso domanda risposta esempio uwaga pytanie odpowiedź pozor pozn "
+    "时间 時間 地点 地點 注意 注 备注 問題 问题 答案 结果 結果 比分 例如 例"
 )
 # Those that introduce a sentence also before other words ("NOTE TO SELF"); "FIRST OFFICER" is a speaker.
 _INTRODUCING = word_set(
     "note ps warning attention remember reminder step chapter rule fact tip breaking important caution danger hint"
 )
 _BEFORE_NAMES = word_set("dear hi hello hey hallo liebe lieber cher chère chers querido querida caro cara to from re")
+# "He said" in scripts without capitals, at the end or start of what stands before a colon.
+_SAID_ENDINGS = ("说", "說", "道", "问", "問", "是", "为", "為", "言った", "言う", "אמר", "אמרה", "قال", "قالت", "कहा")
+_SAID_STARTS = word_set("אמר אמרה قال قالت")
 _NEVER_IN_NAMES = word_set(
     "i you he she we they it is are was were am be been said says say asked this that these those here there what who "
     "why how when where which not if but because my your our their his do does did have has had will would can could"
@@ -146,7 +151,7 @@ def find_speakers(texts: Sequence[str]) -> Mapping[str, str]:
             counts[key] = counts.get(key, 0) + 1
     n_named = sum(any(_is_name(label.name) for label in labels) for labels in found)
     is_script = n_named >= MIN_CUES and n_named >= MIN_SHARE * len(texts)
-    small = frozenset(_LOWER_WORD.findall("\n".join(texts))) if counts else frozenset[str]()
+    small = frozenset(word for word in _LOWER_WORD.findall("\n".join(texts) if counts else "") if word != word.upper())
     for labels in found:
         is_dialogue = sum(label.has_dash for label in labels) > 0
         for label in labels:
@@ -167,7 +172,8 @@ def _is_certain(label: str) -> bool:
         return False
     words = _words(_NUMBERED.sub("", label))
     # a single letter is a speaker only where it recurs: "A: Hello." in a course, "A:" in a list
-    is_in_capitals = label == label.upper() and len("".join(words)) > 1
+    # nor are there capitals in scripts without them
+    is_in_capitals = label.lower() != label == label.upper() and len("".join(words)) > 1
     return is_in_capitals or words[0] in _TITLES or words[-1] in _ROLES
 
 
@@ -179,7 +185,7 @@ def _is_name(label: str) -> bool:
         return False
     if words[-1] in _NO_SPEAKERS or words[0] in _INTRODUCING or len(written) != len(words):
         return False
-    if any(character.isdigit() for character in base):
+    if base.endswith(_SAID_ENDINGS) or words[0] in _SAID_STARTS or any(character.isdigit() for character in base):
         return False
     for number, (word, key) in enumerate(zip(written, words, strict=True)):
         if "." in word and not (key in _TITLES or _INITIALS.fullmatch(word)):

@@ -17,7 +17,7 @@ _TAG = re.compile(
 )
 _BREAK_TAG = re.compile(r"<br\s?/?\s?>", re.IGNORECASE)
 _RUBY_TEXT = re.compile(r"<rt\b[^<>]*>.*?(?:</rt\s*>|(?=</ruby)|$)", re.IGNORECASE | re.DOTALL)
-_ENTITY = re.compile(r"&(?:amp|lt|gt|nbsp|quot|apos|lrm|rlm|#\d{1,7}|#[xX][0-9a-fA-F]{1,6});")
+_ENTITY = re.compile(r"&(?:[A-Za-z][A-Za-z0-9]{1,31}|#\d{1,7}|#[xX][0-9a-fA-F]{1,6});")
 _DRAWING_MODE = re.compile(r"\\p(\d)")  # {\p1} begins coordinates in place of words, {\p0} ends them
 _INVISIBLE = re.compile(r"[\u200b-\u200f\u202a-\u202e\u2060-\u2069\ufeff\u00ad]")
 # Players of SubRip take over the overrides of SubStation Alpha ({\an8}) and MicroDVD ({y:i}); other braces are text.

@@ -8,6 +8,7 @@ stays.
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate, groupby
 
 from tts2face.interchange.subtitles.clock import parse_clock
 from tts2face.interchange.subtitles.cues import SubtitleWarning, WrittenCue
@@ -18,6 +19,7 @@ from tts2face.interchange.subtitles.unspoken import SIGNS, as_text
 MAX_GAP_S = 0.2  # between a cue and the one that takes over its lines
 HOLD_S = 0.055  # a cue up to two frames long shows words, but is too short to say any
 SURE_WORDS = 4  # carried by a single cue in a file that does not roll
+RUN_WORDS = 3  # carried by two cues in such a file
 SAME_S = 0.1  # within which copies begin
 _INSTANT = re.compile(r"<(\d[\d:.,]*:\d[\d:.,]*)>")
 _PLACED = re.compile(r"\{[^{}]*\\(?:pos|move)\s*\(")  # in SubStation Alpha
@@ -25,19 +27,23 @@ _MARK = re.compile(r"</?[A-Za-z][^<>]*>|\{\\[^{}]*\}")
 _OUTER_MARKS = re.compile(rf"^(?:{_MARK.pattern}|\s)+|(?:{_MARK.pattern}|\s)+$")
 _LYRICS = re.compile("[♪♫♬♩]")
 _MARKS = re.compile(r"[^\w]+")
+_SENTENCE_END = re.compile(r"[.!?…。！？][\"'”’»)\]]*$")
+WORDS_PER_S = 8.0  # said at most
 
 
 @dataclass(frozen=True, slots=True)
 class _Step:
     """Words that a cue takes over from the cue before it.
 
-    `n_carried` counts words; `is_strong` says that the step is one of rolling captions and no repetition in speech.
+    `n_carried` counts words; `is_strong` says that the step is one of rolling captions and no repetition in speech;
+    `may_be_said`, that the words are whole sentences, which the cue before was long enough to say.
     """
 
     n_carried: int = 0
     is_strong: bool = False
     is_sure: bool = False
     is_frame: bool = False
+    may_be_said: bool = False
 
 
 def without_copies(cues: Sequence[WrittenCue], warnings: list[SubtitleWarning]) -> list[WrittenCue]:
@@ -169,7 +175,12 @@ def _step(before: WrittenCue, cue: WrittenCue, old: Sequence[Sequence[str]], new
     is_sung = any(_LYRICS.search(word) for word in words)
     gap = 0.0 if before.end_s is None else cue.begin_s - before.end_s
     is_sure = is_hold or (is_moved and len(tail) >= SURE_WORDS and abs(gap) <= HOLD_S and not is_sung)
-    return _Step(len(tail), is_hold or is_moved, is_sure, is_frame)
+    n_seconds = cue.begin_s - before.begin_s
+    # several words of a whole line are what rolling captions carry
+    is_line = len(tail) >= SURE_WORDS and len(tail) in accumulate(map(len, new))
+    is_sentence = _SENTENCE_END.search(tail[-1]) is not None and not is_line
+    may_be_said = not is_hold and is_sentence and n_seconds >= len(tail) / WORDS_PER_S
+    return _Step(len(tail), is_hold or is_moved, is_sure, is_frame, may_be_said)
 
 
 def _is_highlight(former: str, text: str) -> bool:
@@ -178,19 +189,16 @@ def _is_highlight(former: str, text: str) -> bool:
 
 
 def _accepted(steps: Sequence[_Step]) -> list[_Step]:
-    """Steps of rolling captions: runs of two or more, single ones that are sure, and all where most cues roll."""
+    """Steps of rolling captions: runs, single ones that are sure, and all where most cues roll."""
     n_strong = sum(step.is_strong for step in steps)
     if n_strong >= 3 and n_strong >= 0.5 * (len(steps) - 1):
         return list(steps)
-    return [
-        step
-        if step.is_sure
-        or (
-            step.is_strong and any(steps[near].is_strong for near in (number - 1, number + 1) if 0 <= near < len(steps))
-        )
-        else _Step()
-        for number, step in enumerate(steps)
-    ]
+    accepted: list[_Step] = []
+    for is_strong, group in groupby(steps, lambda step: step.is_strong and not step.may_be_said):
+        run = list(group)
+        is_run = is_strong and len(run) > 1 and (len(run) > 2 or sum(step.n_carried for step in run) >= RUN_WORDS)
+        accepted += [step if is_run or (step.is_sure and not step.may_be_said) else _Step() for step in run]
+    return accepted
 
 
 def _after(lines: Sequence[Sequence[str]], n_words: int) -> str:

@@ -10,13 +10,19 @@ from tts2face.interchange.subtitles.markup import SUBRIP_MARKUP, Markup, plain_t
 from tts2face.interchange.subtitles.unspoken import ANNOTATIONS, LYRICS
 
 # Additions of subtitles for the deaf: noises in brackets, lyrics between notes.
-_ANNOTATION = re.compile(r"\[[^\]]*(?:\]|$)|\([^()]*\)|（[^（）]*）|【[^【】]*】|［[^［］]*］")
-_LYRICS = re.compile(r"[♪♫♬♩][^♪♫♬♩]*(?:[♪♫♬♩]+|$)|(?m:^[^\S\n]*#\s.*(?:\s#)?\s*$)")
+# Brackets in a word or around digits are said: Parent(s), f(x), (555). One that is not closed ends with its line.
+_ANNOTATION = re.compile(
+    r"(?<![A-Za-z\d])(?:\[[^\]]*\]|\[[^\]\n]*|\((?!\d+\))[^()]*\))|（[^（）]*）|【[^【】]*】|［[^［］]*］"
+)
+# Notes that are not closed end before a line of somebody.
+_TURN = r"\n\s*(?:[-–—‐]|>>|[^\W\d_a-z][^\s:]{0,30}(?:[^\S\n][^\W\d_a-z][^\s:]{0,30})?:\s)"
+_LYRICS = re.compile(rf"[♪♫♬♩]+(?:(?!{_TURN})[^♪♫♬♩])*[♪♫♬♩]*|(?m:^[^\S\n]*#\s.*(?:\s#)?\s*$)")
 _BRACKETS = re.compile(r"[\[\]()（）【】［］]")
 _NOTES = re.compile(r"[♪♫♬♩]|(?m:^[^\S\n]*#\s|\s#\s*$)")
-_DASH = re.compile(r"^\s*(?:[-–—‐]\s*(?=\S)|>>\s*|•\s*)", re.MULTILINE)
-_INNER_DASH = re.compile(r"(?<!\s)\s++(?=(?P<dash>[-–—‐]|>>)\s*[\"'“‘«¿¡….(\[]{0,4}(?P<letter>\w))")
-_ENDS_SENTENCE = re.compile(r"[.!?…♪][\"'”’»)\]]*\s*$")
+_DASH = re.compile(r"^\s*(?:[-–—‐](?![\d.,]*\d|[$€£]\d)\s*(?=\S)|>{2,3}\s*|•\s*)", re.MULTILINE)  # -5 is a number
+_DASHED_NUMBER = re.compile(r"^(\s*[-–—‐])(?=\d|[$€£]\d)")
+_INNER_DASH = re.compile(r"(?<!\s)\s++(?=(?P<dash>[-–—‐]|>{2,3})\s*[\"'“‘«¿¡….(\[]{0,4}(?P<letter>\w))")
+_ENDS_SENTENCE = re.compile(r"[.!?…♪。！？؟۔।][\"'”’»)\]]*\s*$")
 _END_CHARACTERS = 8  # of a line, within which the end of its last sentence lies
 _VOICE = re.compile(r"<v(?:\.[^\s.<>]+)*\s([^<>]+)>")
 _VOICE_MARK = re.compile(r"^\s*\x02([^\x03]*)\x03")
@@ -65,6 +71,8 @@ def spoken_text(
     plain = plain_text(_VOICE.sub("\n\x02\\1\x03", written) if is_dialogue else written, markup)
     said, left_out = _without_additions(without_manners(plain, speakers or ()), keep)
     lines = spoken_lines(said)
+    if any(map(_DASH.match, lines)):  # between people, also the dash before a number is one
+        lines = [_DASHED_NUMBER.sub(r"\1 ", line) for line in lines]
     has_dashes = _is_dialogue(lines)
     parts: list[tuple[str, list[str]]] = [("", [])]
     for line in lines:
@@ -103,7 +111,7 @@ def _at_dashes(line: str) -> list[str]:
     has_first = _DASH.match(line) is not None
     starts = [0]
     for match in _INNER_DASH.finditer(line):
-        is_turn = match["dash"] == ">>" or (
+        is_turn = match["dash"].startswith(">>") or (
             _ENDS_SENTENCE.search(line[max(match.start() - _END_CHARACTERS, 0) : match.start()]) is not None
             and not match["letter"].islower()
             and not line[match.end("dash") :][:1].isdigit()  # -5 is a number

@@ -13,6 +13,7 @@ CHARACTERS_PER_S = 15.0  # of speech; for the end of a cue whose own end is miss
 MIN_ESTIMATED_S = 1.0
 MAX_S = 1e6  # 11 days; larger times are damaged
 HOUR_S, DAY_S = 3600.0, 86_400.0
+MIDNIGHT_S = 3 * HOUR_S  # around midnight, within which a clock is seen to begin anew
 SAME_INSTANT_S = 1e-6
 FILM_MARGIN_S = 0.5  # by which a file of subtitles may be longer than its film
 # Characters that a reader of subtitles sees in a second; broadcasters allow 12 to 20, a single word may stand for long.
@@ -64,15 +65,22 @@ def _over_midnight(cues: Sequence[WrittenCue], warnings: list[SubtitleWarning]) 
     unwrapped: list[WrittenCue] = []
     offset, before = 0.0, 0.0
     for cue in cues:
-        if before - (cue.begin_s + offset) > DAY_S / 2 and before < MAX_S:
+        if _is_wrapped(before - offset, cue.begin_s):
             offset += DAY_S
             warnings.append(SubtitleWarning(cue.line, "the clock begins anew at midnight here; the times go on"))
         start, end = cue.begin_s + offset, _plus(cue.end_s, offset)
-        if end is not None and start - end > DAY_S / 2 and start < MAX_S:
+        if cue.end_s is not None and end is not None and _is_wrapped(cue.begin_s, cue.end_s):
             end += DAY_S
         unwrapped.append(replace(cue, begin_s=start, end_s=end))
-        before = max(start, before) if start < MAX_S else before
+        # a single wrong hour is far from the cues around it
+        is_far = start >= MAX_S or (len(unwrapped) > 1 and start - before > DAY_S / 2)
+        before = before if is_far else max(start, before)
     return unwrapped
+
+
+def _is_wrapped(before: float, after: float) -> bool:
+    """Whether a clock of 24 hours was at midnight between two of its readings."""
+    return DAY_S - MIDNIGHT_S < before < DAY_S and after < MIDNIGHT_S
 
 
 def _in_columns(cues: Sequence[WrittenCue], warnings: list[SubtitleWarning]) -> list[WrittenCue]:

@@ -21,6 +21,8 @@ MAX_CUES = 200_000
 _OFFSET = re.compile(r"(-?\d{1,12}(?:\.\d{1,9})?)\s*(h|ms|m|s|f|t|)")
 _CLOCK = re.compile(r"(?:(\d{1,6}):)?(\d{1,2}):(\d{1,2})(?:[.,](\d{1,9})|:(\d{1,4})(?:\.\d{1,4})?)?")
 _TIMED = frozenset({"body", "div", "p", "span"})
+_UNSPOKEN = frozenset({"metadata", "desc", "title", "copyright"})
+_RUBY_TEXT = frozenset({"text", "textContainer", "delimiter"})  # TTML 2, 10.2.38: readings, not what they stand above
 Attributes = Mapping[str, str]
 # Roles of TTML 2, 14.1.2, that are nobody's speech; other roles say how somebody speaks.
 _KINDS = MappingProxyType({
@@ -48,6 +50,7 @@ class _Element:
     kind: str = ""
     is_damaged: bool = False
     keeps_space: bool = False
+    is_unspoken: bool = False
 
 
 @dataclass(slots=True)
@@ -96,6 +99,8 @@ class _TtmlReader:
         self._is_name = False
         # without ttp:frameRate and ttp:tickRate (TTML 2, 7.2)
         self._frame_rate, self._tick_rate = Fraction(30), Fraction(1)
+        self._second = Fraction(1)  # of the time code, in seconds
+        self._ruby_styles: set[str] = set()
         self._cues: list[WrittenCue] = []
         self._warnings: list[SubtitleWarning] = []
         parser = expat.ParserCreate(namespace_separator=" ")
@@ -135,6 +140,8 @@ class _TtmlReader:
         own = {_local(key): value for key, value in attributes.items()}
         if name == "tt":
             self._read_rates(own)
+        elif name == "style" and own.get("ruby") in _RUBY_TEXT:
+            self._ruby_styles.add(own.get("id", ""))
         elif name == "agent":
             self._agent = own.get("id", "")
         elif name == "name" and self._agent:
@@ -174,6 +181,7 @@ class _TtmlReader:
             next((_KINDS[word] for word in role.split() if word in _KINDS), parent.kind),
             is_damaged,
             own.get("space", "preserve" if parent.keeps_space else "") == "preserve",
+            parent.is_unspoken or name in _UNSPOKEN or self._is_ruby_text(own),
         )
 
     def _end(self, tag: str) -> None:
@@ -216,17 +224,24 @@ class _TtmlReader:
     def _characters(self, text: str) -> None:
         if self._is_name:
             self._agents[self._agent] = self._agents.get(self._agent, "") + text.strip()
-        elif self._paragraphs:
+        elif self._paragraphs and not self._elements[-1].is_unspoken:
             keeps_space = self._elements[-1].keeps_space
             self._paragraphs[-1].text.append(text if keeps_space else re.sub(r"\s+", " ", text))
 
+    def _is_ruby_text(self, own: Attributes) -> bool:
+        """Whether an element holds the reading of words, which those are spoken by."""
+        return own.get("ruby") in _RUBY_TEXT or not self._ruby_styles.isdisjoint(own.get("style", "").split())
+
     def _read_rates(self, own: Attributes) -> None:
+        is_smpte = own.get("timeBase") == "smpte" and own.get("dropMode", "nonDrop") == "nonDrop"
         numbers = {key: own.get(key, "") for key in ("frameRate", "frameRateMultiplier", "tickRate")}
         if numbers["frameRate"].isdecimal() and int(numbers["frameRate"]) > 0:
             self._frame_rate = Fraction(int(numbers["frameRate"]))
         match = re.fullmatch(r"(\d{1,9})[\s:](\d{1,9})", numbers["frameRateMultiplier"].strip())
         if match and int(match[1]) and int(match[2]):
             self._frame_rate *= Fraction(int(match[1]), int(match[2]))
+        # SMPTE time code counts whole frames: its seconds are longer than those of a clock where the rate is 29.97
+        self._second = round(self._frame_rate) / self._frame_rate if is_smpte else Fraction(1)
         self._tick_rate = self._frame_rate if numbers["frameRate"] else Fraction(1)
         if numbers["tickRate"].isdecimal() and int(numbers["tickRate"]) > 0:
             self._tick_rate, self._is_rate_stated = Fraction(int(numbers["tickRate"])), True
@@ -246,7 +261,9 @@ class _TtmlReader:
         if clock:
             hours, minutes, seconds, fraction, frames = clock.groups()
             whole = int(hours or 0) * 3600 + int(minutes) * 60 + int(seconds)
-            return whole + float(f"0.{fraction or 0}") + float(int(frames or 0) / self._frame_rate)
+            return (
+                float(whole * self._second) + float(f"0.{fraction or 0}") + float(int(frames or 0) / self._frame_rate)
+            )
         self._warn(f"the time {written.strip()[:20]!r} cannot be read; it is not used")
         return None
 

@@ -35,8 +35,12 @@ _MAKER = (
     r"|correct(?:ed|ions?)|translat(?:ed|ion)|transcri(?:bed|pts?|ption)|ripped|encoded|resync(?:ed)?|timed|timing"
     r"|edited|downloaded|uploaded|created|fixed|improved)"
 )
+_AND = r"(?:\s*(?:,|&|and|\+|/)\s*|\s+)"
+# "Fixed: the bug" is said; a bare colon tells makers only after work on subtitles
+_SUBTITLER = r"(?:sub(?:title)?s?|subtitl(?:ed|ing)|(?:closed )?caption\w*|(?:re)?sync\w*|translat(?:ed|ion))"
 _MADE_BY = re.compile(
-    rf"{_MAKER}(?:(?:\s*(?:,|&|and|\+|/)\s*|\s+){_MAKER})*\s*(?:\bby\b|\bfrom\b|:)\s*\S"
+    rf"{_MAKER}(?:{_AND}{_MAKER})*\s*(?:\bby\b|\bfrom\b)\s*\S"
+    rf"|(?:{_MAKER}{_AND})*{_SUBTITLER}(?:{_AND}{_MAKER})*\s*:\s*\S"
     r"|(?:untertitel(?:ung)?|deutsche untertitel|sous-titres?|sous-titrage|traduction|subt[ií]tulos|traducci[oó]n"
     r"|legendas|tradu[cç][aã]o|sottotitoli|traduzione|napisy|t[lł]umaczenie|titulky|p[rř]eklad|felirat(?:ok)?"
     r"|ford[ií]totta|titlovi|prijevod|prevod|podnapisi|ondertiteling|undertexter|tekster|tekstitys|субтитры|перевод"
@@ -46,7 +50,8 @@ _MADE_BY = re.compile(
 )
 _ADDRESS = re.compile(r"(?:https?://|www\.)\S+|\b[\w-]+\.(?:com|org|net|tv|info)\b", re.IGNORECASE)
 _ADVERTISEMENT = re.compile(
-    r"subtitle|caption|opensubtitles|addic7ed|subscene|yts|vip member|advertise your|sync|rip", re.IGNORECASE
+    r"subtitl|addic7ed|subscene|\b(?:captions?|captioned|yts|vip member|advertise your|sync(?:ed)?|rip(?:ped|s)?)\b",
+    re.IGNORECASE,
 )
 
 

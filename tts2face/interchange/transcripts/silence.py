@@ -8,14 +8,18 @@ import functools
 import re
 from importlib import resources
 
+from lexicon.dictionary import word_set
+
 # <eps>, {SL}, [noise], (laughs); several in a row; ++UM++, +noise+ (CMU Sphinx); *cough*; _noise_; &=laughs (CHAT)
 _MARKED = re.compile(
     r"(?:<[^<>]*>|\{[^{}]*\}|\[[^\[\]]*\]|\(\([^()]*\)\)|\([^()]*\)|\+{1,2}\w+\+{1,2}|\*\w+\*|_\w+_|&=\S+|\s)+"
 )
 # <LAUGH-yeah> (Buckeye), [laughter-yeah] (Switchboard): a word, and how it is said
 _SAID_LAUGHING = re.compile(r"[<\[](?:laughter|laugh|cry|yawn|ext|hes)-([^\W\d][\w'’_-]*)[>\]]", re.IGNORECASE)
-# within an utterance; a space behind < is a comparison; no brackets of ( ), in which people also write what is said
-_INSERTED = re.compile(r"<[^<>\s][^<>]*>|\{[^{}]*\}|\[[^\[\]]*\]|&=\S+")
+# within an utterance; a space behind < is a comparison; between single ( ) people also write what is said
+_INSERTED = re.compile(r"<[^<>\s][^<>]*>|\{[^{}]*\}|\[[^\[\]]*\]|\(\([^()]*\)\)|&=\S+")
+# labels that stand between the words of an utterance and are no words of a language
+_BETWEEN_WORDS = word_set("spn nsn sp ssil lsil brth vocnoise xxx yyy # + h# !sil !enter !exit sent-start sent-end")
 
 
 @functools.cache
@@ -42,4 +46,4 @@ def spoken_part(label: str) -> str:
     if is_silence(label):
         return ""
     words = _INSERTED.sub(" ", _SAID_LAUGHING.sub(r"\1", label)).split()
-    return " ".join(word for word in words if len(words) == 1 or word.casefold() not in silence_labels())
+    return " ".join(word for word in words if len(words) == 1 or word.casefold() not in _BETWEEN_WORDS)

@@ -1,6 +1,7 @@
 """Instants of annotations that have no time of their own, between those that have one."""
 
 from collections.abc import Sequence
+from itertools import accumulate
 
 
 def interpolated(times: Sequence[float | None]) -> list[float]:
@@ -8,11 +9,11 @@ def interpolated(times: Sequence[float | None]) -> list[float]:
 
     At an end, where only one neighbour has a time, the run lies there; without any time all is 0.
     """
-    known = [at for at, time in enumerate(times) if time is not None]
+    befores = list(accumulate((at if time is not None else None for at, time in enumerate(times)), _latest))
+    from_behind = ((at if times[at] is not None else None) for at in reversed(range(len(times))))
+    afters = list(accumulate(from_behind, _latest))[::-1]
     filled = []
-    for at, time in enumerate(times):
-        before = max((place for place in known if place <= at), default=None)
-        after = min((place for place in known if place >= at), default=None)
+    for at, (time, before, after) in enumerate(zip(times, befores, afters, strict=True)):
         if time is not None:
             filled.append(time)
         elif before is None or after is None:
@@ -22,3 +23,7 @@ def interpolated(times: Sequence[float | None]) -> list[float]:
             first, last = float(times[before] or 0.0), float(times[after] or 0.0)
             filled.append(first + (last - first) * (at - before) / (after - before))
     return filled
+
+
+def _latest(before: int | None, place: int | None) -> int | None:
+    return before if place is None else place

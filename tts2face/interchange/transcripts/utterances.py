@@ -22,7 +22,8 @@ def shared_words(labels: Sequence[SpokenCue]) -> tuple[tuple[SpokenCue, ...], st
 
 
 def _divided(label: SpokenCue) -> list[SpokenCue]:
-    words = label.text.split()
+    # punctuation alone takes no time; a label of nothing else stays whole
+    words = [word for word in label.text.split() if any(map(str.isalnum, word))] or [label.text]
     return [SpokenCue(*span, word) for word, span in zip(words, share_time(label.start, label.end, words), strict=True)]
 
 
