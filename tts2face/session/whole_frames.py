@@ -6,7 +6,7 @@ any frame rate at which a frame is no longer than the silence at the end of a se
 
 from dataclasses import replace
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -107,7 +107,7 @@ def _after(spoken: SpokenSentence, n_samples: int) -> SpokenSentence:
     """Silence at the end of a part, from a sample on, with the instants of its timeline there."""
     voice, sound = spoken.speech.waveform, spoken.sound
     at = n_samples / sound.rate
-    instants = {
+    instants: dict[str, Any] = {
         name: tuple(element for element in getattr(spoken.timeline, name) if element.time >= at)
         for name, kind in KINDS.items()
         if kind.shape == "instant"
