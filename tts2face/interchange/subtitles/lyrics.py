@@ -1,6 +1,7 @@
 """LRC: lines of a song or speech after their instants, ``[00:12.30]Hello``; extended files have those of words."""
 
 import re
+from bisect import bisect_right
 from collections.abc import Sequence
 
 from tts2face.interchange.subtitles.clock import parse_clock
@@ -38,11 +39,13 @@ def read_lyrics(lines: Sequence[str]) -> tuple[list[WrittenCue], list[SubtitleWa
         found += [(start, end if len(starts) == 1 else None, text, number) for start in starts if start is not None]
     found.sort(key=lambda line: line[0])
     empty = [at for at, _, text, _ in found if not text]
+    worded = [at for at, _, text, _ in found if text]
     cues = []
     for start, end, text, number in found:
         if text:
-            until = end if end is not None else next((at for at in empty if at > start), None)
-            is_next = until is not None and not any(start < at < until for at, _, other, _ in found if other)
+            until = end if end is not None else _next(empty, start)
+            following = _next(worded, start)
+            is_next = until is not None and (following is None or following >= until)
             cues.append(
                 WrittenCue(
                     start - offset,
@@ -54,3 +57,9 @@ def read_lyrics(lines: Sequence[str]) -> tuple[list[WrittenCue], list[SubtitleWa
                 )
             )
     return cues, []
+
+
+def _next(instants: Sequence[float], start: float) -> float | None:
+    """The first of instants in order that is after `start`."""
+    at = bisect_right(instants, start)
+    return instants[at] if at < len(instants) else None

@@ -41,6 +41,9 @@ def read_cha(path: Path) -> list[Tier]:
             utterances[-1] = [
                 SpokenCue(int(start) / 1000, int(end) / 1000, _PARTS.sub("", word)) for word, start, end in words
             ]
+    has_words = any(isinstance(said, list) for said in utterances)
+    if spans and not has_words and all(span is None for span in spans):
+        raise DataError(f"{path} has no times; link its lines to the recording in CLAN, so that each has a bullet")
     edges = interpolated(spans)
     n_unknown = spans.count(None) // 2
     notes = (f"{n_unknown} lines of {path.name} without times lie between the others",) if n_unknown else ()
