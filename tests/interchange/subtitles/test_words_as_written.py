@@ -85,7 +85,15 @@ def test_sentences_that_are_said_again_are_spoken(texts: list[str], read: ReadTe
 
 @pytest.mark.parametrize(
     "text",
-    ["-40 degrees today.", "–5°C", "f(x) equals 3", "Parent(s) come", "Call (555) 123-4567.", "array[0] is it"],
+    [
+        "-40 degrees today.",
+        "–5°C",
+        "f(x) equals 3",
+        "Parent(s) come",
+        "Call (555) 123-4567.",
+        "array[0] is it",
+        "if (a<b && c>d) go",
+    ],
 )
 def test_signs_of_numbers_and_brackets_in_words_stay(text: str, read: ReadText) -> None:
     cues = read(srt((1, 2, text), LATE)).cues

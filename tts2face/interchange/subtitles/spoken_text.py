@@ -12,7 +12,8 @@ from tts2face.interchange.subtitles.unspoken import ANNOTATIONS, LYRICS
 # Additions of subtitles for the deaf: noises in brackets, lyrics between notes.
 # Brackets in a word or around digits are said: Parent(s), f(x), (555). One that is not closed ends with its line.
 _ANNOTATION = re.compile(
-    r"(?<![A-Za-z\d])(?:\[[^\]]*\]|\[[^\]\n]*|\((?!\d+\))[^()]*\))|（[^（）]*）|【[^【】]*】|［[^［］]*］"
+    r"(?<![A-Za-z\d])(?:\[[^\]]*\]|\[[^\]\n]*|\((?!\d+\)|[^()\n]{0,60}\w ?[<>=]{1,2} ?\w)[^()]*\))"
+    r"|（[^（）]*）|【[^【】]*】|［[^［］]*］"
 )
 # Notes that are not closed end before a line of somebody.
 _TURN = r"\n\s*(?:[-–—‐]|>>|[^\W\d_a-z][^\s:]{0,30}(?:[^\S\n][^\W\d_a-z][^\s:]{0,30})?:\s)"
