@@ -20,5 +20,5 @@ def test_clips_that_were_taken_are_forgotten() -> None:
     for _ in ready.stream(Request(text="Bob may. " * 8, voice="espeak")):
         counts.append(n_alive() - before)
     assert len(counts) == 8
-    assert counts[-1] == counts[1]
+    assert counts[-1] <= counts[-2] == counts[1]  # between two pieces there is what is left of the first
     assert n_alive() <= before + 6  # the last piece's, which the loop's variable holds
