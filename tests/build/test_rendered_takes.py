@@ -7,7 +7,7 @@ import av
 import numpy as np
 import pytest
 
-from tests.rendered_takes import CAPTURE_NAME, NAMES, TAKES, make_takes, manifest_rows
+from tests.rendered_takes import CAPTURE_FPS, CAPTURE_NAME, NAMES, TAKES, make_takes, manifest_rows
 from tts2face.video.media import read_sound
 
 RATE = 48_000
@@ -71,7 +71,10 @@ def test_the_capture_moves_and_sounds_the_same(made: Path) -> None:
     assert [row[:2] for row in kept] == [row[:2] for row in again]
     weights = [np.array([row[2:] for row in rows[1 : 1 + N_EQUAL_ROWS]], float) for rows in tables]
     np.testing.assert_allclose(*weights, atol=WEIGHT)
-    assert_same_sound(*(folder / f"{CAPTURE_NAME}.flac" for folder in (TAKES, made)))
+    kept_sound, sound = (read_sound(folder / f"{CAPTURE_NAME}.flac", RATE).samples for folder in (TAKES, made))
+    n_equal = N_EQUAL_ROWS * RATE // CAPTURE_FPS
+    np.testing.assert_allclose(kept_sound[:n_equal], sound[:n_equal], atol=LEVEL)
+    assert abs(len(kept_sound) - len(sound)) < 2 * FRAME_S * RATE
 
 
 def decoded(film: Path) -> list[av.VideoFrame]:
