@@ -93,17 +93,29 @@ class SubtitlesRequest(SubtitleFields):
             examples=[["signs"]],
         ),
     ] = ()
-    speakers: Annotated[bool, Field(description="Names before a colon are speakers; else they are words.")] = True
+    speakers: Annotated[
+        bool, Field(description="Names before a colon are speakers; else they are words.", examples=[True])
+    ] = True
     subtitle_fps: Annotated[
         float | None,
-        Field(ge=RATE_LIMITS[0], le=RATE_LIMITS[1], description="Frames a second of times that are frames."),
+        Field(
+            ge=RATE_LIMITS[0],
+            le=RATE_LIMITS[1],
+            description="Frames a second of times that are frames.",
+            examples=[25.0],
+        ),
     ] = None
     track: Annotated[
         str | None,
-        Field(max_length=40, description="Subtitle track of a film, by number or language; class of a SAMI file."),
+        Field(
+            max_length=40,
+            description="Subtitle track of a film, by number or language; class of a SAMI file.",
+            examples=["en"],
+        ),
     ] = None
     shift: Annotated[
-        float, Field(ge=-MAX_SHIFT_S, le=MAX_SHIFT_S, description="Seconds that are added to all times.")
+        float,
+        Field(ge=-MAX_SHIFT_S, le=MAX_SHIFT_S, description="Seconds that are added to all times.", examples=[-3600.0]),
     ] = 0.0
     cast: Annotated[
         dict[str, Any] | str | None,
