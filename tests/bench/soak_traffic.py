@@ -3,6 +3,7 @@
 import asyncio
 import json
 import random
+import re
 from collections import Counter
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
@@ -45,7 +46,8 @@ class Soak:
         try:
             status = await KINDS[name][1](self, client)
         except (httpx.HTTPError, OSError, websockets.WebSocketException) as error:
-            is_cut = isinstance(error, httpx.RemoteProtocolError) and "incomplete" in str(error)
+            # h11 has two sentences: for an end within a chunk, and for one within the line before it
+            is_cut = isinstance(error, httpx.RemoteProtocolError) and re.search("incomplete|unexpectedly", str(error))
             status = CUT if is_cut else LOST
             print(f"  {name}: {error!r}", flush=True)
         self.statuses[name, status] += 1
