@@ -10,6 +10,7 @@ from tts2face.interchange.subtitles.blocks import with_voice
 from tts2face.interchange.subtitles.cues import SubtitleWarning, WrittenCue
 from tts2face.interchange.subtitles.markup import PLAIN_MARKUP, SUBRIP_MARKUP, SUBSTATION_MARKUP, Markup
 from tts2face.interchange.subtitles.substation import packet_cue
+from tts2face.video.container import open_container
 
 _TEXT = {
     "subrip": SUBRIP_MARKUP, "srt": SUBRIP_MARKUP, "text": SUBRIP_MARKUP, "webvtt": SUBRIP_MARKUP,
@@ -39,29 +40,21 @@ class Film:
 
 def film_facts(path: Path) -> Film:
     """Length and rate of a film or recording; none of a file that cannot be read as one."""
-    import av
-
-    if not path.is_file():  # FFmpeg would wait for the writer of a pipe
-        return Film()
     try:
-        with av.open(str(path)) as container:
+        with open_container(path) as container:
             video = next(iter(container.streams.video), None)
             rate = None if video is None else video.average_rate
             return Film(container.duration / SECONDS if container.duration else None, float(rate) if rate else None)
-    except (OSError, ValueError):
+    except (InputError, DataError, ValueError):
         return Film()
 
 
 def has_text_track(path: Path) -> bool:
     """Whether a file is a film with a track of subtitles of text."""
-    import av
-
-    if not path.is_file():
-        return False
     try:
-        with av.open(str(path)) as container:
+        with open_container(path) as container:
             return any(_codec(stream) in _TEXT for stream in container.streams.subtitles)
-    except (OSError, ValueError):
+    except (InputError, DataError, ValueError):
         return False
 
 
