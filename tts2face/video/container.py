@@ -1,13 +1,12 @@
 """An opened media file: its streams, their frames one after another, and where its clock starts."""
 
+import math
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
-
-import numpy as np
 
 from lexicon.errors import DataError, InputError
 from lexicon.values.files import check_regular_file
@@ -49,7 +48,7 @@ def _start_time(path: Path, version: tuple[int, int, int], formats: str | None) 
         shown, heard = _stated_start(film), _stated_start(sound)
         first = next(decode_packets(container.demux(sound), path, 0.0), None) if sound else None
         if first is not None and first.time is not None:  # Opus in WebM: before the time that the stream states
-            heard = min(float(first.time), np.inf if heard is None else heard)
+            heard = min(float(first.time), math.inf if heard is None else heard)
         if shown is None or heard is None:
             return heard or shown or 0.0
         is_unstated = is_broadcast(container) and shown - heard <= MAX_PRIMING_S

@@ -36,7 +36,7 @@ _MAKER = (
     r"|edited|downloaded|uploaded|created|fixed|improved)"
 )
 _AND = r"(?:\s*(?:,|&|and|\+|/)\s*|\s+)"
-# "Fixed: the bug" is said; a bare colon tells makers only after work on subtitles
+# "Fixed: the bug" is said; a bare colon names makers only after work on subtitles
 _SUBTITLER = r"(?:sub(?:title)?s?|subtitl(?:ed|ing)|(?:closed )?caption\w*|(?:re)?sync\w*|translat(?:ed|ion))"
 _MADE_BY = re.compile(
     rf"{_MAKER}(?:{_AND}{_MAKER})*\s*(?:\bby\b|\bfrom\b)\s*\S"
