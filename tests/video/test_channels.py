@@ -81,6 +81,29 @@ def test_channels_of_a_layout_have_their_weights(channels: list[NDArray[np.float
         assert mix.weights[channel] == pytest.approx(gain, abs=0.02)
 
 
+@pytest.mark.parametrize("layout", ["3.1.2", "5.1.2", "5.1.4", "7.1.2", "7.1.4", "9.1.4", "22.2"])
+def test_bass_is_left_out_of_a_layout_with_height(layout: str) -> None:
+    names = tuple(channel.name for channel in av.AudioLayout(layout).channels)
+    places = {"FC": VOICE, "LFE": BASS, "TFL": 0.1 * OTHER}
+    sound = np.stack([places.get(name, NONE) for name in names])
+    weights = dict(zip(names, mix_of_products(sound @ sound.T, names).weights, strict=True))
+    assert weights["FC"] == pytest.approx(1.0, abs=0.02)
+    assert weights["LFE"] == 0.0
+    assert weights["TFL"] == weights["TFR"] == pytest.approx(0.5, abs=0.02)  # above, as beside the listener
+
+
+def test_a_channel_above_can_hold_the_voice() -> None:
+    names = tuple(channel.name for channel in av.AudioLayout("7.1.4").channels)
+    sound = np.stack([VOICE if name == "TBR" else NONE for name in names])
+    assert mix_of_products(sound @ sound.T, names).weights[names.index("TBR")] == pytest.approx(1.0)
+
+
+def test_ambisonics_are_heard_from_all_directions() -> None:
+    names = tuple(channel.name for channel in av.AudioLayout("ambisonic 1").channels)
+    sound = np.stack([0.7 * VOICE, VOICE, NONE, NONE])  # from the left
+    np.testing.assert_allclose(mix_of_products(sound @ sound.T, names).weights, [1, 0, 0, 0], atol=1e-6)
+
+
 def test_only_bass_is_better_than_nothing() -> None:
     sound = np.stack([NONE, NONE, NONE, BASS, NONE, NONE])
     assert mix_of_products(sound @ sound.T, SIX).weights[3] == pytest.approx(1.0)

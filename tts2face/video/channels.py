@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 FRONT, SURROUND = 0.5**0.5, 0.5  # weights beside a centre of 1 (BS.775-3, annex 4)
 WEIGHTS = {
     "FC": 1.0, "FL": FRONT, "FR": FRONT, "FLC": FRONT, "FRC": FRONT, "DL": FRONT, "DR": FRONT, "WL": FRONT, "WR": FRONT,
-    "BL": SURROUND, "BR": SURROUND, "SL": SURROUND, "SR": SURROUND, "BC": SURROUND,
-    "LFE": 0.0, "LFE2": 0.0,
+    "BIL": FRONT, "BIR": FRONT, "AMBI0": 1.0, "LFE": 0.0, "LFE2": 0.0,
 }  # fmt: skip
+DIRECTIONS = "AMBI"  # channels of Ambisonics but the first are differences of directions
 CANCELLED = 0.25  # of the power that channels have together: what their sum keeps if they correlate by less than -.75
 EQUAL = 0.99  # of the largest power: channels that are inverted copies differ by rounding
 DIGITS = 6  # of weights: equal channels get equal ones, whatever the last bit of their powers is
@@ -86,11 +86,10 @@ def mix_of_products(products: FloatArray, names: Sequence[str]) -> ChannelMix:
     products : (C, C)
         Sums of the products of each two channels; on the diagonal their powers.
     names
-        C names as FFmpeg has them; channels with other names have equal weights.
+        C names as FFmpeg has them; channels without a place have equal weights.
     """
     powers = np.diag(products)
-    known = all(name in WEIGHTS for name in names)
-    weights = np.array([WEIGHTS[name] if known else FRONT for name in names])
+    weights = _weights_of(names)
     if not (weights @ powers) > 0:  # only what a layout leaves out, or nothing, has sound
         weights = np.full(len(powers), FRONT)
     heard = np.where(weights > 0, powers, 0.0)
@@ -102,6 +101,15 @@ def mix_of_products(products: FloatArray, names: Sequence[str]) -> ChannelMix:
         taken = int(np.argmax(heard >= EQUAL * loudest))
         return ChannelMix(np.eye(len(powers))[taken], taken + 1)
     return ChannelMix(np.round(weights * np.sqrt(loudest / mixed), DIGITS))
+
+
+def _weights_of(names: Sequence[str]) -> FloatArray:
+    """Weights (C,) of the channels of a layout; of all channels alike where it names no place."""
+    if not any(name in WEIGHTS for name in names):
+        return np.full(len(names), FRONT)
+    # whatever else a layout has is beside, behind, above or below the listener
+    others = {name: 0.0 if name.startswith(DIRECTIONS) else SURROUND for name in names}
+    return np.array([(others | WEIGHTS)[name] for name in names])
 
 
 def channel_samples(frame: "AudioFrame") -> FloatArray:
