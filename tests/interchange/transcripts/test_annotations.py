@@ -78,7 +78,9 @@ def test_words_that_refer_to_an_utterance_share_its_time_in_their_order(read):
     assert found.text == "bin red now seven"
     assert (found.words[0].start, found.words[1].end, found.words[3].end) == (0.5, 1.0, 2.6)
     assert found.words[2].end == found.words[3].start < 2.3
-    assert found.notes[0] == "the words of v.eaf are those of its tier 'Anna-words'; --tier names another"
+    assert found.notes[0] == (
+        "the words of v.eaf are those of its tier 'Anna-words'; 'Anna' also has words; --tier names another"
+    )
     assert found.notes[1].startswith("words of 2 utterances in v.eaf have no times of their own and share theirs")
 
 
@@ -121,7 +123,9 @@ def test_other_xml_is_refused(content, reason, read):
 def test_exmaralda_gives_the_transcription(read):
     found = read("v.exb", EXB)
     assert [(word.start, word.end, word.text) for word in found.words] == [(0.5, 1.0, "bin"), (1.0, 1.5, "red")]
-    assert found.notes[0] == "the words of v.exb are those of its tier 'A [v]'; --tier names another"
+    assert found.notes[0] == (
+        "the words of v.exb are those of its tier 'A [v]'; 'A [en]' is taken for phones or notes; --tier names another"
+    )
 
 
 def test_chat_gives_what_the_first_speaker_says(read):

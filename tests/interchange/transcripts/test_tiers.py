@@ -61,7 +61,8 @@ def test_points_are_words_where_nothing_else_is(read, tmp_path):
 
 def test_the_choice_is_said_with_the_others(read):
     assert read(PhonAlign=PHONES, TokensAlign=WORDS).notes == (
-        "the words of v.TextGrid are those of its tier 'TokensAlign'; --tier names another",
+        "the words of v.TextGrid are those of its tier 'TokensAlign'; 'PhonAlign' is taken for phones or notes; "
+        "--tier names another",
     )
     two = read(Anna_words=WORDS, Ben_words=relabelled(WORDS, seven="two"))
     assert two.text == SAID

@@ -52,7 +52,8 @@ def read_eaf(path: Path) -> list[Tier]:
         ]
         labels.sort(key=lambda cue: cue.start)
         name, kind = tier.get("TIER_ID", ""), tier.get("LINGUISTIC_TYPE_REF", "")
-        made.append(Tier(name, tuple(labels), kind=kind, notes=tuple(notes[id(tier)])))
+        parent = tier.get("PARENT_REF", "")
+        made.append(Tier(name, tuple(labels), kind=kind, parent=parent, notes=tuple(notes[id(tier)])))
     return made
 
 

@@ -17,8 +17,8 @@ class Tier:
     """A row of labels of a file, in the order of the file, with silences and noises.
 
     ``has_points`` if the labels are instants, whose start is their end; ``is_speech`` if the format says that the
-    labels are words, whatever their name. ``kind`` is what the file says of the tier beside its name, ``notes`` are
-    sentences about its times.
+    labels are words, whatever their name. ``kind`` is what the file says of the tier beside its name, ``parent`` the
+    name of the tier of which the labels are parts or which they annotate, ``notes`` are sentences about its times.
     """
 
     name: str
@@ -26,6 +26,7 @@ class Tier:
     has_points: bool = False
     is_speech: bool = False
     kind: str = ""
+    parent: str = ""
     notes: tuple[str, ...] = ()
 
 
