@@ -41,6 +41,20 @@ WORDS = (
     "NOTE TO SELF: buy bread.",
     "A: the first of all.",
     "BREAKING NEWS: it rains.",
+    "EPISODE IV: a new hope.",
+    "PART II: the return.",
+    "Part Two of Three: the sea.",
+    "ACT THREE: the storm.",
+    "DAY ONE: we leave.",
+    "SEASON 2: the end.",
+    "WORLD WAR II: six years.",
+    "DNA: the code of life.",
+    "BBC: the news at ten.",
+    "LIVE: from London.",
+    "LATEST: rain.",
+    "FIRST OF ALL: no.",
+    "WEDNESDAY: fish.",
+    "HERE'S THE DEAL: no.",
 )
 
 
@@ -94,3 +108,64 @@ def test_speakers_of_the_format_stay_without_labels(read: ReadText) -> None:
     content = "WEBVTT\n\n00:01.000 --> 00:02.000\n<v Ann>NOTE: hi.</v>\n"
     (cue,) = read(content, ".vtt", speakers=False).cues
     assert (cue.speaker, cue.text) == ("Ann", "NOTE: hi.")
+
+
+HEADINGS = ("HERE'S THE DEAL:", "THREE WORDS:", "BOTTOM LINE:", "THE WEATHER:", "MY MOTTO:", "SHORT ANSWER:")
+
+
+@pytest.mark.parametrize("heading", [*HEADINGS, "GOOD MORNING:", "MISSION ACCOMPLISHED:", "LONDON:"])
+def test_capitals_are_no_sign_in_a_file_of_capitals(heading: str, read: ReadText) -> None:
+    found = read(srt((1, 2, "IT IS LATE."), (3, 4, f"{heading} WE GO."), (5, 6, "[a door slams] SO WE DO.")))
+    assert [(cue.speaker, cue.text) for cue in found.cues] == [
+        ("", "IT IS LATE."), ("", f"{heading} WE GO."), ("", "SO WE DO.")
+    ]  # fmt: skip
+
+
+def test_headings_of_a_file_of_capitals_are_no_script(read: ReadText) -> None:
+    found = read(srt(*[(at, at + 1, f"{heading} YES.") for at, heading in enumerate(HEADINGS)]))
+    assert {cue.speaker for cue in found.cues} == {""}
+
+
+@pytest.mark.parametrize(
+    ("text", "speaker"),
+    [
+        (">> MARY: HELLO.", "MARY"),
+        ("- MARY: HELLO.", "MARY"),
+        ("MAN TWO: HELLO.", "MAN TWO"),
+        ("MARY (OFF): HELLO.", "MARY"),
+        ("DR. SMITH: HELLO.", "DR. SMITH"),
+        ("JOHN: HELLO.", "JOHN"),
+    ],
+)
+def test_signs_beside_capitals_tell_speakers_in_a_file_of_capitals(text: str, speaker: str, read: ReadText) -> None:
+    found = read(srt((1, 2, text), (3, 4, "IT IS LATE."), (5, 6, "JOHN: SO IT IS."), (7, 8, "GO."), (9, 10, "NO.")))
+    assert (found.cues[0].speaker, found.cues[0].text) == (speaker, "HELLO.")
+
+
+def test_two_names_in_a_cue_of_capitals_are_speakers(read: ReadText) -> None:
+    (cue, *_) = read(srt((1, 2, "EVE: HELLO.\nBOB: HI."), (3, 4, "IT IS LATE."))).cues
+    assert [part.speaker for part in cue.parts] == ["EVE", "BOB"]
+
+
+INNER = {
+    "a known name": ("JOHN: Hi. MARY: Ho.", [("JOHN", "Hi."), ("MARY", "Ho.")]),
+    "a question": ("JOHN: Is it? Dr. Smith: It is.", [("JOHN", "Is it?"), ("Dr. Smith", "It is.")]),
+    "a quotation": ("“Come here.” MARY: No!", [("", "“Come here.”"), ("MARY", "No!")]),
+    "three": ("MARY: A… JOHN: B! MARY: C.", [("MARY", "A…"), ("JOHN", "B!"), ("MARY", "C.")]),
+    "a manner": ("JOHN: Hi. MARY (off): Ho.", [("JOHN", "Hi."), ("MARY", "Ho.")]),
+    "nobody": ("JOHN: Hi. Remember: go.", [("JOHN", "Hi. Remember: go.")]),
+    "a name after a title": ("JOHN: I met Mr. Mary: he ran.", [("JOHN", "I met Mr. Mary: he ran.")]),
+    "no sentence before it": ("JOHN: I met MARY: she ran.", [("JOHN", "I met MARY: she ran.")]),
+}
+
+
+@pytest.mark.parametrize(("text", "said"), INNER.values(), ids=INNER)
+def test_a_known_speaker_begins_after_a_sentence(text: str, said: list[tuple[str, str]], read: ReadText) -> None:
+    (cue, *_) = read(srt((1, 2, text), (3, 4, "MARY: Yes."), (5, 6, "Dr. Smith: No."), (7, 8, "It is late."))).cues
+    parts = [(part.speaker, part.text) for part in cue.parts] or [(cue.speaker, cue.text)]
+    assert parts == said
+
+
+def test_names_within_cues_alone_are_speakers_where_they_recur(read: ReadText) -> None:
+    found = read(srt((1, 2, "JOHN: Hi. MARY: Ho."), (3, 4, "JOHN: So. MARY: No."), (5, 6, "Well. So. MARY: Yes.")))
+    assert [[part.speaker for part in cue.parts] for cue in found.cues] == [["JOHN", "MARY"]] * 2 + [["", "MARY"]]

@@ -5,6 +5,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from lexicon.dictionary import word_set
+from lexicon.english import is_read_by_letters
 
 # A label at the start of a line, after a dash or >>, and its manner: `- Anna (off):`, `MAN #2:`, `[JOHN]:`.
 _LEAD = r"[^\S\n]*(?:(?:[-–—‐]|>{2,3}|•)[^\S\n]*)?(?:[(\[][^()\[\]\n:]{1,60}[)\]][^\S\n]+){0,2}"  # also after a noise
@@ -17,12 +18,22 @@ _BRACKETED = re.compile(
     r"^(?P<lead>" + _LEAD + r")[\[(](?P<label>[^\W\d_][^()\[\]\n:]{0,40})[\])][^\S\n]*:(?=\s|$)",
     re.MULTILINE,
 )
-_NUMBERED = re.compile(r"\s*(?:#\s*|No\.\s*)?\d{1,3}$")
+# The number of one of several: MAN 2, MAN #2, EPISODE IV, SPEAKER NUMBER ONE; "NUMBER ONE" alone has no other word.
+_NUMBER_WORDS = "one|two|three|four|five|six|seven|eight|nine|ten|eleven|twelve"
+_ROMAN = r"(?=[IVXL])(?:XL|L?X{0,3})(?:IX|IV|V?I{0,3})"
+_NUMBERED = re.compile(
+    rf"(?<=\w)(?:\s*(?:#\s*|\bNo\.\s*|\b(?i:number)\s+)?\d{{1,3}}|\s+(?:(?i:number)\s+)?(?:(?i:{_NUMBER_WORDS})|{_ROMAN}))$"
+)
+_AFTER_SENTENCE = re.compile(r"(?P<word>\w{0,20})[.!?…。！？][\"'”’»)\]]*[^\S\n]+(?=[^\W\d_])")
+_IN_BRACKETS = re.compile(r"\[[^\[\]]*\]|\([^()]*\)")
 _INITIALS = re.compile(r"(?:[^\W\d_]\.)+")
 _LOWER_WORD = re.compile(r"(?<![^\W\d_])[^\W\d_A-Z][^\W\d_]+")
 MAX_NAME_WORDS = 5
 MIN_SHARE = 0.4  # of the cues of a file that begin with a label: then also names that stand once are speakers
 MIN_CUES = 3
+MIN_CAPITALS = 0.5  # of the letters of a file: then capitals are how it is written, and no sign of a name
+MAX_LETTERS = 200_000  # of a file that are counted for this
+MAX_LABEL = 100  # characters of a label with its manner
 _TITLES = word_set(
     "mr mrs ms miss dr prof sir lady lord madam mme mlle m herr frau fr hr señor señora sr sra don doña signor signora "
     "sgt lt capt col gen maj cpl pvt det insp officer detective captain sergeant lieutenant colonel general major "
@@ -53,6 +64,10 @@ _NO_SPEAKERS = word_set(
     "think consider suppose guess message quote quotes verdict motto caption headline exit entrance open closed "
     "welcome introducing previously meanwhile therefore however otherwise namely meaning means conversely todo done "
     "pros cons goal goals task tasks day week month year level round case exhibit item point points option options "
+    "words word line lines deal weather headlines forecast traffic sports live new latest exclusive developing recap "
+    "volume vol book books season seasons phase phases stage stages series unit module edition issue verse chorus "
+    "article amendment canto psalm war wars top fact-check more ahead next-up plot rumor rumour truth "
+    "choice choices thing things way ways "
     "pin password username id ref re cc bcc fwd subject from to via as at by for is was are were it this that these "
     "those here there what who why how when where which i you he she we they me him her us them "
     "said says say asked told faq ad ads fun hinweis achtung warnung merke frage antwort beispiel wichtig ergebnis "
@@ -65,13 +80,27 @@ _NO_SPEAKERS = word_set(
 _INTRODUCING = word_set(
     "note ps warning attention remember reminder step chapter rule fact tip breaking important caution danger hint"
 )
+# Names only where something else says so: days and months, and what is counted.
+_SELDOM_NAMES = word_set(
+    "monday tuesday wednesday thursday friday saturday sunday january february march april may june july august "
+    "september october november december number"
+)
+_EVERYBODY = word_set("all both everyone everybody alle beide tous todos tutti")  # "FIRST OF ALL:" is nobody
+# Those that introduce one of several parts: "PART TWO OF THREE", "EPISODE IV A NEW HOPE".
+_PARTS = word_set(
+    "part parts episode act scene lesson season phase volume vol book day week month year chapter section series round "
+    "step rule number no"
+)
 _BEFORE_NAMES = word_set("dear hi hello hey hallo liebe lieber cher chère chers querido querida caro cara to from re")
 # "He said" in scripts without capitals, at the end or start of what stands before a colon.
 _SAID_ENDINGS = ("说", "說", "道", "问", "問", "是", "为", "為", "言った", "言う", "אמר", "אמרה", "قال", "قالت", "कहा")
 _SAID_STARTS = word_set("אמר אמרה قال قالت")
 _NEVER_IN_NAMES = word_set(
     "i you he she we they it is are was were am be been said says say asked this that these those here there what who "
-    "why how when where which not if but because my your our their his do does did have has had will would can could"
+    "why how when where which not if but because my your our their his do does did have has had will would can could "
+    "let's don't doesn't didn't can't won't isn't aren't wasn't i'm i've i'd i'll he's she's it's that's what's who's "
+    "after before above under "
+    "here's there's where's how's when's why's you're we're they're you've we've they've you'll we'll they'll"
 )
 
 
@@ -83,6 +112,7 @@ class FoundLabel:
     key: str
     has_manner: bool
     has_dash: bool
+    is_inner: bool = False  # it follows a sentence of somebody else
 
 
 def labels_of(text: str) -> list[FoundLabel]:
@@ -132,60 +162,106 @@ def split_label(line: str, speakers: Collection[str] | None) -> tuple[str, str] 
     return (label, line[match.end() :]) if is_speaker else None
 
 
+def divided_at_labels(text: str, speakers: Collection[str]) -> str:
+    """A text with a line end before each label of a speaker that follows a sentence: `JOHN: Hi. MARY: Ho.`."""
+    starts = [start for start, label in _inner_labels(text) if label.key in speakers]
+    return "\n".join(text[start:end] for start, end in zip([0, *starts], [*starts, None], strict=True))
+
+
+def _inner_labels(text: str) -> list[tuple[int, FoundLabel]]:
+    """Labels that follow the end of a sentence within a line, with the positions at which they begin."""
+    found: list[tuple[int, FoundLabel]] = []
+    for match in _AFTER_SENTENCE.finditer(text) if ":" in text or "：" in text else ():
+        # nobody's sentence ends in "Mr."; "Dr. Smith" is one label
+        is_title = label_key(match["word"]) in _TITLES
+        label = _LABEL.match(text[match.end() : match.end() + MAX_LABEL])
+        if label is None or is_title:
+            continue
+        name = " ".join(label["label"].split())
+        found.append((match.end(), FoundLabel(name, label_key(name), False, False, is_inner=True)))
+    return found
+
+
 def find_speakers(texts: Sequence[str]) -> Mapping[str, str]:
     """Speakers of a file by their keys, as they are written first.
 
     Capitals, titles (Dr. Smith), people without names (Man #2) and a manner in brackets (Anna (off)) tell a speaker;
-    another name is one after a dash, if it stands twice, or if most cues begin with a label.
+    another name is one after a dash, if it stands twice, or if most cues begin with a label. Where most letters of the
+    file are capitals, they tell nothing.
 
     Parameters
     ----------
     texts
         Text of each cue without tags, its lines divided by line feeds.
     """
-    found = [labels_of(text) for text in texts]
+    found = [_labels_with_inner(text) for text in texts]
     names: dict[str, str] = {}
     counts: dict[str, int] = {}
     for labels in found:
         for key in {label.key for label in labels}:
             counts[key] = counts.get(key, 0) + 1
-    n_named = sum(any(_is_name(label.name) for label in labels) for labels in found)
-    is_script = n_named >= MIN_CUES and n_named >= MIN_SHARE * len(texts)
+    is_shouted = bool(counts) and _is_in_capitals(texts)
+    named = {label.key for labels in found for label in labels if _is_name(label.name)}
+    n_named = sum(any(label.key in named for label in labels) for labels in found)
+    # in capitals a heading looks like a name: people speak again
+    has_sign = not is_shouted or any(counts[key] > 1 for key in named)
+    is_script = n_named >= MIN_CUES and n_named >= MIN_SHARE * len(texts) and has_sign
     small = frozenset(word for word in _LOWER_WORD.findall("\n".join(texts) if counts else "") if word != word.upper())
     for labels in found:
-        is_dialogue = sum(label.has_dash for label in labels) > 0
+        is_dialogue = any(label.has_dash for label in labels)
+        is_pair = is_shouted and sum(label.key in named and not label.is_inner for label in labels) > 1
         for label in labels:
-            is_likely = counts[label.key] > 1 or is_script or (is_dialogue and label.has_dash)
+            is_likely = counts[label.key] > 1 or is_script or is_pair or (is_dialogue and label.has_dash)
             is_ordinary = label.name.lower() in small
-            if (
-                _is_certain(label.name)
-                or (label.has_manner and _is_name(label.name))
-                or (is_likely and not is_ordinary and _is_name(label.name))
+            if label.key in named and (
+                label.has_manner
+                or (is_likely and not is_ordinary)
+                or (_is_certain(label.name, are_capitals_sure=not is_shouted) and not label.is_inner)
             ):
                 names.setdefault(label.key, label.name)
     return names
 
 
-def _is_certain(label: str) -> bool:
+def _labels_with_inner(text: str) -> list[FoundLabel]:
+    """Labels of a cue, of those within lines only ones in capitals after a label at a start."""
+    labels = labels_of(text)
+    inner = _inner_labels(text) if labels else []
+    return labels + [label for _, label in inner if label.name.lower() != label.name == label.name.upper()]
+
+
+def _is_in_capitals(texts: Sequence[str]) -> bool:
+    """Whether most letters are capitals, without those of labels and of what stands in brackets."""
+    joined = _IN_BRACKETS.sub(" ", _LABEL.sub(" ", "\n".join(texts)[:MAX_LETTERS]))
+    n_small, n_large = sum(map(str.islower, joined)), sum(map(str.isupper, joined))
+    return n_large > MIN_CAPITALS * (n_small + n_large)
+
+
+def _is_certain(label: str, *, are_capitals_sure: bool = True) -> bool:
     """Whether a label is a speaker wherever it stands: a name in capitals, with a title, or of a person without one."""
     if not _is_name(label):
         return False
     words = _words(_NUMBERED.sub("", label))
+    if words[0] in _TITLES or words[-1] in _ROLES:
+        return True
     # a single letter is a speaker only where it recurs: "A: Hello." in a course, "A:" in a list
     # nor are there capitals in scripts without them
     is_in_capitals = label.lower() != label == label.upper() and len("".join(words)) > 1
-    return is_in_capitals or words[0] in _TITLES or words[-1] in _ROLES
+    is_seldom = words[-1] in _SELDOM_NAMES or (len(words) == 1 and _is_initialism(words[0]))
+    return are_capitals_sure and is_in_capitals and not is_seldom
+
+
+def _is_initialism(word: str) -> bool:
+    """Whether a word is read by its letters: DNA, FBI."""
+    return word.isascii() and (is_read_by_letters(word) or not set(word) & set("aeiouy"))
 
 
 def _is_name(label: str) -> bool:
     """Whether a label has the form of a name: few words, each with a capital, none that introduces a sentence."""
     base = _NUMBERED.sub("", label).strip()
     written, words = base.split(), _words(base)
-    if not words or len(words) > MAX_NAME_WORDS or words[0] in _BEFORE_NAMES or _NEVER_IN_NAMES & set(words):
+    if len(written) != len(words) or not 0 < len(words) <= MAX_NAME_WORDS or _introduces(written, words):
         return False
-    if words[-1] in _NO_SPEAKERS or words[0] in _INTRODUCING or len(written) != len(words):
-        return False
-    if base.endswith(_SAID_ENDINGS) or words[0] in _SAID_STARTS or any(character.isdigit() for character in base):
+    if base.endswith(_SAID_ENDINGS) or any(character.isdigit() for character in base):
         return False
     for number, (word, key) in enumerate(zip(written, words, strict=True)):
         if "." in word and not (key in _TITLES or _INITIALS.fullmatch(word)):
@@ -193,6 +269,17 @@ def _is_name(label: str) -> bool:
         if not word[0].isupper() and (number == 0 or key not in _PARTICLES) and word[0].lower() != word[0].upper():
             return False
     return True
+
+
+def _introduces(written: Sequence[str], words: Sequence[str]) -> bool:
+    """Whether words before a colon introduce what follows, as ``Remember`` or ``First of all``."""
+    first, last = words[0], words[-1]
+    if first in _BEFORE_NAMES | _INTRODUCING | _SAID_STARTS or last in _NO_SPEAKERS or _NEVER_IN_NAMES & set(words):
+        return True
+    if len(words) == 1:
+        return False
+    is_part = first in _PARTS and _NUMBERED.search(f"a {written[1]}") is not None
+    return is_part or last in _EVERYBODY or set(words) <= _PARTICLES
 
 
 def _words(label: str) -> list[str]:

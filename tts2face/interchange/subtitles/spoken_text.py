@@ -5,7 +5,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from tts2face.interchange.subtitles.cues import CuePart
-from tts2face.interchange.subtitles.labels import split_label, without_manners
+from tts2face.interchange.subtitles.labels import divided_at_labels, split_label, without_manners
 from tts2face.interchange.subtitles.markup import SUBRIP_MARKUP, Markup, plain_text
 from tts2face.interchange.subtitles.unspoken import ANNOTATIONS, LYRICS
 
@@ -70,7 +70,8 @@ def spoken_text(
     """
     is_dialogue = markup.has_tags and len({name.strip() for name in _VOICE.findall(written)}) > 1
     plain = plain_text(_VOICE.sub("\n\x02\\1\x03", written) if is_dialogue else written, markup)
-    said, left_out = _without_additions(without_manners(plain, speakers or ()), keep)
+    turns = divided_at_labels(plain, speakers) if speakers else plain
+    said, left_out = _without_additions(without_manners(turns, speakers or ()), keep)
     lines = spoken_lines(said)
     if any(map(_DASH.match, lines)):  # between people, also the dash before a number is one
         lines = [_DASHED_NUMBER.sub(r"\1 ", line) for line in lines]
