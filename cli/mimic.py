@@ -99,9 +99,9 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
 
 def _report(written: "WrittenClip", performance: "Performance", took: float) -> None:
     """Say what is written, and what is missing or guessed about the take and its sound."""
-    from tts2face.video.media import channel_notes
+    from tts2face.video.sound_survey import sound_notes
 
-    for note in channel_notes([performance.audio or performance.take]):
+    for note in sound_notes([performance.audio or performance.take]):
         write_message(f"tts2face: note: {note}")
     for note in written.notes:
         write_message(f"tts2face: note: {performance.take.name}: {note}")

@@ -22,9 +22,9 @@ from corpus_tools.recordings.video import CachedTracker, TrackedVideo
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.sound.praat import intensity
-from tts2face.video.media import channel_notes
 from tts2face.video.pose import PoseFreeLandmarks, head_angles, remove_pose
 from tts2face.video.resampling import resample_to_grid, trim_and_fill
+from tts2face.video.sound_survey import sound_notes
 
 TRACK_SUFFIX = ".npz"  # of a file of tracked landmarks in place of a video, without sound
 TIME_TOLERANCE_S = 1e-6  # seconds
@@ -164,7 +164,7 @@ def observe_recording(
         ),
         video=recording.video,
         is_recognised=sound.is_recognised,
-        mismatches=(*(mismatch.sentence for mismatch in sound.mismatches), *channel_notes([recording.video])),
+        mismatches=(*(mismatch.sentence for mismatch in sound.mismatches), *sound_notes([recording.video])),
     )
 
 

@@ -9,10 +9,14 @@ import pytest
 from numpy.typing import NDArray
 
 from tts2face.request import Request
+from tts2face.serving.work.resource_check import RefusedFileError
 from tts2face.serving.work.uploaded_file import decode_sound
 from tts2face.session.prepared import prepare
+from tts2face.video import channels
+from tts2face.video.channels import channel_samples as samples_of
 from tts2face.video.channels import mix_of_products
-from tts2face.video.media import channel_mix, read_sound, sound_blocks
+from tts2face.video.media import read_sound, sound_blocks
+from tts2face.video.sound_survey import survey_sound
 
 RATE = 48_000
 RNG = np.random.default_rng(3)
@@ -56,7 +60,7 @@ def test_a_voice_keeps_its_level_wherever_it_stands(name: str, tmp_path: Path) -
 
 @pytest.mark.parametrize(("name", "taken"), [("inverted", 1), ("inverted and weaker", 2), ("both sides", 0)])
 def test_a_channel_that_stands_for_all_is_named(name: str, taken: int, tmp_path: Path) -> None:
-    mix = channel_mix(write(tmp_path / "a.wav", PLACES[name]))
+    mix = survey_sound(write(tmp_path / "a.wav", PLACES[name])).mix
     assert mix.taken == taken
     assert mix.note("a.wav") == (
         f"the 2 channels of a.wav cancel each other, as one is inverted: channel {taken} is taken alone; give a file "
@@ -122,17 +126,53 @@ def test_a_request_says_which_channel_it_takes(tmp_path: Path) -> None:
     assert prepare(Request(audio=write(tmp_path / "b.wav", PLACES["right"]))).notes == ()
 
 
-def test_the_first_track_that_is_not_silent_is_taken(tmp_path: Path) -> None:
-    path = tmp_path / "screen.mkv"
+def write_tracks(path: Path, tracks: list[NDArray[np.floating]]) -> Path:
     with av.open(str(path), "w") as container:
-        streams = [container.add_stream("flac", rate=RATE, layout="mono") for _ in range(3)]
-        for at in range(0, RATE, 4800):
-            for stream, samples in zip(streams, (NONE, VOICE, OTHER), strict=True):
+        streams = [container.add_stream("flac", rate=RATE, layout="mono") for _ in tracks]
+        for at in range(0, len(tracks[0]), 4800):
+            for stream, samples in zip(streams, tracks, strict=True):
                 block = np.round(samples[None, at : at + 4800] * 32767).astype(np.int16)
                 frame = av.AudioFrame.from_ndarray(block, format="s16", layout="mono")
                 frame.sample_rate, frame.pts = RATE, at
                 container.mux(stream.encode(frame))
         for stream in streams:
             container.mux(stream.encode(None))
-    assert np.corrcoef(read_sound(path, RATE).samples, VOICE)[0, 1] > 0.99
-    assert channel_mix(path).note("screen.mkv").startswith("sound track 2 of 3 of screen.mkv is taken")
+    return path
+
+
+HUM = np.sin(2 * np.pi * 50 * np.arange(RATE) / RATE)
+SPEECH = VOICE * (np.arange(RATE) // 6000 % 2)  # with pauses
+NO_SPEECH = {
+    "silence": NONE, "dither": RNG.integers(-1, 2, RATE) / 32767, "hum": 0.01 * HUM, "loud hum": 0.3 * HUM,
+    "noise": 10 * NOISE, "hum that begins late": np.where(np.arange(RATE) < RATE // 2, 0, 0.1 * HUM),
+    "crosstalk": 0.001 * SPEECH, "offset": NONE + 0.2, "hum in noise": 0.02 * HUM + NOISE,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NO_SPEECH)
+def test_the_first_track_with_speech_is_taken(name: str, tmp_path: Path) -> None:
+    path = write_tracks(tmp_path / "screen.mkv", [NO_SPEECH[name], SPEECH, VOICE])
+    assert np.corrcoef(read_sound(path, RATE).samples, SPEECH)[0, 1] > 0.99
+    is_silent = name in {"silence", "offset"}
+    assert survey_sound(path).mix.note("screen.mkv") == (
+        f"sound track 2 of 3 of screen.mkv is taken, as what precedes it is {'silent' if is_silent else 'noise'}"
+        f"{'' if is_silent else ' without speech'}; give a file with one track to use another one"
+    )
+
+
+@pytest.mark.parametrize(
+    "tracks",
+    [[0.1 * SPEECH, SPEECH], [SPEECH + 3 * NOISE, VOICE], [SPEECH, NONE], [10 * NOISE, NONE], [0.1 * HUM, NOISE]],
+)
+def test_speech_or_the_only_sound_stays_the_first_track(tracks: list[NDArray[np.floating]], tmp_path: Path) -> None:
+    path = write_tracks(tmp_path / "screen.mkv", tracks)
+    assert survey_sound(path).notes("screen.mkv") == ()
+
+
+def test_an_upload_that_is_too_long_is_decoded_to_its_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[int] = []
+    monkeypatch.setattr(channels, "channel_samples", lambda frame: seen.append(frame.samples) or samples_of(frame))
+    path = write(tmp_path / "a.wav", [np.tile(VOICE, 20), np.tile(OTHER, 20)])
+    with pytest.raises(RefusedFileError, match="longer than 3 s"):
+        decode_sound(path, tmp_path / "sent.wav", 3.0)
+    assert sum(seen) < 2 * 3.5 * RATE

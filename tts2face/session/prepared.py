@@ -167,9 +167,9 @@ def _notes_on(source: Source) -> tuple[str, ...]:
     found = recordings(source).values()
     if not found:
         return ()
-    from tts2face.video.media import channel_notes
+    from tts2face.video.sound_survey import sound_notes
 
-    return channel_notes(found)
+    return sound_notes(found)
 
 
 def prepare_request(text: str | Request | PreparedRequest, options: dict[str, Any]) -> PreparedRequest:

@@ -4,24 +4,20 @@ Times are seconds from the start of the file, for pictures and sound alike, so t
 the file starts where the first of them does, whatever its clock says there: that of a broadcast runs on for hours.
 """
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
-from functools import lru_cache
-from itertools import count
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import chain, islice, repeat
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import DataError, InputError
+from lexicon.errors import DataError
 from tts2face.types import Waveform
-from tts2face.video.channels import ChannelMix, choose_mix
 from tts2face.video.container import (
     decode_frames,
-    decode_packets,
-    file_version,
     first_decodable,
     is_broadcast,
     open_container,
@@ -29,6 +25,8 @@ from tts2face.video.container import (
     start_time,
     video_stream,
 )
+from tts2face.video.sound_clock import MAX_DELAY_S, FrameTimes, Stretch, resample_stretch
+from tts2face.video.sound_survey import SoundSurvey, survey_sound
 
 if TYPE_CHECKING:
     from av.audio.frame import AudioFrame
@@ -36,8 +34,6 @@ if TYPE_CHECKING:
     from av.video.frame import VideoFrame
     from av.video.stream import VideoStream
 
-MAX_DELAY_S = 60.0  # of the sound behind the pictures, and of a gap in it; beyond, a clock was set anew
-LEAST_GAP_S = 0.1  # in the times of the sound that is silence; less is rounding of the file's clock
 ABSOLUTE_DURATION = "matroska"  # whose duration ends at its last time stamp, wherever it starts
 DEFAULT_FPS = 25  # of a broadcast that states none
 MAX_FPS = 240.0  # upper limit of cameras; higher stated rates are those of the file's time base
@@ -126,13 +122,17 @@ def read_sound(path: Path, rate: int) -> Waveform:
     return Waveform(np.clip(soxr.resample(sound, source_rate, rate), -1.0, 1.0), rate)
 
 
-def sound_blocks(path: Path, rate: int, formats: str | None = None) -> Iterator[NDArray[np.float32]]:
+def sound_blocks(
+    path: Path, rate: int, formats: str | None = None, longest_s: float | None = None
+) -> Iterator[NDArray[np.float32]]:
     """Yield the sound of a file, as `read_sound` returns it, in blocks, for bounded memory.
 
     Parameters
     ----------
     formats
         As `tts2face.video.container.open_container`, for the file of a stranger.
+    longest_s
+        Seconds by which its channels are chosen at most; who gives it reads no more than these. None: all of it.
 
     Raises
     ------
@@ -141,80 +141,68 @@ def sound_blocks(path: Path, rate: int, formats: str | None = None) -> Iterator[
     """
     import soxr
 
-    with _open_sound(path, formats) as (source_rate, blocks):
+    with _open_sound(path, formats, longest_s) as (source_rate, blocks):
         resampler = soxr.ResampleStream(source_rate, rate, 1, dtype="float32")
         for samples in blocks:
             yield np.clip(resampler.resample_chunk(samples), -1.0, 1.0)
         yield np.clip(resampler.resample_chunk(np.zeros(0, np.float32), last=True), -1.0, 1.0)
 
 
-def channel_mix(path: Path, formats: str | None = None) -> ChannelMix:
-    """How the channels of a file become one; from all of its sound, if it has several channels."""
-    return _channel_mix(path, file_version(path), formats)
-
-
-def channel_notes(paths: Iterable[Path]) -> tuple[str, ...]:
-    """Sentences for the user on what is guessed about the channels of files; none of files that cannot be read."""
-    notes = []
-    for path in paths:
-        with suppress(InputError, DataError):  # who reads the sound says so
-            notes.append(channel_mix(path).note(path.name))
-    return tuple(filter(None, notes))
-
-
-@lru_cache(maxsize=64)
-def _channel_mix(path: Path, version: tuple[int, int, int], formats: str | None) -> ChannelMix:
-    with open_container(path, formats) as container:
-        n_tracks = len(container.streams.audio)
-        n_channels = sound_stream(container, path).codec_context.channels
-    if n_tracks == 1 and n_channels == 1:
-        return ChannelMix(np.ones(1))
-    mixes = []
-    for track in range(n_tracks):  # recorders of screens write the system's sound first, then the microphone
-        with open_container(path, formats) as container:
-            stream = sound_stream(container, path, track)
-            mixes.append(choose_mix(decode_packets(container.demux(stream), path, start_time(path, formats))))
-        if not mixes[-1].is_silent:
-            return replace(mixes[-1], track=track, n_tracks=n_tracks)
-    return mixes[0]
-
-
 @contextmanager
-def _open_sound(path: Path, formats: str | None = None) -> Iterator[tuple[int, Iterator[NDArray[np.float32]]]]:
+def _open_sound(
+    path: Path, formats: str | None = None, longest_s: float | None = None
+) -> Iterator[tuple[int, Iterator[NDArray[np.float32]]]]:
     """Sample rate of a file's sound, and its samples as one channel, in blocks from the start of the file."""
-    start, mix = start_time(path, formats), channel_mix(path, formats)
+    start, survey = start_time(path, formats), survey_sound(path, formats, longest_s)
     with open_container(path, formats) as container:
-        stream = sound_stream(container, path, mix.track)
-        yield stream.rate, _timed_samples(decode_frames(container, stream, path, start), mix, start, path)
+        stream = sound_stream(container, path, survey.mix.track)
+        yield stream.rate, _timed_samples(decode_frames(container, stream, path, start), survey, start, path)
 
 
 def _timed_samples(
-    frames: Iterator["AudioFrame"], mix: ChannelMix, start: float, path: Path
+    frames: Iterator["AudioFrame"], survey: SoundSurvey, start: float, path: Path
 ) -> Iterator[NDArray[np.float32]]:
-    """Samples of frames, with silence where the file has a time but no sound."""
-    expected = start
+    """Samples of frames where the file's times say, with silence where it has a time but no sound."""
+    end = start  # of what precedes, on the file's clock
     n_early = 0  # samples before the start of the file that remain to be left out
-    for number in count():
-        frame = next(frames, None)
-        if frame is None:
-            return
-        samples = mix.mono(frame)
-        gap = 0.0 if frame.time is None else float(frame.time) - expected
+    stretches = chain(survey.clock.stretches, repeat(Stretch(0)))
+    for number, ((time, rate, following), stretch) in enumerate(zip(_stretches(frames), stretches, strict=False)):
+        gap = time - end
         if number == 0 and gap > MAX_DELAY_S:
             raise DataError(
                 f"the sound of {path} begins {gap:.0f} s after its pictures, more than {MAX_DELAY_S:g} s; cut the "
                 "file where the sound begins"
             )
-        offset = round(gap * frame.sample_rate)
+        offset = round(gap * rate)
         if number == 0:
             n_early = max(-offset, 0)
-        if (number == 0 and offset > 0) or LEAST_GAP_S < gap <= MAX_DELAY_S:
-            samples = np.concatenate([np.zeros(offset, np.float32), samples])
-        if number == 0 or abs(gap) > LEAST_GAP_S:
-            expected += gap
-        expected += frame.samples / frame.sample_rate
-        yield samples[n_early:]
-        n_early -= min(n_early, len(samples))
+        if offset > 0 and gap <= MAX_DELAY_S:
+            yield np.zeros(offset, np.float32)
+        n_samples = 0
+        for samples in resample_stretch(map(survey.mix.mono, following), stretch):
+            yield samples[n_early:]
+            n_early -= min(n_early, len(samples))
+            n_samples += len(samples)
+        end = time + n_samples / rate
+
+
+def _stretches(frames: Iterator["AudioFrame"]) -> Iterator[tuple[float, int, Iterator["AudioFrame"]]]:
+    """Time, rate and frames of each stretch without a gap; its frames are read before the next one is."""
+    times = FrameTimes()
+    ahead = [(frame, times.add(frame)[0]) for frame in islice(frames, 1)]
+
+    def following(first: "AudioFrame") -> Iterator["AudioFrame"]:
+        yield first
+        for frame in frames:
+            time, is_new = times.add(frame)
+            if is_new:
+                ahead.append((frame, time))
+                return
+            yield frame
+
+    while ahead:
+        first, time = ahead.pop()
+        yield time, first.sample_rate, following(first)
 
 
 def _frame_rate(container: "InputContainer", stream: "VideoStream", path: Path) -> float:

@@ -99,7 +99,7 @@ def decode_sound(source: Path, target: Path, max_seconds: float) -> None:
     n_left = int(max_seconds * SOUND_RATE)
     try:
         with _decoding(SOUND, source), open_wave(str(target), SOUND_RATE) as out:
-            for block in sound_blocks(source, SOUND_RATE, SOUND_FORMATS):
+            for block in sound_blocks(source, SOUND_RATE, SOUND_FORMATS, max_seconds):
                 n_left -= len(block)
                 if n_left < 0:
                     raise RefusedFileError(f"it is longer than {max_seconds:g} s")
