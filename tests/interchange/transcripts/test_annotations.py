@@ -66,6 +66,7 @@ def test_utterances_share_their_time_among_their_words(read):
     assert [found.words[at].end for at in (1, 3)] == [1.0, 2.6]
     assert found.words[0].end == found.words[1].start
     assert found.notes == (
+        "silence and noise in v.eaf, not words: [laughs] (1)",
         "v.eaf: 2 utterances share their times among their words by nominal lengths, as the words have no times of "
         "their own",
     )
@@ -143,6 +144,32 @@ def test_chat_gives_the_times_of_its_words(read):
     words = "%wor:\tI \x15500_600\x15 want \x15600_900\x15 .\n"
     found = read("v.cha", CHA.replace("%mor:\tpro|I\n", words))
     assert [(word.start, word.end, word.text) for word in found.words] == [(0.5, 0.6, "I"), (0.6, 0.9, "want")]
+
+
+@pytest.mark.parametrize(
+    "bullet",
+    [
+        '\x15%snd:"rec.wav"_500_2500\x15',
+        '\x15%mov:"a_b_1.mov"_500_2500\x15',
+        '\x15%snd: "my rec" 500 2500\x15',
+        "\x15%snd:rec_1_500_2500\x15",
+        "•500_2500•",
+        '•%snd:"rec"_500_2500•',
+        "\x15500_2500-\x15",
+        '\n%snd:\t"rec.wav" 500 2500',
+        '\n%com:\tloud\n%mov:\t"rec 2.mov"_500_2500',
+    ],
+)
+def test_chat_gives_times_in_every_form_of_bullets(bullet, read):
+    found = read("v.cha", f"@Begin\n*CHI:\tat Merry_Christmas the bath+tub fell . {bullet}\n@End\n")
+    assert found.text == "at Merry Christmas the bath tub fell"
+    assert (found.words[0].start, found.words[-1].end) == (0.5, 2.5)
+
+
+def test_compounds_of_timed_words_are_words(read):
+    found = read("v.cha", "@Begin\n*CHI:\tto New_York .\n%wor:\tto •500_600• New_York •600_1400• .\n@End\n")
+    assert [(word.text, word.start) for word in found.words][:2] == [("to", 0.5), ("New", 0.6)]
+    assert (found.words[2].text, found.words[2].end) == ("York", 1.4)
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,11 @@
 """CTM, STM, label files of HTK and xlabel, words of TIMIT: six words with their times."""
 
+import re
+
 import pytest
 
 from lexicon.errors import DataError
-from tts2face.interchange.transcripts.reader import find_reader, read_transcript
+from tts2face.interchange.transcripts.reader import find_reader, find_reader_of_text, read_transcript
 
 WORDS = (("bin", 0.55, 0.75), ("red", 0.75, 1.05), ("now", 1.9, 2.3))
 CTM = "".join(f"v A {start:.2f} {end - start:.2f} {word} 0.98\n" for word, start, end in WORDS)
@@ -79,6 +81,40 @@ def test_words_beside_phones_of_htk(read):
     assert [(word.text, round(word.start, 6), round(word.end, 6)) for word in found.words] == [
         ("bin", 0.5, 0.9), ("now", 0.9, 1.5),
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        "0 50 sil SIL\n50 60 b bin\n60 70 ih\n70 90 n\n90 100 n now\n100 150 aw\n150 160 sil SIL\n",
+        "0 50 s2 -1 sil -1 SIL -1\n50 60 s2 -1 b -1 bin -2\n60 90 s3 -1\n90 150 s2 -1 n -1 now -3\n150 160 s2 -1 sil "
+        "-1 SIL -2\n",
+    ],
+)
+def test_words_beside_phones_and_states_of_htk(rows, read):
+    units = re.sub(r"^(\d+) (\d+)", lambda match: f"{match[1]}00000 {match[2]}00000", rows, flags=re.MULTILINE)
+    found = read("v.lab", units)
+    assert [(word.text, round(word.start, 6), round(word.end, 6)) for word in found.words] == [
+        ("bin", 0.5, 0.9), ("now", 0.9, 1.5),
+    ]  # fmt: skip
+
+
+def test_numbers_that_are_said_are_no_scores(read):
+    assert read("v.lab", "0.5 1.5 place red at f 2\n1.5 2.5 set blue by k 9\n").text.endswith("set blue by k 9")
+    assert read("v.txt", "0.5\t1.5\tplace red at f 2\n1.5\t2.5\tset blue by k 9\n").text.startswith("place red at f 2")
+    assert find_reader_of_text("1 2 buckle my shoe\n3 4 knock at the door\n") is None
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ("THE(2) cat READ(3)", "THE cat READ"),
+        ("A(2) {cat / cats / @} it's(2)", "A cat it's"),
+        ("(the(2)) f(2) GOING_TO go", "the f2 GOING TO go"),
+    ],
+)
+def test_further_pronunciations_and_compounds_of_recognisers_are_words(said, words, read):
+    assert read("v.stm", f"v 1 anna 0.50 1.10 {said}\n").text == words
 
 
 def test_plain_words_of_a_label_file_are_text(tmp_path):

@@ -1,6 +1,7 @@
 """Tables of labels as Audacity exports them: start, end and label in columns, frequencies in lines of their own."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 from lexicon.errors import DataError
@@ -10,6 +11,9 @@ from tts2face.interchange.transcripts.spoken import SpokenCue, Tier
 _NUMBER = r"-?\d+(?:[.,]\d+)?"
 _ROW = re.compile(rf"\s*({_NUMBER})\t\s*({_NUMBER})(?:\t(.*))?")
 _SPACED_ROW = re.compile(r"\s*(\d+\.\d+) +(\d+\.\d+)(?: +(.*))?")  # numbers of words have no decimals
+_SCORED = re.compile(
+    r"(.*\S)(?:\t\s*-?\d[\d.,eE+-]*|\s+-?\d+\.\d+(?:[eE][+-]?\d+)?|\s+-\d+)\s*"
+)  # bin -201.5, bin 0.98
 _FREQUENCIES = re.compile(rf"\\\s*{_NUMBER}\s+{_NUMBER}\s*")
 _NAMES = re.compile(r"\s*(?:start|begin|from|tmin|xmin|onset|time)\b[^\t]*\t.*", re.IGNORECASE)
 
@@ -40,4 +44,12 @@ def _rows(text: str) -> list[SpokenCue]:
         if start > end:
             return []
         rows.append(SpokenCue(start, end, (match[3] or "").strip()))
-    return rows
+    return _without_scores(rows)
+
+
+def _without_scores(rows: list[SpokenCue]) -> list[SpokenCue]:
+    """Rows without a column of confidences or likelihoods behind all labels."""
+    scored = [_SCORED.fullmatch(row.text) for row in rows if row.text]
+    if not scored or not all(scored):
+        return rows
+    return [replace(row, text=match[1]) if (match := _SCORED.fullmatch(row.text)) else row for row in rows]

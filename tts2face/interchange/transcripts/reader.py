@@ -21,13 +21,14 @@ from tts2face.interchange.transcripts.ctm import read_ctm
 from tts2face.interchange.transcripts.elan import read_eaf
 from tts2face.interchange.transcripts.exmaralda import read_exb
 from tts2face.interchange.transcripts.grid_align import read_align
-from tts2face.interchange.transcripts.htk import is_label_file, read_lab
+from tts2face.interchange.transcripts.htk import is_label_file, is_unnamed_label_file, read_lab
 from tts2face.interchange.transcripts.label_table import is_label_table, read_label_table
-from tts2face.interchange.transcripts.silence import spoken_part
+from tts2face.interchange.transcripts.silence import spoken_label
+from tts2face.interchange.transcripts.speakers import without_speakers
 from tts2face.interchange.transcripts.spoken import SpokenCue, Tier, Transcript
 from tts2face.interchange.transcripts.stm import read_stm
 from tts2face.interchange.transcripts.textgrid import is_textgrid, read_textgrid
-from tts2face.interchange.transcripts.tiers import choose_tier, name_tiers
+from tts2face.interchange.transcripts.tiers import choose_tier, has_words, name_tiers
 from tts2face.interchange.transcripts.timit import is_timit_prompt, read_timit
 from tts2face.interchange.transcripts.utterances import shared_words
 
@@ -47,6 +48,7 @@ READERS: Mapping[str, ReadTiers] = MappingProxyType(
         ".stm": read_stm,
         ".wrd": read_timit,
         ".lab": read_lab,
+        ".rec": read_lab,
     }
 )
 _MARKS: Mapping[str, ReadTiers] = MappingProxyType(
@@ -84,6 +86,7 @@ def read_transcript(path: Path, tier: str | None = None) -> Transcript:
     spoken, left_out = _spoken_labels(chosen)
     if not spoken:
         raise DataError(f"{path} contains no word; check the file")
+    spoken, speakers = without_speakers(spoken)
     words, shared = shared_words(spoken)
     notes = (
         encoding_note(path),
@@ -91,6 +94,7 @@ def read_transcript(path: Path, tier: str | None = None) -> Transcript:
         *chosen.notes,
         _overlap_note(path, spoken),
         _left_out_note(path, left_out),
+        speakers and f"{path.name}: {speakers}",
         shared and f"{path.name}: {shared}",
     )
     return Transcript(words, tuple(note for note in notes if note))
@@ -127,23 +131,24 @@ def find_reader_of_text(text: str) -> ReadTiers | None:
             return read
     if is_timit_prompt(text):
         return read_timit
+    if is_unnamed_label_file(text):
+        return read_lab
     return read_label_table if is_label_table(text) else None
 
 
 def _spoken_labels(tier: Tier) -> tuple[list[SpokenCue], Counter[str]]:
-    """Labels with words in the order of time, and how often other labels than the empty one occur."""
+    """Labels with words in the order of time, and how often what is no word occurs."""
     spoken, left_out = [], Counter[str]()
     for label in tier.labels:
-        words = spoken_part(label.text)
-        if words:
-            spoken.append(SpokenCue(label.start, label.end, words))
-        elif label.text:
-            left_out[label.text] += 1
+        found = spoken_label(label.text)
+        left_out.update(found.left_out)
+        if found.spoken:
+            spoken.append(SpokenCue(label.start, label.end, found.spoken))
     return sorted(spoken, key=lambda cue: cue.start), left_out
 
 
 def _no_words(path: Path, tiers: list[Tier]) -> str:
-    full = [tier for tier in tiers if any(spoken_part(label.text) for label in tier.labels)]
+    full = [tier for tier in tiers if has_words(tier)]
     if not full:
         return f"{path} contains no word; check the file"
     if any(tier.name for tier in tiers):

@@ -6,6 +6,7 @@ from pathlib import Path
 from lexicon.errors import DataError
 from tts2face.interchange.subtitles.decoding import read_text
 from tts2face.interchange.transcripts.ctm import tiers_of_file
+from tts2face.interchange.transcripts.silence import without_variants
 from tts2face.interchange.transcripts.spoken import SpokenCue, Tier
 
 _LINE = re.compile(r"(\S+)\s+(\S+)\s+(\S+)\s+(\d+(?:\.\d*)?|\.\d+)\s+(\d+(?:\.\d*)?|\.\d+)(?:\s+<[^<>]*>)?(?:\s+(.*))?")
@@ -29,6 +30,7 @@ def read_stm(path: Path) -> list[Tier]:
         words = (match[6] or "").strip()
         if words.casefold() in UNSPOKEN:
             continue
-        words = _OPTIONAL.sub(r"\1", _HESITATION.sub("", _ALTERNATIVES.sub(r"\1", words)))
+        words = without_variants(_HESITATION.sub("", _ALTERNATIVES.sub(r"\1", words)))
+        words = _OPTIONAL.sub(r"\1", words)
         speakers.setdefault((match[1], match[3]), []).append(SpokenCue(start, end, words))
     return tiers_of_file(path, speakers)
