@@ -64,7 +64,7 @@ def spoken_label(label: str) -> SpokenLabel:
         return SpokenLabel("", (plain,) if plain else ())
     said = _SAID_LAUGHING.sub(r"\1", plain)
     left_out = _INSERTED.findall(said)
-    words = []
+    words: list[str] = []
     for word in _INSERTED.sub(" ", said).split():
         is_between = len(word) > 1 and word.casefold() in _BETWEEN_WORDS
         (left_out if is_between else words).append(word)
