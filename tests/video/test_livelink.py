@@ -1,6 +1,6 @@
 """Takes of Live Link Face and tables like them are read with what they hold; what is missing or guessed is said."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,8 @@ HEAD = ("HeadYaw", "HeadPitch", "HeadRoll")
 NAMES = (*(name[0].upper() + name[1:] for name in ARKIT_SHAPES), *HEAD)
 TEN = 10 * 3600.0  # o'clock
 FOUR_S = np.arange(240) / 60
+AT = {name.lower(): column for column, name in enumerate(("Timecode", "BlendShapeCount", *NAMES))}
+ONE_LEFT_OUT = "rows left out, as their time is missing, damaged or no later one: 1"
 
 
 def jaw(times: np.ndarray) -> np.ndarray:
@@ -74,17 +76,6 @@ def test_a_second_without_a_face_keeps_its_time(tmp_path: Path) -> None:
     assert np.abs(np.diff(values)).max() < 0.05  # no leap: a motion through the whole range takes a quarter second
 
 
-def test_rows_of_a_lost_face_are_no_frames(tmp_path: Path) -> None:
-    rows = rows_of(FOUR_S, [timecode(TEN + time) for time in FOUR_S])
-    rows[100:106] = [[row[0], "0", *("" for _ in NAMES)] for row in rows[100:106]]
-    rows[180] = [rows[180][0], "0"]
-    found = read(tmp_path, rows)
-    assert len(found.weights) == 240
-    assert jaw_error(found) < 0.03
-    assert "rows without a face: 7" in found.notes
-    assert "frames missing from 1.63 s on, which are interpolated: 7" in found.notes
-
-
 def test_frames_that_were_dropped_keep_their_time(tmp_path: Path) -> None:
     kept = FOUR_S[np.random.default_rng(3).uniform(size=240) > 0.3]
     kept = np.concatenate([[0.0], kept[(kept > 0) & (kept < FOUR_S[-1])], FOUR_S[-1:]])
@@ -101,7 +92,7 @@ def test_a_row_that_is_not_later_is_left_out(again: float, tmp_path: Path) -> No
     found = read(tmp_path, rows_of(FOUR_S, labels))
     assert len(found.weights) == 240
     assert jaw_error(found) < 0.01
-    assert found.notes[0] == "rows left out, as their time is missing or not after that of the row before: 1"
+    assert found.notes[0] == "rows left out, as their time is missing, damaged or no later one: 1"
 
 
 def test_a_clock_that_was_set_goes_on(tmp_path: Path) -> None:
@@ -186,17 +177,164 @@ def test_names_are_compared_without_case_and_in_any_order(short: bool, tmp_path:
     assert jaw_error(found) < 1e-3
 
 
-def test_damage_costs_the_damaged_rows_only(tmp_path: Path) -> None:
-    rows = rows_of(FOUR_S, [timecode(TEN + time) for time in FOUR_S])
-    at = rows[0].index("JawOpen")
-    rows[40][at] = "NaN"
-    rows[41][at] = rows[42][0] = ""
-    rows = [*rows[:60], [], rows[0], *rows[60:], rows[0], rows[-1][:30]]
-    found = read(tmp_path, rows)
+def lost_face(rows: list[list[str]]) -> list[list[str]]:
+    rows[100:106] = [[row[0], "0", *("" for _ in NAMES)] for row in rows[100:106]]
+    rows[180] = [rows[180][0], "0"]
+    return rows
+
+
+def spoilt_cells(rows: list[list[str]]) -> list[list[str]]:
+    rows[40][AT["jawopen"]] = "NaN"
+    rows[41][AT["jawopen"]] = rows[42][0] = ""
+    return [*rows[:60], [], rows[0], *rows[60:], rows[0], rows[-1][:30]]
+
+
+def with_slates(rows: list[list[str]]) -> list[list[str]]:
+    """Two columns of the user's own, whose empty cells are not written."""
+    rows[0] += ["Slate", "Take"]
+    for row in rows[200:]:
+        row += ["4A", ""]
+    return rows
+
+
+def with_cell(row: int, name: str, value: str) -> Callable[[list[list[str]]], list[list[str]]]:
+    return lambda rows: [
+        [value if (number, column) == (row, AT[name]) else cell for column, cell in enumerate(cells)]
+        for number, cells in enumerate(rows)
+    ]
+
+
+def with_times(labels: dict[int, str]) -> Callable[[list[list[str]]], list[list[str]]]:
+    return lambda rows: [[labels.get(number, row[0]), *row[1:]] for number, row in enumerate(rows)]
+
+
+@pytest.mark.parametrize(
+    ("damage", "notes"),
+    [
+        (lost_face, {"rows without a face: 7", "frames missing from 1.63 s on, which are interpolated: 7"}),
+        (spoilt_cells, {"rows left out, as they have more or fewer cells than columns: 1",
+                        "cells without a number, which are interpolated: 2"}),
+        (with_times({60: "10:00:00:75.000"}), {ONE_LEFT_OUT,
+                                               "frames missing from 0.97 s on, which are interpolated: 1"}),
+        (with_times({60: "10:00:00:45.000"}), {ONE_LEFT_OUT}),  # a possible number, a quarter second early
+        (with_times({60: "10:00:01:10.000"}), {ONE_LEFT_OUT}),  # and late: no row after it is lost
+        (with_times({60: "10:00:09:59.000", 61: "10:00:09:60.000"}), {ONE_LEFT_OUT[:-1] + "2"}),
+        (with_times({60: "10:00:00:59.000", 61: "10:00:01;00"}), set()),  # one sign of drop frame
+        (with_cell(60, "timecode", "600"), {ONE_LEFT_OUT}),
+        (with_cell(60, "jawopen", "23"), {"cells that no face can have are left out: JawOpen 23 at 0.98 s"}),
+        (with_cell(60, "jawopen", "-1e40"), {"cells that no face can have are left out: JawOpen -1e+40 at 0.98 s"}),
+        (with_cell(1, "mouthclose", "99"), {"cells that no face can have are left out: MouthClose 99 at 0.00 s"}),
+        (with_cell(60, "headyaw", "7.5"), {"cells that no face can have are left out: HeadYaw 7.5 at 0.98 s"}),
+        (with_cell(60, "headroll", "inf"), {"cells without a number, which are interpolated: 1"}),
+        (lambda rows: [[*rows[0], ""], *rows[1:]], set()),  # a comma at the end of the heading
+        (lambda rows: [rows[0], *([*row, "", ""] for row in rows[1:])], set()),  # at the ends of rows
+        (lambda rows: [rows[0][:-3], *(row[:-2] for row in rows[1:])], set()),  # of headings, without the last names
+        (with_slates, set()),
+        (lambda rows: [["Anna; take 3; 60 fps; good"], *rows], set()),
+        (lambda rows: [["a\tb\tc; d"], [], *rows], set()),
+    ],
+)  # fmt: skip
+def test_damage_costs_the_damaged_cells_only(
+    damage: Callable[[list[list[str]]], list[list[str]]], notes: set[str], tmp_path: Path
+) -> None:
+    found = read(tmp_path, damage(rows_of(FOUR_S, [timecode(TEN + time) for time in FOUR_S])))
+    assert (len(found.weights), found.weights.fps) == (240, 60.0)
+    assert jaw_error(found) < 0.03
+    assert np.abs(found.head.values).max() == 0.0
+    assert notes <= set(found.notes)
+    assert bool(notes) == bool(found.notes)
+
+
+@pytest.mark.parametrize(("row", "label"), [(0, "09:00:00:00.000"), (239, "10:20:00:00.000"), (239, "10:00:03:75.000")])
+def test_a_damaged_time_at_an_end_costs_that_row(row: int, label: str, tmp_path: Path) -> None:
+    times = FOUR_S - (row == 0) / 60
+    found = read(
+        tmp_path, rows_of(times, [label if n == row else timecode(TEN + time) for n, time in enumerate(FOUR_S)])
+    )
+    assert (len(found.weights), found.weights.fps, found.notes) == (239, 60.0, (ONE_LEFT_OUT,))
+    assert jaw_error(found) < 1e-3
+
+
+@pytest.mark.parametrize("leaps", [(10.0, -10.0), (-10.0, 10.0), (70.0, -70.0)])
+def test_a_clock_that_is_set_and_set_back_leaves_no_gap(leaps: tuple[float, float], tmp_path: Path) -> None:
+    labels = [timecode(TEN + time + leaps[0] * (time > 1) + leaps[1] * (time > 2)) for time in FOUR_S]
+    found = read(tmp_path, rows_of(FOUR_S, labels))
     assert len(found.weights) == 240
     assert jaw_error(found) < 0.01
-    assert "rows left out, as they have more or fewer cells than columns: 1" in found.notes
-    assert "cells without a number, which are interpolated: 2" in found.notes
+    assert found.notes == ("its clock leaps at 1.00 s, 2.00 s; the rows after it follow without a pause",)
+
+
+@pytest.mark.parametrize(
+    ("column", "per_second", "said"),
+    [
+        ("Timecode", 1e3, "milliseconds"),
+        ("timestamp", 1e6, "microseconds"),
+        ("Time", 1e9, "nanoseconds"),
+        ("Time (ms)", 1e3, ""),
+        ("timestamp_us", 1e6, ""),
+        ("Time [s]", 1.0, ""),
+    ],
+)
+@pytest.mark.parametrize("fps", [30, 60])
+def test_times_in_parts_of_seconds(column: str, per_second: float, said: str, fps: int, tmp_path: Path) -> None:
+    times = np.arange(4 * fps) / fps
+    start = 1.7e9 if per_second > 1 else 0.0  # from 1970 on, as programs write it
+    rows = rows_of(times, [f"{(start + time) * per_second:.{0 if per_second > 1 else 4}f}" for time in times])
+    found = read(tmp_path, [[column, *rows[0][1:]], *rows[1:]])
+    assert (len(found.weights), found.weights.fps) == (4 * fps, fps)
+    assert jaw_error(found) < 0.01
+    assert [said in note for note in found.notes] == [True] * bool(said)
+
+
+def test_frame_numbers_in_steps_are_no_milliseconds(tmp_path: Path) -> None:
+    rows = rows_of(FOUR_S, [str(8 * frame) for frame in range(240)])
+    assert read(tmp_path, rows, fps=240.0).weights.fps == 30.0
+    assert read(tmp_path, [["Frame", *rows[0][1:]], *rows[1:]], fps=480.0).weights.fps == 60.0
+
+
+def test_seconds_of_few_frames_are_no_frame_numbers(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="has 3 frames per second by its column Timecode"):
+        read(tmp_path, rows_of(FOUR_S, [f"{frame / 3:.4f}" for frame in range(240)]))
+
+
+def test_a_rate_that_the_timecodes_contradict_is_said(tmp_path: Path) -> None:
+    found = read(tmp_path, rows_of(FOUR_S, [timecode(TEN + time) for time in FOUR_S]), fps=30.0)
+    assert (found.weights.fps, jaw_error(found) < 1e-3) == (60.0, True)
+    assert found.notes == ("its timecodes count up to frame 59, which 30 frames a second do not have; 60 are taken",)
+
+
+def test_one_number_that_drop_frame_skips_is_damage(tmp_path: Path) -> None:
+    labels = [f"10:01:{59 + (n >= 60):02d};{n % 60:02d}" for n in range(60)]
+    labels += [f"10:02:{second:02d};{n:02d}" for second in range(3) for n in range(4 * (not second), 60)]
+    labels[64] = "10:02:00;01"
+    found = read(tmp_path, rows_of(np.arange(len(labels)) * 1.001 / 60, labels))
+    assert found.weights.fps == pytest.approx(60 / 1.001, abs=1e-6)
+
+
+def test_a_still_head_in_degrees_and_a_large_weight_are_read(tmp_path: Path) -> None:
+    rows = rows_of(FOUR_S, [timecode(TEN + time) for time in FOUR_S])
+    for number, row in enumerate(rows[1:]):
+        row[AT["headyaw"]] = f"{90 + 3 * np.sin(number / 20):.4f}"
+        row[AT["jawopen"]] = f"{3 * float(row[AT['jawopen']]):.4f}"  # of a program that exaggerates
+    found = read(tmp_path, rows)
+    assert np.ptp(found.head.values[:, 1]) == pytest.approx(np.radians(6), abs=0.01)
+    assert found.weights.values.max() == pytest.approx(1.5, abs=0.01)
+
+
+def test_a_head_that_turns_over_half_a_circle_does_not_leap(tmp_path: Path) -> None:
+    rows = rows_of(FOUR_S, [timecode(TEN + time) for time in FOUR_S])
+    for number, row in enumerate(rows[1:]):
+        roll = np.pi + 0.1 * np.sin(number / 20)
+        row[AT["headroll"]] = f"{roll - 2 * np.pi * (roll > np.pi):.5f}"
+    found = read(tmp_path, rows)
+    assert np.abs(found.head.values[:, 2]).max() < 0.15
+    assert found.notes == ()
+
+
+def test_a_take_of_no_frame_says_what_became_of_its_rows(tmp_path: Path) -> None:
+    rows = rows_of(FOUR_S, [timecode(TEN + time) for time in FOUR_S])
+    with pytest.raises(DataError, match=r"\(0\); rows left out, as they have more or fewer cells than columns: 240"):
+        read(tmp_path, [rows[0], *([*row, *row[2:]] for row in rows[1:])])
 
 
 def test_turns_in_degrees_and_weights_per_cent_are_said(tmp_path: Path) -> None:

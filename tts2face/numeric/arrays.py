@@ -5,6 +5,7 @@ sRGB values and linear light (IEC 61966-2-1).
 
 import threading
 import weakref
+from bisect import bisect_left
 from dataclasses import fields
 from typing import Any, TypeVar
 
@@ -65,6 +66,29 @@ def true_runs(values: NDArray[np.bool_]) -> NDArray[np.int64]:
     """(N, 2) first index and one past the last of each run of True in (T,)."""
     borders = np.flatnonzero(np.diff(np.concatenate([[False], values, [False]])))
     return borders.reshape(-1, 2)
+
+
+def longest_increasing(values: NDArray[np.floating]) -> Mask:
+    """Values (T,) of a longest increasing part: as few as possible of the others are left out (Fredman 1975)."""
+    found: Mask = np.ones(len(values), np.bool_)
+    if (np.diff(values) > 0).all():
+        return found
+    ends = list[float]()  # least last value of a part of each length
+    rows = list[int]()  # where these stand
+    before = np.full(len(values), -1)
+    for row, value in enumerate(values.tolist()):
+        at = bisect_left(ends, value)
+        if at < len(ends) and ends[at] == value:
+            continue
+        before[row] = rows[at - 1] if at else -1
+        ends[at : at + 1] = [value]
+        rows[at : at + 1] = [row]
+    found[:] = False
+    row = rows[-1]
+    while row >= 0:
+        found[row] = True
+        row = int(before[row])
+    return found
 
 
 def connected_pieces(corners: NDArray[np.integer], n_vertices: int) -> NDArray[np.int32]:

@@ -1,14 +1,16 @@
 """One clock for the rows of a capture: without repetitions and jumps, across midnight; and its frame rate."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from tts2face.numeric.arrays import FloatArray, IntArray, Mask
+from tts2face.numeric.arrays import FloatArray, IntArray, Mask, longest_increasing
 from tts2face.video.timecode import FrameClock
 
 MAX_SHORT_GAP_S = 0.5  # a longer one hides a word: the pose in it is not interpolated
 MAX_LONG_GAP_S = 60.0  # a longer one is a clock that was set, or another take
+MAX_ASTRAY_END = 2  # rows before the first leap, or after the last one, that are damaged and no take
 STANDARD_RATES = (12.0, 15.0, 24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 90.0, 100.0, 120.0)
 NTSC_RATES = tuple(nominal * 1000 / 1001 for nominal in (24, 30, 48, 60, 120))
 RATE_TOLERANCE = 0.02  # of a rate: a capture of few frames is that far from it
@@ -39,41 +41,70 @@ def order_frames(clock: FrameClock, still_fps: float) -> CaptureTimes:
     if len(rows) > 1 and not np.ptp(times):
         notes.append(f"its clock stands still; its rows are taken for {still_fps:g} frames a second")
         times = np.arange(len(rows)) / still_fps
+    times = _cross_midnight(times, clock.day_s)
     keep = ~_astray(times)
-    rows, times = rows[keep], _continue_clock(times[keep], clock.day_s, notes)
-    ahead = np.concatenate([[True], times[1:] > np.maximum.accumulate(times)[:-1]]) if len(times) else np.zeros(0, bool)
+    rows, times = rows[keep], _continue_clock(times[keep], notes)
+    ahead = longest_increasing(times)
     n_lost = len(clock.times) - int(ahead.sum())
     if n_lost:
-        notes.append(f"rows left out, as their time is missing or not after that of the row before: {n_lost}")
+        notes.append(f"rows left out, as their time is missing, damaged or no later one: {n_lost}")
     rows, times = rows[ahead], times[ahead]
     return CaptureTimes(rows, times - (times[0] if len(times) else 0.0), _frame_rate(times), tuple(notes))
 
 
+def _cross_midnight(times: FloatArray, day_s: float) -> FloatArray:
+    """Times that go on where a day begins: the shorter way round from row to row."""
+    if not len(times) or not np.isfinite(day_s):
+        return times
+    steps = np.diff(times)
+    passed = np.where(np.abs(steps) > day_s / 2, steps - np.sign(steps) * day_s, steps)
+    return np.cumsum(np.concatenate([times[:1], passed]))
+
+
 def _astray(times: FloatArray) -> Mask:
-    """Rows (T,) whose time lies far from those of both neighbours, which fit each other."""
+    """Rows (T,) of runs whose times lie far from those on both sides, which fit each other; a row or two at an end."""
     found: Mask = np.zeros(len(times), np.bool_)
-    before, after = times[:-2], times[2:]
-    at = times[1:-1]
-    fit = (after > before) & (after - before <= MAX_SHORT_GAP_S)
-    found[1:-1] = fit & ((at < before - MAX_SHORT_GAP_S) | (at > after + MAX_SHORT_GAP_S))
+    borders = [0, *(np.flatnonzero(np.abs(np.diff(times)) > MAX_SHORT_GAP_S) + 1).tolist(), len(times)]
+    runs = list(pairwise(borders))
+    for first, end in (runs[0], runs[-1]):
+        if len(runs) > 1 and end - first <= MAX_ASTRAY_END:
+            found[first:end] = True
+    before = 0  # end of the last run that is not astray
+    for (first, end), (after, _) in pairwise(runs):
+        inside = times[first:end]
+        if before and 0 < times[after] - times[before - 1] <= MAX_SHORT_GAP_S:
+            found[first:end] |= bool(inside.max() < times[before - 1] or inside.min() > times[after])
+        if not found[first]:
+            before = end
     return found
 
 
-def _continue_clock(times: FloatArray, day_s: float, notes: list[str]) -> FloatArray:
-    """Times across midnight; where the clock was set, the next row follows by the usual step."""
+def _continue_clock(times: FloatArray, notes: list[str]) -> FloatArray:
+    """Times without leaps: where the clock was set, the next row follows by the usual step."""
     steps = np.diff(times)
-    if np.isfinite(day_s):
-        steps = np.where(steps < -day_s / 2, steps + day_s, steps)
     inner = steps[(steps > 0) & (steps <= MAX_SHORT_GAP_S)]
     is_set = (steps > MAX_LONG_GAP_S) | (steps < -MAX_SHORT_GAP_S)
     if is_set.any() and len(inner):
-        steps = np.where(is_set, np.median(inner), steps)
+        usual = float(np.median(inner))
+        is_set |= _is_set_back(steps, usual)
+        steps = np.where(is_set, usual, steps)
         at = np.concatenate([[0.0], np.cumsum(steps)])[:-1][is_set]
         notes.append(
             f"its clock leaps at {', '.join(f'{second:.2f} s' for second in at[:4])}{' ...' if len(at) > 4 else ''}; "
             "the rows after it follow without a pause"
         )
     return np.concatenate([times[:1], times[:1] + np.cumsum(steps)])
+
+
+def _is_set_back(steps: FloatArray, usual: float) -> Mask:
+    """Steps (T - 1,) of a leap that the next one takes back, of which the forward one alone would be a gap."""
+    found: Mask = np.zeros(len(steps), np.bool_)
+    leaps = np.flatnonzero(np.abs(steps) > MAX_SHORT_GAP_S)
+    for first, second in pairwise(leaps):
+        passed = steps[first : second + 1].sum()
+        if steps[first] * steps[second] < 0 and 0 < passed <= MAX_SHORT_GAP_S + 2 * usual * (second - first):
+            found[[first, second]] = True
+    return found
 
 
 def _frame_rate(times: FloatArray) -> float:

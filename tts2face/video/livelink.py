@@ -4,6 +4,7 @@ A take cannot be made again: what can be read of it is read, and notes say what 
 """
 
 import csv
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,14 +12,14 @@ import numpy as np
 
 from lexicon.errors import DataError, InputError
 from lexicon.values.tables import parse_table, read_table
-from tts2face.numeric.arrays import FloatArray, IntArray, interpolate_columns
+from tts2face.numeric.arrays import FloatArray, IntArray, Mask, interpolate_columns
 from tts2face.types import HEAD_CHANNELS, Trajectory
 from tts2face.video.blendshapes import BLENDSHAPES
 from tts2face.video.capture_clock import GAP_STEPS, MAX_SHORT_GAP_S, CaptureTimes, order_frames
-from tts2face.video.timecode import DEFAULT_TIMECODE_RATE, parse_times
+from tts2face.video.capture_values import describe_damage, read_turns, read_weights
+from tts2face.video.timecode import DEFAULT_TIMECODE_RATE, TIME_COLUMNS, parse_times
 
 HEAD_COLUMNS = ("headpitch", "headyaw", "headroll")
-TIME_COLUMNS = ("timecode", "time", "timestamp", "frame")  # how programs name it, in lower case
 NO_SHAPES = ("blendshapecount", "head", "lefteye", "righteye")  # how other columns begin
 ARKIT_NAMES = {name.lower(): name for name in (*BLENDSHAPES[1:], "tongueOut")}
 DELIMITERS = ",;\t"
@@ -27,8 +28,8 @@ MIN_CAPTURE_FPS, MAX_CAPTURE_FPS = 10.0, 240.0
 RELAX_S = 0.25  # from a pose to the take's usual one in a long gap, and back
 MAX_QUOTED = 4  # gaps quoted in a note
 MAX_HEADER_ROW, MAX_HEADER_BYTES = 20, 1 << 16  # of what stands above the first frame
-LARGEST_TURN_RAD = 2 * np.pi  # turns beyond it are in degrees
-LARGEST_WEIGHT = 10.0  # weights beyond it are per cent
+USUAL_SHARE = 0.02  # of rows with another number of cells than the heading: fewer are damaged
+MAX_UNNAMED_SHARE = 0.25  # cells beyond the heading, over its columns: more are no further columns
 HEAD_SIGNS = np.array([1.0, -1.0, 1.0])  # as of its eyes: pitch down (EyePitch follows EyeLookDown), yaw to the right
 
 
@@ -61,21 +62,23 @@ def read_livelink(path: Path, fps: float | None = None) -> FaceCapture:
     """
     if not path.is_file():
         raise InputError(f"there is no capture {path}; check the path")
-    rows = read_table(path, delimiters=DELIMITERS)
+    rows = read_table(path, delimiters=DELIMITERS, is_heading=_is_heading)
     first = _header_row(rows)
     if first is None:
         raise DataError(
             f"{path} is not a CSV file of Live Link Face: it needs the columns Timecode, JawOpen, ... ; "
             "it has no row with a column of times and ARKit's names"
         )
-    names = [_normal(cell) for cell in rows[first]]
+    names = _column_names(rows[first])
     labels, values, notes = _parse_rows(names, rows[first + 1 :])
-    clock = order_frames(parse_times(labels, fps), fps or DEFAULT_TIMECODE_RATE)
+    column = _time_column(names)
+    clock = order_frames(parse_times(labels, fps, names[column]), fps or DEFAULT_TIMECODE_RATE)
     if len(clock.rows) < 2:
-        raise DataError(f"{path} holds fewer than two frames with a time and a face ({len(clock.rows)})")
+        reasons = "".join(f"; {note}" for note in (*clock.notes, *notes))
+        raise DataError(f"{path} holds fewer than two frames with a time and a face ({len(clock.rows)}){reasons}")
     if not MIN_CAPTURE_FPS <= clock.fps <= MAX_CAPTURE_FPS:
         raise DataError(
-            f"{path} has {clock.fps:g} frames per second by its column {rows[first][_time_column(names)].strip()}; "
+            f"{path} has {clock.fps:g} frames per second by its column {rows[first][column].strip()}; "
             f"supported are {MIN_CAPTURE_FPS:g} to {MAX_CAPTURE_FPS:g}"
         )
     return _build_capture(rows[first], names, values[clock.rows], clock, notes)
@@ -88,7 +91,7 @@ def is_capture_table(path: Path) -> bool:
     with path.open("rb") as file:
         start = file.read(MAX_HEADER_BYTES).decode("utf-8-sig", errors="replace")
     try:
-        return _header_row(parse_table(start, DELIMITERS)) is not None
+        return _header_row(parse_table(start, DELIMITERS, _is_heading)) is not None
     except csv.Error:
         return False
 
@@ -105,11 +108,18 @@ def _normal(cell: str) -> str:
 
 def _header_row(rows: list[list[str]]) -> int | None:
     """Number of the row with the names of the columns; None without one."""
-    for number, row in enumerate(rows[:MAX_HEADER_ROW]):
-        names = {_normal(cell) for cell in row}
-        if names & set(TIME_COLUMNS) and names & ARKIT_NAMES.keys():
-            return number
-    return None
+    return next((number for number, row in enumerate(rows[:MAX_HEADER_ROW]) if _is_heading(row)), None)
+
+
+def _is_heading(row: list[str]) -> bool:
+    names = {_normal(cell) for cell in row}
+    return bool(names & TIME_COLUMNS.keys() and names & ARKIT_NAMES.keys())
+
+
+def _column_names(heading: list[str]) -> list[str]:
+    """Names of the columns, without empty ones at the end, which a comma there makes."""
+    names = [_normal(cell) for cell in heading]
+    return names[: max(column for column, name in enumerate(names) if name) + 1]
 
 
 def _time_column(names: list[str]) -> int:
@@ -121,13 +131,14 @@ def _parse_rows(names: list[str], rows: list[list[str]]) -> tuple[list[str], Flo
     at, shapes = _time_column(names), [column for column, name in enumerate(names) if name in ARKIT_NAMES]
     labels, values = list[str](), list[list[float]]()
     n_cut = n_empty = 0
+    lengths = _usual_lengths(rows, len(names))
     for row in rows:
         cells = row[: len(names)]
         # an empty line of a spreadsheet; a heading that is repeated
         if not any(cell.strip() for cell in row) or [_normal(cell) for cell in cells[:3]] == names[:3]:
             continue
         # a row of a time and a count alone has no face
-        if 2 < len(row) < len(names) or any(cell.strip() for cell in row[len(names) :]):
+        if len(row) > 2 and _filled_length(row, len(names)) not in lengths:
             n_cut += 1
             continue
         numbers = _parse_numbers(cells + [""] * (len(names) - len(cells)))
@@ -142,6 +153,21 @@ def _parse_rows(names: list[str], rows: list[list[str]]) -> tuple[list[str], Flo
     if n_empty:
         notes.append(f"rows without a face: {n_empty}")
     return labels, np.array(values).reshape(len(values), len(names)), notes
+
+
+def _filled_length(row: list[str], n_columns: int) -> int:
+    """Number of cells of a row, without empty ones beyond the columns."""
+    length = len(row)
+    while length > n_columns and not row[length - 1].strip():
+        length -= 1
+    return length
+
+
+def _usual_lengths(rows: list[list[str]], n_columns: int) -> set[int]:
+    """Numbers of cells that whole rows have: programs leave out empty cells at the end, or names of last columns."""
+    counts = Counter(_filled_length(row, n_columns) for row in rows)
+    least, most = max(2, USUAL_SHARE * len(rows)), (1 + MAX_UNNAMED_SHARE) * n_columns
+    return {n_columns, *(length for length, count in counts.items() if count >= least and length <= most)}
 
 
 def _parse_numbers(cells: list[str]) -> list[float]:
@@ -163,35 +189,46 @@ def _build_capture(
     heading: list[str], names: list[str], values: FloatArray, clock: CaptureTimes, notes: list[str]
 ) -> FaceCapture:
     """The capture at even times."""
-    values = np.where(np.isfinite(values), values, np.nan)
-    shapes = [column for column in _channel_columns(names) if np.isfinite(values[:, column]).any()]
-    turned = [names.index(name) for name in HEAD_COLUMNS if name in names]
-    has_head = len(turned) == len(HEAD_COLUMNS) and bool(np.isfinite(values[:, turned]).any(axis=0).all())
-    columns: IntArray = np.array([*shapes, *(turned if has_head else ())])
-    whole, n_cells = _fill_cells(values[:, columns], clock.times)
-    if n_cells:
+    shapes, head = _channel_columns(names), [names.index(name) for name in HEAD_COLUMNS if name in names]
+    head = head if len(head) == len(HEAD_COLUMNS) else []
+    written = np.where(np.isfinite(values), values, np.nan)
+    read = _read_cells(names, written, shapes, head, notes)
+    notes += describe_damage(written, read, [cell.strip() for cell in heading], clock.times)
+    has_value: Mask = np.asarray(np.isfinite(read).any(axis=0))
+    shapes = [column for column in shapes if has_value[column]]
+    columns: IntArray = np.array([*shapes, *(head if has_value[head].all() else ())])
+    whole = _fill_cells(read[:, columns], clock.times)
+    if n_cells := int(np.isnan(written[:, columns]).sum()):
         notes.append(f"cells without a number, which are interpolated: {n_cells}")
+    # a turn may leap from half a circle to minus half
+    whole[:, len(shapes) :] = np.unwrap(whole[:, len(shapes) :], axis=0)
     n_frames = int(np.floor(clock.times[-1] * clock.fps + 0.5)) + 1
     even = np.arange(n_frames) / clock.fps
-    read = interpolate_columns(*_relax_in_gaps(whole, clock, notes), even)
-    weights, head = read[:, : len(shapes)], np.zeros((n_frames, len(HEAD_CHANNELS)))
-    known = [names[column] in ARKIT_NAMES for column in shapes]
-    if np.abs(weights[:, known]).max() > LARGEST_WEIGHT:
-        weights = weights / 100.0
-        notes.append(f"its weights go beyond {LARGEST_WEIGHT:g}; they are taken for per cent")
-    if has_head:
-        turns = read[:, len(shapes) :]
-        if np.abs(turns).max() > LARGEST_TURN_RAD:
-            turns = np.radians(turns)
-            notes.append("its turns of the head go beyond a whole one in radians; they are taken for degrees")
+    moved = interpolate_columns(*_relax_in_gaps(whole, clock, notes), even)
+    pose = np.zeros((n_frames, len(HEAD_CHANNELS)))
+    if len(columns) > len(shapes):
+        turns = moved[:, len(shapes) :]
         # angles from the median: the telephone need not stand straight before the face
-        head[:, :3] = HEAD_SIGNS * (turns - np.median(turns, axis=0))
+        pose[:, :3] = HEAD_SIGNS * (turns - np.median(turns, axis=0))
     channels = tuple(_channel_name(heading[column], names[column]) for column in shapes)
     return FaceCapture(
-        Trajectory(channels, weights, clock.fps),
-        Trajectory(HEAD_CHANNELS, head, clock.fps),
+        Trajectory(channels, moved[:, : len(shapes)], clock.fps),
+        Trajectory(HEAD_CHANNELS, pose, clock.fps),
         (*clock.notes, *notes),
     )
+
+
+def _read_cells(
+    names: list[str], written: FloatArray, shapes: list[int], head: list[int], notes: list[str]
+) -> FloatArray:
+    """Cells (T, C) as weights and radians, NaN where one is damaged; of other columns as they are."""
+    has_value: Mask = np.asarray(np.isfinite(written).any(axis=0))
+    read = written.copy()
+    shapes = [column for column in shapes if has_value[column]]
+    read[:, shapes] = read_weights(read[:, shapes], np.array([names[at] in ARKIT_NAMES for at in shapes]), notes)
+    if head and has_value[head].all():
+        read[:, head] = read_turns(read[:, head], notes)
+    return read
 
 
 def _channel_columns(names: list[str]) -> list[int]:
@@ -208,13 +245,13 @@ def _channel_name(written: str, name: str) -> str:
     return ARKIT_NAMES.get(name, own[:1].lower() + own[1:])
 
 
-def _fill_cells(values: FloatArray, times: FloatArray) -> tuple[FloatArray, int]:
-    """Values (T, C) without NaN, by linear interpolation in each column, and how many were filled."""
+def _fill_cells(values: FloatArray, times: FloatArray) -> FloatArray:
+    """Values (T, C) without NaN, by linear interpolation in each column."""
     is_empty, whole = np.isnan(values), values.copy()
     for column in np.flatnonzero(is_empty.any(axis=0)):
         there = ~is_empty[:, column]
         whole[:, column] = np.interp(times, times[there], values[there, column])
-    return whole, int(is_empty.sum())
+    return whole
 
 
 def _relax_in_gaps(values: FloatArray, clock: CaptureTimes, notes: list[str]) -> tuple[FloatArray, FloatArray]:

@@ -1,5 +1,6 @@
 """Reader of weights of ARKit's shapes as this project and Audio2Face write them: .a2f.json and .curves.jsonl."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -12,6 +13,7 @@ from lexicon.values.checks import is_number
 from lexicon.values.files import read_text
 from lexicon.values.json_text import parse_json
 from tts2face.types import HEAD_CHANNELS, Trajectory
+from tts2face.video.capture_values import LARGEST_VALUE
 from tts2face.video.livelink import MAX_CAPTURE_FPS, FaceCapture
 
 MAX_BYTES = 1 << 28  # an hour of curves at 60 frames a second is 110 MB
@@ -74,13 +76,15 @@ def _capture(path: Path, fps: Any, names: Any, weights: Any, head: Sequence[Any]
         raise DataError(f"{path} has {fps} frames per second, not up to {MAX_CAPTURE_FPS:g}; export it again")
     if not isinstance(names, list) or not names or not all(isinstance(name, str) and name for name in names):
         raise DataError(f"{path} does not name its shapes; export it again")
+    channels = tuple(name[0].lower() + name[1:] for name in names)
+    if twice := [name for name, count in Counter(channels).items() if count > 1]:
+        raise DataError(f"{path} names the shape {twice[0]} twice; export it again")
     if not isinstance(weights, list) or not weights:
         raise DataError(f"{path} has no frame; export a longer clip")
     for number, row in enumerate(weights):
         _check_row(f"frame {number} of {path}", row, len(names))
     for number, row in enumerate(head):
         _check_row(f"the head in frame {number} of {path}", row, len(HEAD_CHANNELS))
-    channels = tuple(name[0].lower() + name[1:] for name in names)
     pose = np.array(head, np.float64) if head else np.zeros((len(weights), len(HEAD_CHANNELS)))
     return FaceCapture(
         Trajectory(channels, np.array(weights, np.float64), float(fps)), Trajectory(HEAD_CHANNELS, pose, float(fps))
@@ -90,3 +94,5 @@ def _capture(path: Path, fps: Any, names: Any, weights: Any, head: Sequence[Any]
 def _check_row(place: str, row: Any, length: int) -> None:
     if not isinstance(row, list) or len(row) != length or not all(map(is_number, row)):
         raise DataError(f"{place} does not have {length} numbers; export it again")
+    if beyond := [value for value in row if abs(value) > LARGEST_VALUE]:
+        raise DataError(f"{place} has a value of {beyond[0]:g}, which no face has; export it again")

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import DataError
-from lexicon.values.tables import read_table
+from lexicon.values.tables import parse_table, read_table
 
 
 def test_a_table_is_its_rows_without_empty_ones(tmp_path: Path) -> None:
@@ -27,3 +27,14 @@ def test_tables_that_are_refused(content: bytes, reason: str, tmp_path: Path) ->
     table.write_bytes(content)
     with pytest.raises(DataError, match=reason):
         read_table(table, 300_000)
+
+
+@pytest.mark.parametrize("above", ["", "a; b; c; d\n", "take\t3\tgood\n\n", '"x;y";z;\n'])
+def test_the_delimiter_is_that_of_the_heading(above: str) -> None:
+    found = parse_table(above + "time,value,unit\n1,2;5,s\n", ",;\t", lambda row: row[:2] == ["time", "value"])
+    assert found[-2:] == [["time", "value", "unit"], ["1", "2;5", "s"]]
+
+
+def test_without_a_heading_the_first_row_has_the_delimiter() -> None:
+    for is_heading in (None, lambda row: False):
+        assert parse_table("a;b;c,d\n1;2;3\n", ",;", is_heading) == [["a", "b", "c,d"], ["1", "2", "3"]]
