@@ -16,7 +16,6 @@ from tts2face.lips.articulation_tracks import articulation_tracks, pause_closure
 from tts2face.lips.mouth_limits import close_lips, largest_gaps, limit_speed
 from tts2face.lips.teeth_and_tongue import IncisorContact, Tongue, build_incisor_contact, build_tongue, incisor_edge
 from tts2face.models.face import Face
-from tts2face.models.face_schema import WIDE_OPEN
 from tts2face.models.landmarks import (
     MOUTH_CORNER_LEFT,
     MOUTH_CORNER_RIGHT,
@@ -196,7 +195,7 @@ def build_articulator(face: Face) -> Articulator:
     rest_width = float(np.linalg.norm(places[MOUTH_CORNER_LEFT] - places[MOUTH_CORNER_RIGHT]))
     edge = incisor_edge(face, places, rest_width)
     tables = {"round": ROUND_SHAPES, "flared": FLARED_SHAPES, "spread": SPREAD_SHAPES, "lowered": LOWERED_SHAPES}
-    tables["open"] = {WIDE_OPEN: 1.0}
+    tables["open"] = {face.opened_by: 1.0}
     if not {*ROUND_SHAPES, *FLARED_SHAPES} <= {*face.shape_names}:
         tables["flared"] = ROUND_SHAPES
     return Articulator(

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tts2face.face.lip_constraints import LipConstraints
-from tts2face.models.face import Face
-from tts2face.models.face_schema import WIDE_OPEN
+from tts2face.models.face import WIDE_OPEN, Face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, UPPER_LIP_INNER_MID
 from tts2face.numeric.arrays import FloatArray, ordered_product, smoothstep
 from tts2face.numeric.least_squares import bounded_least_squares
@@ -158,8 +157,8 @@ def upper_teeth(face: Face) -> FloatArray:
     parts = [part for part in face.parts if any(name in part.name.lower() for name in TEETH_NAMES)]
     used = [face.triangles[part.first : part.first + part.count].ravel() for part in parts]
     numbers = np.unique(np.concatenate([np.zeros(0, np.int32), *used]))
-    if WIDE_OPEN in face.shape_names and len(numbers):
-        jaw = np.linalg.norm(face.shapes[face.shape_names.index(WIDE_OPEN)], axis=1)
+    if face.opening is not None and len(numbers):
+        jaw = np.linalg.norm(face.shapes[face.opening], axis=1)
         numbers = numbers[jaw[numbers] < STILL_SHARE * jaw.max()]
     return np.asarray(face.vertices[numbers], np.float64)
 

@@ -22,6 +22,7 @@ SUM_WITHIN = 1e-3  # tolerance of the sum of barycentric weights; 32-bit roundin
 LIMITS = Tensor("float32", ("shapes", 2), -MAX_WEIGHT, MAX_WEIGHT, may_be_empty=True)
 BARYCENTRIC = Tensor("float32", ("landmarks", 3), -SUM_WITHIN, 1 + SUM_WITHIN, may_be_empty=True)
 VERTEX_COLOURS = -1  # `FacePart.texture` of a part without texture
+WIDE_OPEN = "jawOpen"  # opens the mouth of faces with ARKit's shapes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,7 +126,7 @@ class Face(StoredModel):
     tangents : (V, 3)
         Unit vectors along the strands, for the vertices of parts of kind strands; None without.
     occlusion : (P, V, D / 8)
-        Directions from which each vertex is hidden, as packed bits, at rest and with the jaw wide open
+        Directions from which each vertex is hidden, as packed bits, at rest and, of two poses, with `opened_by`
         (`tts2face.picture.occlusion`); None where it is not computed.
     landmarks, landmark_vertices, landmark_weights : (L,), (L, 3), (L, 3)
         Landmark `landmarks[i]` of `tts2face.models.landmarks` lies at the barycentric weights of three vertices.
@@ -137,6 +138,8 @@ class Face(StoredModel):
         Haircut and colour that suit the face, of those that fit it; None for a face that no haircut fits.
     scores
         What the face tracker reads in the mouth for weights of the shapes that speech moves; None if unknown.
+    opened_by
+        Shape that opens the mouth wide, by which its light changes; a name that is none of the shapes where none does.
     light
         Lamps, unless the face has light of its own: that which a path tracer has baked, or that of a photograph.
     """
@@ -160,12 +163,23 @@ class Face(StoredModel):
     hairdo: Hairdo | None = None
     occlusion: NDArray[np.uint8] | None = None
     scores: ScoreMap | None = None
+    opened_by: str = WIDE_OPEN
     light: Light = field(default_factory=Lamps)
 
     @property
     def synthetic_notice(self) -> str:
         """Comment for files that show the face; empty unless it is the likeness of a real person, or a photograph."""
         return self.light.notice(self.metadata.get("name", "a person"), is_of_person="consent" in self.metadata)
+
+    @property
+    def opening(self) -> int | None:
+        """Number of the shape `opened_by`; None for a face that has none."""
+        return self.shape_names.index(self.opened_by) if self.opened_by in self.shape_names else None
+
+    @property
+    def n_lit_poses(self) -> int:
+        """Poses with an occlusion of their own: that of the face where it is stored, shapes may be added later."""
+        return len(self.occlusion) if self.occlusion is not None else 1 + (self.opening is not None)
 
     def __post_init__(self) -> None:
         """Check that the arrays agree, then make them read-only."""
@@ -186,6 +200,10 @@ class Face(StoredModel):
         )
         if not fits:
             raise DataError("the face's vertices, shapes, colours and landmarks do not fit each other; build it again")
+        if self.n_lit_poses > 1 and self.opening is None:
+            raise DataError(
+                f"the face's occlusion is for the shape {self.opened_by!r}, which it lacks; leave that out, too"
+            )
         if self.triangles.size and not 0 <= int(self.triangles.min()) <= int(self.triangles.max()) < n_vertices:
             raise DataError(
                 f"a triangle of the face has a vertex index beyond its {n_vertices} vertices; build it again"

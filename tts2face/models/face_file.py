@@ -12,17 +12,19 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError, InputError
 from tts2face.models.baked_light import BakedLight
 from tts2face.models.codec import model_of, stored_arrays
-from tts2face.models.face import VERTEX_COLOURS, Eye, Face, FacePart, Hairdo, Texture
+from tts2face.models.face import VERTEX_COLOURS, WIDE_OPEN, Eye, Face, FacePart, Hairdo, Texture
 from tts2face.models.face_schema import (
     FOLLOW,
     LIGHT,
+    LIT_POSES,
     MAX_TEXTURES,
+    OPENED_BY,
     PHOTO_ALPHA,
     PHOTO_BEHIND,
     PHOTOGRAPH,
     SCORE_INPUTS,
-    WIDE_OPEN,
     check_face,
+    lit_poses,
     texture_number,
 )
 from tts2face.models.face_tint import tint_parts
@@ -104,6 +106,7 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
         "occlusion_bytes": 0 if face.occlusion is None else face.occlusion.shape[2],
         "metadata": dict(face.metadata),
     }
+    header |= _pose_fields(face)
     if face.scores is not None:
         arrays |= stored_arrays(face.scores, SCORES)
         header[SCORE_INPUTS] = list(face.scores.inputs)
@@ -148,6 +151,13 @@ def read_face(path: Path, identity: str | None = None, *, checks_pictures: bool 
     return face if identity is None else _apply_identity(face, arrays, header, names.index(identity))
 
 
+def _pose_fields(face: Face) -> dict[str, Any]:
+    """What the occlusion is for; nothing of ARKit's faces, whose files stay equal."""
+    own = {OPENED_BY: face.opened_by} if face.opening is not None and face.opened_by != WIDE_OPEN else {}
+    usual = lit_poses({"shape_names": face.shape_names, **own})
+    return {**own, LIT_POSES: face.n_lit_poses} if face.occlusion is not None and face.n_lit_poses != usual else own
+
+
 def _texture_arrays(face: Face) -> dict[str, NDArray[Any]]:
     arrays: dict[str, NDArray[Any]] = {}
     for number, texture in enumerate(face.textures):
@@ -189,8 +199,7 @@ def _read_occlusion(
 ) -> NDArray[np.uint8] | None:
     if "occlusion" not in arrays:
         return None
-    n_poses = 2 if WIDE_OPEN in header["shape_names"] else 1
-    shape = (n_poses, len(arrays["vertices"]), header.get("occlusion_bytes", 0))
+    shape = (lit_poses(header), len(arrays["vertices"]), header.get("occlusion_bytes", 0))
     return decode_occlusion(arrays["occlusion"], shape, path)
 
 
@@ -259,6 +268,7 @@ def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, A
         occlusion=_read_occlusion(arrays, header, path),
         metadata=header["metadata"],
         scores=score_map_of(contents, tuple(header.get(SCORE_INPUTS, ()))),
+        opened_by=header.get(OPENED_BY, WIDE_OPEN),
         light=_read_light(arrays, header, path),
     )
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lexicon.values.checks import Check, choice, flag, free, list_of, number, record, row, table, text, whole
 from tts2face.models.baked_light import LIP_RING
 from tts2face.models.codec import stored_tensors
-from tts2face.models.face import PART_KINDS, SUM_WITHIN, VERTEX_COLOURS, Face
+from tts2face.models.face import PART_KINDS, SUM_WITHIN, VERTEX_COLOURS, WIDE_OPEN, Face
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.mesh_coding import MAX_OCCLUSION_BYTES
 from tts2face.models.score_map import check_score_map
@@ -31,7 +31,7 @@ MIN_EXTENT_MM = 1.0  # least width and height of a face
 # Triangles' area over that of the box around them: 0.5 of a head; shuffled vertices have 200, and take minutes to draw.
 MOST_AREA = 10.0
 MEASURED = 4000  # triangles, spread over all, of which the area is measured: all of a head would take 10 ms
-WIDE_OPEN = "jawOpen"  # the shape with which a face is drawn besides at rest before its first picture
+OPENED_BY, LIT_POSES = "opened_by", "occlusion_poses"  # keys: the shape that opens the mouth; rest, and rest and open
 
 _INDEX, _POINT = whole(0, 2**31 - 1), list_of(number(-MAX_MM, MAX_MM), 3)
 _PART = record(
@@ -88,6 +88,7 @@ def check_face(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[s
     table(row(text, text))(header.get("hairdos", {}), ModelPlace(f"{path}: metadata: hairdos"))
     whole(0, MAX_OCCLUSION_BYTES)(header.get("occlusion_bytes", 0), ModelPlace(f"{path}: metadata: occlusion_bytes"))
     contents.tensors(TENSORS)
+    _check_poses(contents)
     presets = range(len(header["identities"]))
     contents.tensors({f"identity{n}": Tensor("int16", ("vertices", 3)) for n in presets})
     contents.tensors({f"identity{n}_step": Tensor("float32", (1,), 0.0, MAX_STEP_MM) for n in presets})
@@ -112,6 +113,24 @@ def check_face(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[s
     _check_shapes(contents)
     _check_parts(contents, n_vertices)
     _check_area(contents)
+
+
+def _check_poses(contents: Contents) -> None:
+    header, place = contents.header, f"{contents.path}: metadata: "
+    text(header.get(OPENED_BY, ""), ModelPlace(place + OPENED_BY))
+    whole(1, 2)(header.get(LIT_POSES, 1), ModelPlace(place + LIT_POSES))
+    opening = header.get(OPENED_BY, WIDE_OPEN)
+    # without the key the opening shape is ARKit's, of faces that have it
+    needed = OPENED_BY in header or header.get(LIT_POSES, 1) > 1
+    contents.require(
+        not needed or opening in header["shape_names"],
+        f"states its occlusion for the shape {opening[:60]!r}, which is not one of its shapes",
+    )
+
+
+def lit_poses(header: Mapping[str, Any]) -> int:
+    """Number of the poses of a file's occlusion: 1 at rest, 2 with an open mouth, too."""
+    return int(header.get(LIT_POSES, 1 + (header.get(OPENED_BY, WIDE_OPEN) in header["shape_names"])))
 
 
 def _check_textures(contents: Contents) -> None:
@@ -201,16 +220,17 @@ def _check_parts(contents: Contents, n_vertices: int) -> None:
 
 
 def _check_area(contents: Contents) -> None:
-    """Refuse a face whose triangles, at rest or with its jaw wide open, lie crosswise through each other."""
+    """Refuse a face whose triangles, at rest or with its mouth wide open, lie crosswise through each other."""
     arrays, names = contents.arrays, contents.header["shape_names"]
     poses = {"at rest": arrays["vertices"]}
-    if WIDE_OPEN in names:
-        number_ = names.index(WIDE_OPEN)
+    opening = contents.header.get(OPENED_BY, WIDE_OPEN)
+    if opening in names:
+        number_ = names.index(opening)
         first = int(arrays["shape_counts"][:number_].sum(dtype=np.int64))
         moved = slice(first, first + int(arrays["shape_counts"][number_]))
         opened = arrays["vertices"].copy()
         opened[arrays["shape_vertices"][moved]] += arrays["shape_deltas"][moved] * arrays["shape_steps"][number_]
-        poses[f"with {WIDE_OPEN}"] = opened
+        poses[f"with {opening}"] = opened
     size = np.ptp(arrays["vertices"], axis=0).astype(np.float64)
     box = 2.0 * float(size @ np.roll(size, 1))
     every = len(arrays["triangles"]) // MEASURED + 1

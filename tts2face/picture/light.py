@@ -45,7 +45,6 @@ class Exposure:
 def compute_exposure(face: Face, surface: Surface, lamps: NDArray[np.float64], threads: int) -> Exposure:
     """Exposure of a face to the sky and to lamps in the world directions `lamps` (L, 3)."""
     hidden = occlusion_of(face, surface, threads)
-    jaw = face.shape_names.index("jawOpen") if "jawOpen" in face.shape_names else -1
     exposures = [
         _pose_exposure(surface, pose_normals(surface, pose), bits, lamps)
         for pose, bits in zip(occlusion_poses(face), hidden, strict=True)
@@ -55,26 +54,26 @@ def compute_exposure(face: Face, surface: Surface, lamps: NDArray[np.float64], t
             teeth = np.unique(face.triangles[part.first : part.first + part.count])
             lit = HIDDEN_TOOTH_LIGHT * np.percentile(exposures[-1][teeth], 90, axis=0)
             exposures[-1][teeth] = np.maximum(exposures[-1][teeth], lit)
-    return Exposure(exposures[0], exposures[-1] - exposures[0], lip_opening(face, jaw))
+    return Exposure(exposures[0], exposures[-1] - exposures[0], lip_opening(face))
 
 
-def lip_opening(face: Face, jaw: int) -> NDArray[np.float32]:
-    """Lip opening (K,) of each shape at its middle, relative to that of the wide open jaw.
+def lip_opening(face: Face) -> NDArray[np.float32]:
+    """Lip opening (K,) of each shape at its middle, relative to that of the wide open mouth.
 
-    `jaw` is the index of jawOpen, -1 without it. On a face without lip landmarks only the jaw opens the lips.
+    On a face without lip landmarks only the shape `Face.opened_by` opens the lips.
     """
-    opening = np.zeros(len(face.shape_names), np.float32)
-    if jaw >= 0:
-        opening[jaw] = 1 / OPEN_JAW_WEIGHT
+    opening, widest = np.zeros(len(face.shape_names), np.float32), face.opening
+    if widest is not None:
+        opening[widest] = 1 / OPEN_JAW_WEIGHT
     rows = {int(number): row for row, number in enumerate(face.landmarks)}
-    if jaw < 0 or not {UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID} <= rows.keys():
+    if widest is None or not {UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID} <= rows.keys():
         return opening
     upper, lower = (
         np.einsum("kv,v->k", face.shapes[:, face.landmark_vertices[rows[lip]], 1], face.landmark_weights[rows[lip]])
         for lip in (UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID)
     )
     parted = upper - lower
-    return (parted / (OPEN_JAW_WEIGHT * parted[jaw])).astype(np.float32) if parted[jaw] > 0 else opening
+    return (parted / (OPEN_JAW_WEIGHT * parted[widest])).astype(np.float32) if parted[widest] > 0 else opening
 
 
 def lamp_weights(directions: NDArray[np.float64], lamps: NDArray[np.float64]) -> NDArray[np.float32]:

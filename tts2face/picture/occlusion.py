@@ -28,7 +28,7 @@ N_DIRECTIONS = 128  # docs/decisions/112-occlusion.md: more change the light by 
 VIEW_SAMPLES = 192  # samples along a side of the views: 1.5 mm each on a head
 LIFT_MM, SLACK_MM = 1.2, 1.2  # offset of a vertex along its normal, and depth tolerance of occlusion
 VIEW_DISTANCE_MM = 20_000.0  # distance of the cameras: almost parallel light
-OPEN_JAW_WEIGHT = 0.6  # jawOpen weight of the wide open mouth
+OPEN_JAW_WEIGHT = 0.6  # of the shape that opens the mouth wide
 MIN_CACHED_VERTICES = 5000  # smaller faces are traced as fast as a file is read
 CACHE_KIND, CACHE_VERSION = "occlusion", 1
 
@@ -57,7 +57,7 @@ def occlusion_of(face: Face, surface: Surface, threads: int) -> Bits:
         return face.occlusion
     if len(face.vertices) < MIN_CACHED_VERTICES:
         return _trace(face, surface, threads, N_DIRECTIONS)
-    shape = (len(occlusion_poses(face)), len(face.vertices))
+    shape = (face.n_lit_poses, len(face.vertices))
     return computed_once(
         CACHE_KIND,
         CACHE_VERSION,
@@ -68,19 +68,18 @@ def occlusion_of(face: Face, surface: Surface, threads: int) -> Bits:
 
 
 def _geometry(face: Face) -> list[NDArray[Any] | str]:
-    """Vertices, triangles, jaw of a face, and what of its parts is drawn."""
-    jaw = [face.shapes[face.shape_names.index("jawOpen")]] if "jawOpen" in face.shape_names else []
+    """Vertices, triangles, opening shape of a face, and what of its parts is drawn."""
+    jaw = [] if face.opening is None else [face.shapes[face.opening]]
     parts = repr([(part.count, part.opacity, part.cutout, part.kind) for part in face.parts])
     alphas = ["" if texture.alpha is None else texture.alpha for texture in face.textures]
     return [face.vertices, face.triangles, occlusion_poses(face), *jaw, parts, *alphas]
 
 
 def occlusion_poses(face: Face) -> NDArray[np.float32]:
-    """Shape weights (P, K) of the poses with an occlusion of their own: at rest, and with the jaw wide open."""
-    jaw = face.shape_names.index("jawOpen") if "jawOpen" in face.shape_names else -1
-    poses = np.zeros((1 if jaw < 0 else 2, len(face.shape_names)), np.float32)
-    if jaw >= 0:
-        poses[1, jaw] = OPEN_JAW_WEIGHT
+    """Shape weights (P, K) of the poses with an occlusion of their own: at rest, and with the mouth wide open."""
+    poses = np.zeros((face.n_lit_poses, len(face.shape_names)), np.float32)
+    if face.opening is not None:
+        poses[1:, face.opening] = OPEN_JAW_WEIGHT
     return poses
 
 

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 import tts2face
+from lexicon.errors import InputError
 from tests.interchange.exports.made import arkit_clip, made_clip, made_stream, turned_clip
 from tests.packages import package
 from tests.picture.tiny_face import tiny_face
 from tts2face.face.shape_transfer import append_shapes
-from tts2face.interchange.exports.arkit import ARKIT_SHAPES, build_arkit_projection
+from tts2face.interchange.exports.arkit import ARKIT_SHAPES, arkit_projection, build_arkit_projection
 from tts2face.interchange.exports.livelink import eye_angles, timecode
 from tts2face.interchange.exports.parts import Target
 from tts2face.models.face_loading import load_face
@@ -186,13 +187,47 @@ def test_clips_of_a_face_share_the_inner_products_of_its_shapes():
     face = _face_with_gestures()
     target = Target(None, "a.csv", Fraction(30), Fraction(30), 16_000, face.shape_names, face)
     first, second = build_arkit_projection(target), build_arkit_projection(target)
-    assert first.curvature is second.curvature
-    assert first.cross is second.cross
+    assert first.parts[0].curvature is second.parts[0].curvature
+    assert first.parts[0].cross is second.parts[0].cross
     renamed = replace(target, channels=(*face.shape_names[:-1], "brows1"))
-    assert build_arkit_projection(renamed).cross is not first.cross
+    assert build_arkit_projection(renamed).parts[0].cross is not first.parts[0].cross
 
 
 def test_a_stream_of_captures_is_continuous(tmp_path):
     tts2face.export(made_stream(3, 20, 30.0, ARKIT_SHAPES), tmp_path / "a.csv")
     read = read_livelink(tmp_path / "a.csv").weights
     assert len(read) == 120
+
+
+VISEMES = {"jawOpen": "mouthViseme_aa", "mouthFunnel": "mouthViseme_oh", "mouthPucker": "mouthViseme_ou"}
+
+
+@pytest.mark.parametrize("keeps_others", [True, False])
+def test_visemes_are_expressed_by_jaw_and_lips(keeps_others):
+    head = load_face("head")
+    rows = [at for at, name in enumerate(head.shape_names) if name in VISEMES or (keeps_others and "mouth" not in name)]
+    names = tuple(VISEMES.get(head.shape_names[at], head.shape_names[at]) for at in rows)
+    face = replace(
+        head,
+        shape_names=names,
+        shapes=head.shapes[rows],
+        limits=head.limits[rows],
+        eyes=(),
+        scores=None,
+        occlusion=None,
+    )
+    motion = np.zeros((6, len(names)), np.float32)
+    for shape, viseme in enumerate(VISEMES.values()):
+        motion[2 * shape : 2 * shape + 2, names.index(viseme)] = (0.2, 0.4)
+    weights = arkit_projection(names, face, "a.csv").weights(motion)
+    for shape, own in enumerate(VISEMES):
+        found = weights[2 * shape : 2 * shape + 2, ARKIT_SHAPES.index(own)]
+        assert found == pytest.approx([0.2, 0.4], abs=0.12)
+        others = np.delete(weights[2 * shape + 1], ARKIT_SHAPES.index(own))
+        assert others.max() < 0.17
+    assert weights[:2, ARKIT_SHAPES.index("jawOpen")] == pytest.approx([0.2, 0.4], abs=0.03)
+
+
+def test_visemes_without_the_face_are_refused():
+    with pytest.raises(InputError, match="has none of them"):
+        arkit_projection(("mouthViseme_aa",), None, "a.csv")

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.interchange.characters.shape_names import VISEME_PREFIX
 from tts2face.interchange.characters.surface_points import SurfacePoints, points_under_pixels
 from tts2face.models.face import Face, keep_parts
 from tts2face.models.landmarks import (
@@ -31,7 +30,6 @@ LEAST_VIEWS = 3  # reliable readings of a landmark; with fewer all are used
 SIDE_PX = 640
 BACKGROUND = "#8a8f98"
 OPENINGS = (0.5, 0.8)  # weights of the opening shape at which the inner lips are read
-OPENING_SHAPES = ("jawOpen", f"{VISEME_PREFIX}aa", f"{VISEME_PREFIX}oh")
 SKIN, EYES = "skin", "eyes"  # beginnings of the names of parts on which landmarks lie
 BEHIND_LIPS = ("teeth", "tongue")  # not in the views: the tracker reads the upper teeth as a part of the lip
 
@@ -159,11 +157,10 @@ def _joined(points: SurfacePoints, other: SurfacePoints) -> SurfacePoints:
 
 def _opened_weights(face: Face) -> list[NDArray[np.float32]]:
     """Shape weights (K,) of each opening of the mouth; empty for a face that cannot open it."""
-    name = next((name for name in OPENING_SHAPES if name in face.shape_names), None)
-    if name is None:
+    if face.opening is None:
         return []
     poses = np.zeros((len(OPENINGS), len(face.shape_names)), np.float32)
-    poses[:, face.shape_names.index(name)] = OPENINGS
+    poses[:, face.opening] = OPENINGS
     return list(poses)
 
 

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from tts2face.face.deformation import build_rig
 from tts2face.face.eyelids import BLINK_SHAPES
 from tts2face.face.landmarks import scatter_landmarks
-from tts2face.interchange.characters.shape_names import VISEME_PREFIX
 from tts2face.models.face import Face
 from tts2face.models.landmarks import (
     FACE_OVAL,
@@ -40,7 +39,6 @@ CELL_PX = 192
 LABEL_PX = 16
 N_COLUMNS = 8
 OPEN_WEIGHT = 0.5  # of the opening shape in the second picture of the preview
-SHOWN_OPENING_SHAPES = ("jawOpen", f"{VISEME_PREFIX}aa")
 WALL = "#8a8f98"
 PAPER, INK = (245, 245, 243), (20, 20, 20)
 
@@ -51,9 +49,8 @@ def draw_preview(face: Face) -> Pixels:
     That of a photograph is shown with shut eyes in place of the last.
     """
     opened = np.zeros(len(face.shape_names), np.float32)
-    opening = next((name for name in SHOWN_OPENING_SHAPES if name in face.shape_names), None)
-    if opening is not None:
-        opened[face.shape_names.index(opening)] = OPEN_WEIGHT
+    if face.opening is not None:
+        opened[face.opening] = OPEN_WEIGHT
     rest = np.zeros_like(opened)
     views = ((rest, "front"), (opened, "front"), (rest, "three-quarter"))
     if isinstance(face.light, Photographed):

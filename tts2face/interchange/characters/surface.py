@@ -12,9 +12,11 @@ from tts2face.interchange.characters.atlas import CUTOUT, Atlas, build_atlas, sr
 from tts2face.interchange.characters.character import OPAQUE, Character, Material
 from tts2face.interchange.characters.eyeballs import eyeball_centres, fit_sphere, gaze_turns
 from tts2face.interchange.characters.head_mesh import LEFT_EYE, RIGHT_EYE, HeadMesh
-from tts2face.models.face import VERTEX_COLOURS, Eye, Face, FacePart, Texture
+from tts2face.interchange.characters.shape_names import VISEME_PREFIX
+from tts2face.models.face import VERTEX_COLOURS, WIDE_OPEN, Eye, Face, FacePart, Texture
 from tts2face.numeric.arrays import FloatArray
 
+OPENING_SHAPES = (WIDE_OPEN, *(VISEME_PREFIX + vowel for vowel in ("aa", "oh", "ee", "ih", "ou")))
 # Highlights and softness of materials by kind, as on the default head: specular, shininess, wrap.
 SHADING = {
     "eyes": (0.55, 140.0, 0.0),
@@ -125,6 +127,7 @@ def build_face(head: HeadMesh, character: Character, placement: Placement) -> Fa
         landmark_vertices=np.zeros((0, 3), np.int32),
         landmark_weights=np.zeros((0, 3), np.float32),
         pivot=np.zeros(3, np.float32),
+        opened_by=next((name for name in OPENING_SHAPES if name in names), WIDE_OPEN),
     )
 
 

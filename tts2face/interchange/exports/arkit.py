@@ -7,9 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
+from tts2face.face.landmarks import landmark_motion, scatter_landmarks
+from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES
+from tts2face.face.mouth import mouth_curvature
+from tts2face.face.shape_transfer import add_missing_shapes
 from tts2face.interchange.exports.parts import Target
 from tts2face.models.face import Face
-from tts2face.numeric.arrays import Float32Array
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, MOUTH_REGION
+from tts2face.numeric.arrays import Float32Array, FloatArray, ordered_product
 from tts2face.numeric.least_squares import bounded_least_squares
 
 # ARFaceAnchor.BlendShapeLocation, in the order of the columns of Live Link Face.
@@ -27,9 +32,32 @@ ARKIT_SHAPES = (
 # Shapes that express other channels, which are gestures of brows and cheeks; lips, jaw, lids and gaze keep their own.
 HELPER_PREFIXES = ("brow", "cheek", "noseSneer", "eyeSquint", "eyeWide")
 RIDGE = 1e-3  # of the mean curvature: prefers small changes where several shapes do the same
+# Not what visemes do: they would make up for differences between the shapes of two faces.
+NO_VISEME = ("jawForward", "jawLeft", "jawRight", "mouthLeft", "mouthRight")
+SPREAD = 0.02  # ridge of the mouth, over the median curvature: jaw and pucker alone, not ten small shapes together
+LIP_GAP_WEIGHT = 3.0  # of a lip gap, relative to a landmark of the cheek; 300 fits gaps beside the middle by any shape
 # By face and channels: they take a tenth of a second, and every clip of lines needs them.
-_PRODUCTS: WeakKeyDictionary[Face, dict[tuple[str, ...], tuple[NDArray[np.float64], NDArray[np.float64]]]]
-_PRODUCTS = WeakKeyDictionary()
+_PARTS: "WeakKeyDictionary[Face, dict[tuple[str, ...], tuple[Expressed, ...]]]" = WeakKeyDictionary()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Expressed:
+    """Channels of a face that ARKit shapes express.
+
+    Parameters
+    ----------
+    others : (M,)
+        Channels that are not ARKit shapes.
+    helpers : (H,)
+        ARKit shapes (of the 52) that express them.
+    curvature, cross : (H, H), (H, M)
+        Inner products of the helpers with themselves, ridge included, and with the other shapes.
+    """
+
+    others: NDArray[np.int64]
+    helpers: NDArray[np.int64]
+    curvature: FloatArray
+    cross: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,20 +67,13 @@ class ArkitProjection:
     Parameters
     ----------
     columns : (52,)
-        Index of each ARKit shape among the channels; -1 for a shape that the face lacks, whose weight is 0.
-    others : (M,)
-        Channels that are not ARKit shapes.
-    helpers : (H,)
-        ARKit shapes (of the 52) that express the other channels.
-    curvature, cross : (H, H), (H, M)
-        Inner products of the helpers with themselves, ridge included, and with the other shapes.
+        Index of each ARKit shape among the channels; -1 for a shape that the face lacks.
+    parts
+        Other channels: gestures of brows and cheeks by their vertices, visemes by the landmarks of the mouth.
     """
 
     columns: NDArray[np.int64]
-    others: NDArray[np.int64]
-    helpers: NDArray[np.int64]
-    curvature: NDArray[np.float64]
-    cross: NDArray[np.float64]
+    parts: tuple[Expressed, ...] = ()
 
     def weights(self, motion: Float32Array) -> Float32Array:
         """Weights (T, 52) in [0, 1] from motion (T, K).
@@ -64,13 +85,15 @@ class ArkitProjection:
         problem for each frame.
         """
         known = np.where(self.columns >= 0, motion[:, self.columns], 0.0).astype(np.float64).clip(0.0, 1.0)
-        if len(self.helpers) and len(motion):
-            extra = motion[:, self.others].astype(np.float64)
+        for part in self.parts:
+            extra = motion[:, part.others].astype(np.float64)
             moved = np.flatnonzero(extra.any(axis=1))
-            start = known[np.ix_(moved, self.helpers)]
-            linear = start @ self.curvature + extra[moved] @ self.cross.T
-            limits = np.tile([0.0, 1.0], (len(self.helpers), 1))
-            known[np.ix_(moved, self.helpers)] = bounded_least_squares(self.curvature, linear, limits)
+            if not len(moved):
+                continue
+            start = known[np.ix_(moved, part.helpers)]
+            linear = start @ part.curvature + extra[moved] @ part.cross.T
+            limits = np.tile([0.0, 1.0], (len(part.helpers), 1))
+            known[np.ix_(moved, part.helpers)] = bounded_least_squares(part.curvature, linear, limits)
         return known.astype(np.float32)
 
 
@@ -94,35 +117,53 @@ def arkit_projection(channels: tuple[str, ...], face: Face | None, name: str) ->
     """
     columns = np.array([channels.index(name) if name in channels else -1 for name in ARKIT_SHAPES])
     others = np.array([at for at, name in enumerate(channels) if name not in ARKIT_SHAPES], np.int64)
-    if (columns < 0).all():
+    spoken = np.array([channels[at].startswith(SPEECH_SHAPE_PREFIXES) for at in others], bool)
+    if (columns < 0).all() and (face is None or not spoken.any()):
         raise InputError(
             f"{name} holds ARKit shapes, and the clip has none of them (its channels are "
             f"{', '.join(channels[:3])}, ...); choose a face with ARKit shapes, such as head or ada"
         )
-    none = np.zeros((0, 0))
     if not len(others):
-        return ArkitProjection(columns, others, np.zeros(0, np.int64), none, none)
+        return ArkitProjection(columns)
     if face is None:
         raise InputError(
             f"{len(others)} channels of the clip ({', '.join(channels[at] for at in others[:3])}, ...) are not ARKit "
             f"shapes; to express them in {name}, give the clip's face, as in face=session.face"
         )
+    # the products of a face's shapes are the same for each clip of it
+    known = _PARTS.setdefault(face, {})
+    if channels not in known:
+        made = (_by_vertices(face, columns, others[~spoken]), _by_mouth(face, channels, others[spoken]))
+        known[channels] = tuple(part for part in made if part is not None)
+    return ArkitProjection(columns, known[channels])
+
+
+def _by_vertices(face: Face, columns: NDArray[np.int64], others: NDArray[np.int64]) -> Expressed | None:
+    """Gestures by the vertices of the face's own helpers; None without any."""
     helpers = np.array([
         at for at, name in enumerate(ARKIT_SHAPES) if columns[at] >= 0 and name.startswith(HELPER_PREFIXES)
-    ])  # fmt: skip
-    if not len(helpers):
-        return ArkitProjection(columns, others, helpers, none, none)
-    # the products of a face's shapes are the same for each clip of it
-    products = _PRODUCTS.setdefault(face, {})
-    if channels not in products:
-        products[channels] = _inner_products(face, columns[helpers], others)
-    return ArkitProjection(columns, others, helpers, *products[channels])
-
-
-def _inner_products(
-    face: Face, helpers: NDArray[np.int64], others: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    own = face.shapes[helpers].reshape(len(helpers), -1).astype(np.float64)  # the sums of single precision differ
-    curvature = own @ own.T  # with the number of threads
+    ], np.int64)  # fmt: skip
+    if not len(helpers) or not len(others):
+        return None
+    own = face.shapes[columns[helpers]].reshape(len(helpers), -1).astype(np.float64)
+    # the sums of single precision differ with the number of threads
+    curvature = own @ own.T
     curvature += RIDGE * float(np.trace(curvature)) / len(curvature) * np.eye(len(curvature))
-    return curvature, own @ face.shapes[others].reshape(len(others), -1).astype(np.float64).T
+    cross = own @ face.shapes[others].reshape(len(others), -1).astype(np.float64).T
+    return Expressed(others, helpers, curvature, cross)
+
+
+def _by_mouth(face: Face, channels: tuple[str, ...], others: NDArray[np.int64]) -> Expressed | None:
+    """Visemes by the visible motion of the mouth; jaw and lips that the face lacks move as on the default head."""
+    if not len(others):
+        return None
+    names = [name for name in ARKIT_SHAPES if name.startswith(SPEECH_SHAPE_PREFIXES) and name not in NO_VISEME]
+    complete = add_missing_shapes(face, names)
+    rows = np.array([complete.shape_names.index(name) for name in (*names, *(channels[at] for at in others))])
+    motion = scatter_landmarks(complete, landmark_motion(complete, rows))
+    common = [landmark for landmark in MOUTH_REGION if np.isfinite(motion[landmark]).all()]
+    opened = motion[list(INNER_LIP_UPPER), 1] - motion[list(INNER_LIP_LOWER), 1]
+    products = mouth_curvature(motion[common], common) + LIP_GAP_WEIGHT * ordered_product(opened.T, opened)
+    helpers, curvature = np.array([ARKIT_SHAPES.index(name) for name in names]), products[: len(names), : len(names)]
+    curvature += SPREAD * float(np.median(np.diag(curvature))) * np.eye(len(names))
+    return Expressed(others, helpers, curvature, products[: len(names), len(names) :])

@@ -217,8 +217,7 @@ def _webp(texture: Texture) -> bytes:
 
 def _stage(face: Face, surface: Surface, skeleton: Skeleton, channels: tuple[str, ...]) -> Mapping[str, Any]:
     """Values that the preview takes from the renderer: lamps, cameras, joints; lengths in metres."""
-    jaw = face.shape_names.index("jawOpen") if "jawOpen" in face.shape_names else -1
-    opening = lip_opening(face, jaw)[: len(channels)]
+    opening = lip_opening(face)[: len(channels)]
     eyes = [
         {
             "centre": (skeleton.places[HEAD + 1 + number] / MM_PER_M).tolist(),
