@@ -97,7 +97,7 @@ ASS: dict[str, tuple[str, list[tuple[float, float, str]], list[int]]] = {
                             [(1.0, 2.0, "Hi, you, there."), BYE], []),
     "comments": (HEAD + FORM + DA + DA.replace("Dialogue", "Comment").replace("Hi", "No") + DB, BOTH, []),
     "drawings": (HEAD + FORM + DA + DB + DB.replace("Bye.", "{\\p1}m 0 0 l 1 1{\\p0}").replace("3.00", "4.00"),
-                 [(1.0, 2.0, "Hi."), BYE, (4.0, 4.5, "")], [11]),
+                 [(1.0, 2.0, "Hi."), BYE, (4.0, 4.5, "")], []),
     "overrides and line breaks": (HEAD + FORM + DA.replace("Hi.", "{\\i1}Hi,\\Nyou\\hall.{\\i0}") + DB,
                                   [(1.0, 2.0, "Hi, you all."), BYE], []),
     "karaoke": (HEAD + FORM + DA.replace("Hi.", "{\\k20}H{\\k30}i.") + DB, BOTH, []),

@@ -3,7 +3,7 @@
 import pytest
 
 from lexicon.errors import DataError
-from tests.interchange.subtitles.conftest import ReadText, srt
+from tests.interchange.subtitles.conftest import ReadText, ass, srt
 
 TT = '<tt xmlns="http://www.w3.org/ns/ttml"><body><div>{}</div></body></tt>'
 
@@ -144,3 +144,22 @@ def test_hours_of_a_tape_are_taken_off_where_the_film_is_known(read: ReadText) -
     content = srt((3601, 3602, "one"), (3603, 3604, "two"))
     assert times(read, content, film_s=10.0) == [(1, 2), (3, 4)]
     assert times(read, content, shift=-3600.0) == [(1, 2), (3, 4)]
+
+
+def test_what_nobody_says_overlaps_nothing(read: ReadText) -> None:
+    content = ass(
+        (1, 5, "Sign", "Exit"),
+        (1.5, 3, "Default", "Hello."),
+        (2.5, 6, "Sign", "Open"),
+        (4, 7, "Default", "So it is."),
+        (0.5, 0.5, "Sign", "Shut"),
+        (6.5, 8, "Default", "[a bell]"),
+    )
+    assert not read(content, ".ass").warnings
+    found = read(content, ".ass", keep=("signs",))
+    assert sum("overlaps" in warning.message for warning in found.warnings) == 3
+
+
+def test_an_estimated_end_is_not_limited_by_a_sign(read: ReadText) -> None:
+    content = ass((1, 1, "Default", "Hello there, you."), (1.2, 5, "Sign", "Exit"), (9, 10, "Default", "Bye."))
+    assert read(content, ".ass").cues[0].end_s == pytest.approx(2.13, abs=0.01)

@@ -93,6 +93,12 @@ def test_sentences_that_are_said_again_are_spoken(texts: list[str], read: ReadTe
         "Call (555) 123-4567.",
         "array[0] is it",
         "if (a<b && c>d) go",
+        "(s)he came",
+        "print(args) it",
+        "Lehrer(innen) und né(e)",
+        "I am sad :( really",
+        "the set {a: 1}",
+        "a {c: 2} b",
     ],
 )
 def test_signs_of_numbers_and_brackets_in_words_stay(text: str, read: ReadText) -> None:
@@ -118,6 +124,16 @@ def test_a_number_of_a_dialogue_is_said_by_another_speaker(read: ReadText) -> No
         ("♪ soft music\n- Did you hear that?", "Did you hear that?"),
         ("♪ la la\nlu lu ♪", ""),
         ("Unclosed [laughs\nHello.", "Unclosed Hello."),
+        ("Unclosed (laughs\nHello.", "Unclosed Hello."),
+        ("[door\nHello [laughs] there.", "Hello there."),
+        ("(door slams\nHello (laughs) there.", "Hello there."),
+        ("（笑\n你好", "你好"),
+        ("slams] Hello.", "Hello."),
+        ("[door [loud] slams] Hello.", "Hello."),
+        ("(laughs (softly)) Hello.", "Hello."),
+        ("Hello(laughs)", "Hello"),
+        ("Sure[sighing]so", "Sure so"),
+        ("Hi(door slams)there", "Hi there"),
         (">>> REPORTER: HELLO.", "HELLO."),
         ("It&rsquo;s a caf&eacute;&hellip;", "It’s a café…"),
     ],
@@ -153,3 +169,74 @@ def test_hours_of_time_code_without_drops_are_longer(attributes: str, begin: flo
         "</div></body></tt>"
     )
     assert read(content, ".itt").cues[1].begin_s == pytest.approx(begin, abs=0.01)
+
+
+def test_manners_within_labels_are_counted_and_kept(read: ReadText) -> None:
+    content = srt((1, 2, "ANNA (off): Hello."), (3, 4, "MAN (2): Bye."), (5, 6, "[loud] Go. (sighs)"))
+    found = read(content)
+    assert [(cue.speaker, cue.text) for cue in found.cues] == [("ANNA", "Hello."), ("MAN", "Bye."), ("", "Go.")]
+    assert found.notes[0].message.startswith("3 annotations, such as '(off)'")
+    assert [cue.text for cue in read(content, keep=("annotations",)).cues] == ["off Hello.", "Bye.", "loud Go. sighs"]
+
+
+BESIDE = {
+    "words": ("Hello there.", "Hello there. So.", "'Hello there.' stands beside the times; it is read"),
+    "words after settings": ("align:start line: 0 Hello", "Hello So.", "'Hello' stands beside the times; it is read"),
+    "a name": ("ANNA: Hello", "Hello So.", "'ANNA: Hello' stands beside the times; it is read"),
+    "a tag": ("<i>Hello</i>", "Hello So.", "'<i>Hello</i>' stands beside the times; it is read"),
+    "settings": ("align:start position:10%,line-left line:0 size:50% vertical:rl region:fred", "So.", ""),
+    "settings of a draft": ("A:middle L:90% T:50%", "So.", ""),
+    "corners": ("X1:100 X2:200 Y1:1 Y2:-2", "So.", ""),
+    "an unknown setting": ("snap:no", "So.", "'snap:no' stands beside the times; it is taken for a setting"),
+}
+
+
+@pytest.mark.parametrize("suffix", [".srt", ".vtt"])
+@pytest.mark.parametrize(("beside", "words", "message"), BESIDE.values(), ids=BESIDE)
+def test_words_beside_the_times_are_read_and_said(
+    suffix: str, beside: str, words: str, message: str, read: ReadText
+) -> None:
+    head = "WEBVTT\n\n" if suffix == ".vtt" else ""
+    found = read(f"{head}00:00:01.000 --> 00:00:02.000 {beside}\nSo.\n\n00:00:03.000 --> 00:00:04.000\nNo.\n", suffix)
+    assert [cue.text for cue in found.cues] == [words, "No."]
+    assert [warning.message for warning in found.warnings] == [message] * bool(message)
+
+
+@pytest.mark.parametrize("number", ["{}", "{})", "#{}", "{}."])
+def test_numbers_may_stand_before_the_times(number: str, read: ReadText) -> None:
+    lines = (f"00:00:0{at},000 --> 00:00:0{at + 1},000\nGo." for at in (1, 3))
+    content = "\n\n".join(f"{number.format(count)} {line}" for count, line in enumerate(lines, start=1))
+    found = read(content)
+    assert [(cue.begin_s, cue.text) for cue in found.cues] == [(1, "Go."), (3, "Go.")]
+    assert not found.warnings
+
+
+def test_words_beside_two_instants_are_read(read: ReadText) -> None:
+    content = "0:00:01.000,0:00:02.000 Hello\nthere.\n\n0:00:03,0:00:04\nBye.\n"
+    assert [(cue.begin_s, cue.text) for cue in read(content, ".sbv").cues] == [(1, "Hello there."), (3, "Bye.")]
+
+
+@pytest.mark.parametrize(("suffix", "head"), [(".srt", ""), (".vtt", "WEBVTT\n\n")])
+@pytest.mark.parametrize(
+    ("written", "words"),
+    [
+        ('<a href="http://x.org/y">here</a> it is', "here it is"),
+        ('<i class="a">so</i> <b class=x>it</b> is', "so it is"),
+        ("<key name='a'>so</key> press <key>", "so press <key>"),
+        ('so<br clear="all">it is', "so it is"),
+        ("{y:i}so {c:$0000ff}{s:24}{f:Arial}{P:1}it {a: 1}", "so it {a: 1}"),
+        ("C:\\New folder", "C:\\New folder"),
+        ("“D:\\Data\\hot\\Names”", "“D:\\Data\\hot\\Names”"),
+        ("\\\\server\\News here", "\\\\server\\News here"),
+    ],
+)
+def test_tags_have_attributes_and_paths_no_line_breaks(
+    suffix: str, head: str, written: str, words: str, read: ReadText
+) -> None:
+    content = f"{head}00:00:01.000 --> 00:00:02.000\n{written}\n\n00:00:03.000 --> 00:00:04.000\nNo.\n"
+    assert spoken(read, content, suffix) == [words, "No."]
+
+
+def test_signs_of_line_breaks_are_those_of_players(read: ReadText) -> None:
+    assert spoken(read, srt((1, 2, "So\\Nit\\his"))) == ["So it is"]
+    assert spoken(read, vtt((1, 2, "So\\Nit")), ".vtt") == ["So\\Nit"]

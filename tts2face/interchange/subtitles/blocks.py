@@ -7,11 +7,18 @@ from dataclasses import dataclass, field, replace
 
 from tts2face.interchange.subtitles.clock import HAS_ARROW, TIMING, clock_seconds
 from tts2face.interchange.subtitles.cues import SubtitleWarning, WrittenCue
+from tts2face.interchange.subtitles.markup import WEBVTT_MARKUP
 
 _NUMBER = re.compile(r"\s*\d{1,9}\s*")
 _UNSPOKEN_BLOCK = re.compile(r"(?:NOTE|STYLE|REGION)(?:\s|$)")  # W3C WebVTT, 4.1
 _VOICE = re.compile(r"<v(?P<classes>(?:\.[^\s.>]+)*)\s+(?P<name>[^>]+)>")
 _LANGUAGE = re.compile(r"<lang\s+([A-Za-z0-9-]{2,35})\s*>")
+# After the times: settings of WebVTT and of its drafts (A:middle), and the corners of a frame (X1:100).
+_SETTINGS = re.compile(
+    r"\b(?:(?:align|line|position|size|vertical|region)\s*:\s*[\w.%,+-]*|[ADLST]:\S+|[XY][12]\s*:\s*-?\d+)",
+    re.IGNORECASE,
+)
+_OTHER_SETTING = re.compile(r"(?<!\S)[A-Za-z][\w-]*:[\w.%,+-]+(?!\S)")  # of a program of its own
 SHOWN_CHARACTERS = 40  # of a line in a warning
 
 
@@ -56,6 +63,7 @@ def with_voice(cue: WrittenCue) -> WrittenCue:
         speaker=" ".join(html.unescape(voice["name"]).split()) if voice else "",
         style=voice["classes"].lstrip(".") if voice else "",
         language=language[1] if language else None,
+        markup=WEBVTT_MARKUP,
     )
 
 
@@ -99,7 +107,14 @@ def _open_block(number: int, line: str, match: "re.Match[str] | None", warnings:
     end = None if groups[7] is None else clock_seconds(*groups[5:10])
     if end is None:
         warnings.append(SubtitleWarning(number, f"the end in {shown!r} cannot be read; it is estimated"))
-    return _Block(number, clock_seconds(*groups[:5]), end)
+    block = _Block(number, clock_seconds(*groups[:5]), end)
+    beside = " ".join(_SETTINGS.sub(" ", groups[10]).split()) if end is not None else ""
+    if any(map(str.isalnum, beside)):
+        is_read = any(map(str.isalnum, _OTHER_SETTING.sub(" ", beside)))
+        what = "it is read" if is_read else "it is taken for a setting"
+        warnings.append(SubtitleWarning(number, f"{beside[:SHOWN_CHARACTERS]!r} stands beside the times; {what}"))
+        block.lines += [beside] if is_read else []
+    return block
 
 
 def _take_label(block: _Block, following: _Block, *, are_ids_words: bool) -> None:

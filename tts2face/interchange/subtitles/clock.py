@@ -7,7 +7,9 @@ from collections.abc import Sequence
 _CLOCK = r"(?:(-)\s*)?(?:(\d{1,6})\s*:\s*)?(\d{1,2})\s*:\s*(\d{1,2})(?:\s*[.,:;]\s*(\d{1,9}))?"
 CLOCK = re.compile(_CLOCK)
 _ARROW = r"\s*(?:-{1,3}\s*>|–+\s*>|—+\s*>|→)\s*"
-TIMING = re.compile(rf"^\s*{_CLOCK}{_ARROW}(?:{_CLOCK})?(.*)$")
+# The number of the cue may stand before its times.
+_NUMBER = r"(?:#?\d{1,9}[.):]?\s+(?=-?\d{1,3}\s?:\s?\d{1,2}\s?:\s?\d))?"
+TIMING = re.compile(rf"^\s*{_NUMBER}{_CLOCK}{_ARROW}(?:{_CLOCK})?(.*)$")
 # A line of times, also a damaged one: a clock on one side of the arrow, or a number on both.
 _ARROWS = r"(?:-{1,3}\s?>|[–—]\s?>|→)"
 HAS_ARROW = re.compile(

@@ -8,12 +8,12 @@ from typing import Any
 from lexicon.errors import DataError, InputError
 from tts2face.interchange.subtitles.blocks import with_voice
 from tts2face.interchange.subtitles.cues import SubtitleWarning, WrittenCue
-from tts2face.interchange.subtitles.markup import PLAIN_MARKUP, SUBRIP_MARKUP, SUBSTATION_MARKUP, Markup
+from tts2face.interchange.subtitles.markup import PLAIN_MARKUP, SUBRIP_MARKUP, SUBSTATION_MARKUP, WEBVTT_MARKUP, Markup
 from tts2face.interchange.subtitles.substation import packet_cue
 from tts2face.video.container import open_container
 
 _TEXT = {
-    "subrip": SUBRIP_MARKUP, "srt": SUBRIP_MARKUP, "text": SUBRIP_MARKUP, "webvtt": SUBRIP_MARKUP,
+    "subrip": SUBRIP_MARKUP, "srt": SUBRIP_MARKUP, "text": SUBRIP_MARKUP, "webvtt": WEBVTT_MARKUP,
     "mov_text": PLAIN_MARKUP, "ass": SUBSTATION_MARKUP, "ssa": SUBSTATION_MARKUP,
 }  # fmt: skip
 _PICTURES = frozenset({"hdmv_pgs_subtitle", "dvd_subtitle", "dvb_subtitle", "xsub"})

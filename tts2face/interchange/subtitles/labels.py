@@ -26,6 +26,7 @@ _NUMBERED = re.compile(
 )
 _AFTER_SENTENCE = re.compile(r"(?P<word>\w{0,20})[.!?…。！？][\"'”’»)\]]*[^\S\n]+(?=[^\W\d_])")
 _IN_BRACKETS = re.compile(r"\[[^\[\]]*\]|\([^()]*\)")
+_COUNT = re.compile(r"[(\[]\s*#?\d+\s*[)\]]\s*")
 _INITIALS = re.compile(r"(?:[^\W\d_]\.)+")
 _LOWER_WORD = re.compile(r"(?<![^\W\d_])[^\W\d_A-Z][^\W\d_]+")
 MAX_NAME_WORDS = 5
@@ -132,18 +133,19 @@ def label_key(label: str) -> str:
 
 
 def without_manners(text: str, speakers: Collection[str]) -> str:
-    """A text whose labels of speakers stand without brackets: `ANNA (off):` is `ANNA:`."""
+    """A text whose manners in brackets stand after the labels of speakers: `ANNA (off):` is `ANNA: (off)`."""
     text = _BRACKETED.sub(
         lambda match: f"{match['lead']}{match['label']}:" if label_key(match["label"]) in speakers else match[0], text
     )
-    return _LABEL.sub(
-        lambda match: (
-            f"{match['lead']}{match['label']}:"
-            if match["manner"] and label_key(match["label"]) in speakers
-            else match[0]
-        ),
-        text,
-    )
+    return _LABEL.sub(lambda match: _with_manner_after(match, speakers), text)
+
+
+def _with_manner_after(match: "re.Match[str]", speakers: Collection[str]) -> str:
+    if not match["manner"] or label_key(match["label"]) not in speakers:
+        return match[0]
+    # "MAN (2):" is one of two men
+    manner = match["manner"].strip() if not _COUNT.fullmatch(match["manner"]) else ""
+    return f"{match['lead']}{match['label']}: {manner}"
 
 
 def split_label(line: str, speakers: Collection[str] | None) -> tuple[str, str] | None:

@@ -7,7 +7,8 @@ from tts2face.interchange.subtitles.clock import parse_clock
 from tts2face.interchange.subtitles.cues import SubtitleWarning, WrittenCue
 from tts2face.interchange.subtitles.markup import SUBRIP_MARKUP
 
-PAIR = re.compile(r"\s*(-?\d{1,6}:\d{1,2}:\d{1,2}[.,:]\d{1,3})\s*,\s*(-?\d{1,6}:\d{1,2}:\d{1,2}[.,:]\d{1,3})\s*$")
+_INSTANT = r"(-?\d{1,6}:\d{1,2}:\d{1,2}(?:[.,:]\d{1,3})?)"
+PAIR = re.compile(rf"\s*{_INSTANT}\s*,\s*{_INSTANT}(?:\s+(?P<beside>.*))?$")
 _BREAK = re.compile(r"\[br\]", re.IGNORECASE)
 
 
@@ -30,5 +31,5 @@ def read_pairs(lines: Sequence[str]) -> tuple[list[WrittenCue], list[SubtitleWar
             warnings.append(SubtitleWarning(number, f"the start {match[1]!r} cannot be read; the cue is left out"))
         else:
             at = start, end, number
-        texts = []
+        texts = [_BREAK.sub("\n", match["beside"])] if match["beside"] else []
     return cues, warnings

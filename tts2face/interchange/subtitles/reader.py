@@ -10,8 +10,9 @@ How the next format is made:
 3. Say in docs/subtitles.md what is read of it, and add its file and its defects to tests/interchange/subtitles.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import inf
 from pathlib import Path
 
 from lexicon.errors import DataError
@@ -145,7 +146,7 @@ def _timed(
     # Only a text with a colon is divided, as most have none.
     labels = find_speakers(["\n".join(spoken_lines(text)) if ":" in text or "：" in text else text for text in plain])
     speakers: Collection[str] = labels.keys() if options.speakers else ()
-    latest = latest_ends(written)
+    latest = _latest_ends(written, said)
     cues: list[Cue] = []
     left_out: list[tuple[str, int, str]] = []
     for number, (cue, is_said) in enumerate(zip(written, said, strict=True)):
@@ -155,27 +156,40 @@ def _timed(
         else:
             left_out.append((cue.kind, cue.line, text.shown))
             text = SpokenText("", text.shown, ())
-        made = _cue(number, written, text, latest[number], warnings)
+        made = _cue(number, cue, text, latest[number])
         cues.append(made if is_said else replace(made, kind=cue.kind))
+    warnings += _defects(written, cues, said)
     notes += notes_of(left_out)
     notes += _note_of_speakers(cues, labels if options.speakers else {})
     return tuple(cues)
 
 
-def _cue(
-    number: int, written: Sequence[WrittenCue], text: SpokenText, latest: float, warnings: list[SubtitleWarning]
-) -> Cue:
-    cue = written[number]
-    following = written[number + 1].begin_s if number + 1 < len(written) else None
+def _latest_ends(written: Sequence[WrittenCue], said: Sequence[bool]) -> list[float]:
+    """For each cue the latest end of an estimate; what nobody says takes no time from what is said."""
+    latest = latest_ends(written)
+    places = [number for number, is_said in enumerate(said) if is_said]
+    for number, end in zip(places, latest_ends([written[number] for number in places]), strict=True):
+        latest[number] = end
+    return latest
+
+
+def _defects(written: Sequence[WrittenCue], cues: Sequence[Cue], said: Sequence[bool]) -> Iterator[SubtitleWarning]:
+    """Warnings of the times of cues that are said: ends that are estimated, and overlaps of words with words."""
+    following = inf
+    for cue, made, is_said in reversed(list(zip(written, cues, said, strict=True))):
+        if is_said and made.has_estimated_end and cue.end_s is not None:
+            reason = "has no length" if cue.end_s == cue.begin_s else "ends before it begins"
+            yield SubtitleWarning(cue.line, f"the cue {reason}; its end is estimated")
+        elif is_said and made.text and made.end_s > following + OVERLAP_S and not made.has_estimated_end:
+            yield SubtitleWarning(cue.line, f"this cue overlaps the next one by {made.end_s - following:.2f} s")
+        following = made.begin_s if is_said and made.text else following
+
+
+def _cue(number: int, cue: WrittenCue, text: SpokenText, latest: float) -> Cue:
     end = cue.end_s
     is_estimated = end is None or end <= cue.begin_s or end > MAX_S
     if is_estimated:
-        if end is not None:
-            reason = "has no length" if end == cue.begin_s else "ends before it begins"
-            warnings.append(SubtitleWarning(cue.line, f"the cue {reason}; its end is estimated"))
         end = estimated_end(cue.begin_s, latest, text.spoken or text.shown)
-    elif following is not None and end is not None and end > following + OVERLAP_S:
-        warnings.append(SubtitleWarning(cue.line, f"this cue overlaps the next one by {end - following:.2f} s"))
     parts = text.parts if len(text.parts) > 1 else ()
     if parts and not parts[0].speaker:
         parts = (replace(parts[0], speaker=cue.speaker), *parts[1:])

@@ -10,10 +10,26 @@ from tts2face.interchange.subtitles.markup import SUBRIP_MARKUP, Markup, plain_t
 from tts2face.interchange.subtitles.unspoken import ANNOTATIONS, LYRICS
 
 # Additions of subtitles for the deaf: noises in brackets, lyrics between notes.
-# Brackets in a word or around digits are said: Parent(s), f(x), (555). One that is not closed ends with its line.
+# Brackets in a word or around digits are said: Parent(s), (s)he, f(x), (555); so are comparisons. A noise that follows
+# a word without a space is known by its words. Brackets that are not closed end with their line.
+_NOISE = (
+    r"(?:laugh|chuckle|giggle|snicker|sigh|gasp|groan|moan|cough|sneeze|sniff|sniffle|sob|weep|scream|shout|yell|"
+    r"whisper|mutter|mumble|grunt|pant|exhale|inhale|breathe|gulp|hum|whistle|clap|cheer|pause|applaud|stammer|snort|"
+    r"yawn|shush|growl|hiss|wail|whimper|burp|hiccup|click|knock|beep)(?:e?s|e?d|ing)?|cries|crying|sings|singing|"
+    r"(?:laugh|chuckl|giggl|sneez|sniffl|mumbl|exhal|inhal|breath|whistl|paus)ing|laughter|applause|music|silence|"
+    r"inaudible|unintelligible|indistinct|crosstalk|static|lacht|seufzt|hustet|flüstert|rires?|soupirs?|risas?|"
+    r"suspira|ride|sospira"
+)
+_GLUED = r"(?<=[A-Za-zÀ-ɏͰ-ӿ\d])"
+_GLUED_NOISE = rf"{_GLUED}[\[(](?:(?i:{_NOISE})|[^\W\d_]{{2,}}(?:[ ’'-][^\W\d_]{{2,}}){{1,5}})[\])]"
+_SQUARE = r"\[(?:[^\[\]\n]|\[[^\[\]\n]*\])*\]|\[[^\[\]]*\]|\[[^\[\]\n]*"
+_SAID_IN_ROUND = r"\d+\)|[^\W\d_]{1,3}\)[^\W\d_A-Z]|[^()\n]{0,60}\w ?[<>=]{1,2} ?\w"
+_FACE = r"(?:(?<=[:;=]\()|(?<=[:;=]-\())(?:\s|$)"  # :-(
+_ROUND = rf"\((?!{_FACE}|{_SAID_IN_ROUND})(?:(?:[^()]|\([^()]*\))*\)|(?=[^\W\d_])[^()\n]*(?=\n|\Z))"
 _ANNOTATION = re.compile(
-    r"(?<![A-Za-z\d])(?:\[[^\]]*\]|\[[^\]\n]*|\((?!\d+\)|[^()\n]{0,60}\w ?[<>=]{1,2} ?\w)[^()]*\))"
-    r"|（[^（）]*）|【[^【】]*】|［[^［］]*］"
+    rf"{_GLUED.replace('<=', '<!')}(?:{_SQUARE}|{_ROUND})|{_GLUED_NOISE}"
+    r"|（[^（）]*）|【[^【】]*】|［[^［］]*］|[（【［][^（）【】［］\n]*(?=\n|\Z)"
+    r"|\A[^\[\]\n]{0,60}[^\W\d_]\](?!\w)"  # of a noise that begins in the cue before
 )
 # Notes that are not closed end before a line of somebody.
 _TURN = r"\n\s*(?:[-–—‐]|>>|[^\W\d_a-z][^\s:]{0,30}(?:[^\S\n][^\W\d_a-z][^\s:]{0,30})?:\s)"

@@ -40,9 +40,10 @@ def placed(
         if cue.begin_s < 0.0:
             warnings.append(SubtitleWarning(cue.line, "the start is negative; the cue begins at 0 s"))
             cue = replace(cue, begin_s=0.0)  # noqa: PLW2901 - the corrected cue
-        if cue.begin_s < latest:
+        # signs stand in blocks of their own, and nobody waits for them
+        if cue.begin_s < latest and not cue.kind:
             warnings.append(SubtitleWarning(cue.line, "this cue begins before the one above it; cues are sorted"))
-        latest = max(latest, cue.begin_s)
+        latest = latest if cue.kind else max(latest, cue.begin_s)
         kept.append(cue)
     kept.sort(key=lambda cue: cue.begin_s)
     if kept and kept[0].begin_s >= HOUR_S and film_s is None:
