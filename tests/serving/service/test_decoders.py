@@ -164,7 +164,7 @@ def test_twenty_clips_with_small_files_of_large_pictures_share_the_memory(
             most[:] = max(most[0], sum(used)), max(most[1], len(used))
             await settle()
             used.remove(n_bytes)
-            return Message(DECODE, {"is_full": False})
+            return Message(DECODE, {"is_full": False, "notes": []})
 
     monkeypatch.setattr(decoders, "started", Noting)
 

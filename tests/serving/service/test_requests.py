@@ -31,6 +31,10 @@ from tts2face.session.session_cache import SessionCache
 TEXT = "Hello there. This is a test."
 SPEECH = {"input": TEXT, "voice": "alloy", "model": "tts-1"}
 ADJUSTED = "x-tts2face-adjusted"
+CANCELLED = (
+    "the 2 channels of {} cancel each other, as one is inverted: channel 1 is taken alone, give a file with one "
+    "channel to use another one"
+)
 
 
 @pytest.fixture(scope="module")
@@ -221,6 +225,17 @@ def test_refusals_show_no_path_of_the_server(
     assert "/" not in message.replace("and/or", "")
     assert tempfile.gettempdir() not in message
     assert str(data) not in message
+
+
+def test_what_is_guessed_of_sounds_is_said(client: TestClient, table: TableProcess) -> None:
+    files = {"audio": ("a.wav", wav(gains=(1, -1)))}
+    answer = client.post("/v1/clips", data={"request": '{"format": "curves"}'}, files=files)
+    assert answer.status_code == 200, answer.text
+    assert answer.headers[ADJUSTED] == CANCELLED.format("audio")
+    job = client.post("/v1/jobs", data={"job": '{"kind": "clip", "request": {}}'}, files=files)
+    assert (job.status_code, job.headers[ADJUSTED]) == (202, CANCELLED.format("audio"))
+    plain = client.post("/v1/clips", data={"request": '{"format": "curves"}'}, files={"audio": ("a.wav", wav())})
+    assert ADJUSTED not in plain.headers
 
 
 @pytest.mark.parametrize(

@@ -25,12 +25,12 @@ def decode(kind: str, content: bytes, folder: Path, limit: float, **options: boo
     return refusal(kind, given, decoded, limit, **options), decoded
 
 
-def wav(seconds: float = 1.0, level: float = 0.3) -> bytes:
+def wav(seconds: float = 1.0, level: float = 0.3, gains: tuple[float, ...] = (1.0,)) -> bytes:
     samples = level * np.sin(2 * np.pi * 220 * np.arange(int(seconds * RATE)) / RATE)
     buffer = io.BytesIO()
     with wave.open(buffer, "wb") as file:
-        file.setparams((1, 2, RATE, 0, "NONE", ""))
-        file.writeframes((32767 * samples).astype("<i2").tobytes())
+        file.setparams((len(gains), 2, RATE, 0, "NONE", ""))
+        file.writeframes((32767 * np.outer(samples, gains)).astype("<i2").tobytes())
     return buffer.getvalue()
 
 

@@ -11,6 +11,7 @@ from starlette.testclient import TestClient
 
 from tests.interchange.transcripts.grids import PHONES, WORDS, textgrid
 from tests.serving.service.in_process import another_client, decoding_here
+from tests.serving.service.test_uploads import wav
 from tests.serving.studio.server.test_comparison_http import compare
 from tests.serving.studio.server.test_projects_http import TEXT, create, edit, preview, project_file, wait_until_saved
 from tests.serving.studio.server.test_reports_http import REPORTS
@@ -132,6 +133,14 @@ def test_imported_subtitles_say_what_was_guessed_and_is_not_spoken(studio: TestC
     assert project["request"]["text"] == "bouchnutí ANNA: Můžete přijít?"
     refused = studio.post("/api/imports", files={"file": ("x.srt", content)}, data={"keep": "noises"})
     assert "keep must be of annotations" in refused.json()["error"]["message"]
+
+
+def test_imported_sounds_say_what_is_guessed(studio: TestClient) -> None:
+    answer = studio.post("/api/imports", files={"file": ("x.wav", wav(gains=(1, -1)))}).json()
+    assert [note.partition(":")[0] for note in answer["notes"]] == [
+        "the 2 channels of the file cancel each other, as one is inverted"
+    ]
+    assert studio.post("/api/imports", files={"file": ("x.wav", wav())}).json()["notes"] == []
 
 
 def test_words_of_other_programs_are_imported(studio: TestClient) -> None:

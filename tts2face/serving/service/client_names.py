@@ -5,7 +5,7 @@ Whatever is replaced is named in the header `ADJUSTED` of the answer.
 
 import asyncio
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -66,6 +66,10 @@ class Adjustments:
         """Note what is done with words of other writing systems."""
         state.results.check_length(text)
         self.made += await asyncio.to_thread(reading_notes, text, language_code(language))
+
+    def note_sounds(self, notes: Sequence[str]) -> None:
+        """Note what is guessed of sounds that were sent; semicolons divide notes in the header."""
+        self.made += [note.replace(";", ",") for note in notes]
 
     def on(self, response: Answer) -> Answer:
         """An answer with the header that names them, if there are any."""

@@ -134,8 +134,8 @@ class Decoders:
         self._memory = MemoryBudget(MEMORY_BYTES)
         self._bodies: Counter[str] = Counter()
 
-    async def decode(self, key: str, asked: FileOrder, name: str, timeout_s: float) -> None:
-        """Decode a file of a key; `name` is for messages.
+    async def decode(self, key: str, asked: FileOrder, name: str, timeout_s: float) -> tuple[str, ...]:
+        """Decode a file of a key; `name` is for messages. Sentences on what is guessed of its sound.
 
         Raises
         ------
@@ -156,6 +156,7 @@ class Decoders:
         # the child's disk is the server's: its error is raised here, as one of the server
         if answer["is_full"]:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return tuple(note.replace(str(asked.source), name) for note in answer["notes"])
 
     async def make_avatar(self, key: str, order: Mapping[str, Any]) -> None:
         """Make the head of a person in the photo ``take``, which takes all of the memory; errors as `decode`."""

@@ -5,7 +5,7 @@ import shutil
 import tempfile
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -30,12 +30,16 @@ BLOCK_BYTES = 1 << 20
 
 @dataclass(frozen=True, slots=True)
 class UploadFolder:
-    """A private folder of one request of a key; it is removed when the request ends."""
+    """A private folder of one request of a key; it is removed when the request ends.
+
+    `notes` say what is guessed of its sounds.
+    """
 
     path: Path
     settings: ServiceSettings
     decoders: Decoders
     key: str
+    notes: list[str] = field(default_factory=list)
 
     async def sound(self, name: str, upload: UploadFile) -> Path:
         """Decoded sound of an upload, a .wav file; `name` is the field's name in messages.
@@ -129,7 +133,7 @@ class UploadFolder:
         return decoded
 
     async def _check(self, order: FileOrder, name: str, timeout_s: float) -> None:
-        await self.decoders.decode(self.key, order, name, timeout_s)
+        self.notes.extend(await self.decoders.decode(self.key, order, name, timeout_s))
 
     async def _save(self, name: str, upload: UploadFile) -> Path:
         path = self.path / f"{name}.upload"

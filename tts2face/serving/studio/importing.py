@@ -100,16 +100,16 @@ async def import_file(
             return Imported(await import_text(studio, key, words.text, title), words.notes)
         return Imported(await import_text(studio, key, _read_text(path, name), title))
     if suffix in SUFFIXES:
-        async with _decoded(studio.state, key, (SUBTITLES, path, suffix), choices.encoding) as checked:
+        async with _decoded(studio.state, key, (SUBTITLES, path, suffix), choices.encoding) as (checked, _):
             read = await asyncio.to_thread(read_subtitles, checked, choices.encoding, choices.subtitles)
         text = "\n".join(cue.text for cue in read.cues if cue.text)
         notes = tuple(f"line {note.line}: {note.message}" for note in (*read.warnings, *read.notes))
         return Imported(await import_text(studio, key, text, title), notes)
     if suffix in SOUND_SUFFIXES:
-        async with _decoded(studio.state, key, (SOUND, path, ".wav")) as checked:
+        async with _decoded(studio.state, key, (SOUND, path, ".wav")) as (checked, guessed):
             words = await asyncio.to_thread(_words_of_text, choices.transcript, choices.tier)
             text, notes = (choices.transcript, ()) if words is None else (words.text, words.notes)
-            return Imported(await add_recording(studio, key, checked, title, text), notes)
+            return Imported(await add_recording(studio, key, checked, title, text), (*guessed, *notes))
     kinds = (*TEXT_SUFFIXES, *READERS, *SUFFIXES, *SOUND_SUFFIXES, ".json")
     raise InputError(f"a file {name[-40:]!r} cannot be imported; give one that ends in {', '.join(kinds)}")
 
@@ -159,18 +159,18 @@ async def add_recording(studio: StudioHost, key: ApiKey, sound: Path, title: str
 @asynccontextmanager
 async def _decoded(
     state: ServiceState, key: ApiKey, given: tuple[str, Path, str], encoding: str | None = None
-) -> AsyncIterator[Path]:
-    """A file of a kind after its check in a process with limits, with a suffix."""
+) -> AsyncIterator[tuple[Path, tuple[str, ...]]]:
+    """A file of a kind after its check in a process with limits, with a suffix; notes on what is guessed of it."""
     settings, (kind, path, suffix) = state.settings, given
     limit = settings.sound_s if kind == SOUND else settings.job_cues
     with tempfile.TemporaryDirectory(prefix="tts2face-upload-") as folder:
         target = Path(folder, f"checked{suffix}")
         order = FileOrder(kind, path, target, limit, encoding)
         try:
-            await state.decoders.decode(key.name, order, "the file", settings.decode_s)
+            notes = await state.decoders.decode(key.name, order, "the file", settings.decode_s)
         except RefusedError as refused:
             raise InputError(refused.message) from refused
-        yield target
+        yield target, notes
 
 
 def _check_size(path: Path, name: str) -> None:

@@ -72,8 +72,8 @@ class Takes:
         self._studio.work.add(WORK, key.name, file.parent / ORDER, {"task": READ, "file": file.name})
         return entry
 
-    async def add_sound(self, key: ApiKey, number: str, source: Path) -> None:
-        """Give a take the sound of a file.
+    async def add_sound(self, key: ApiKey, number: str, source: Path) -> tuple[str, ...]:
+        """Give a take the sound of a file; sentences on what is guessed of it.
 
         Raises
         ------
@@ -84,13 +84,14 @@ class Takes:
         folder, settings = self.store.folder(key.name, number), self._studio.state.settings
         try:
             order = FileOrder(SOUND_KIND, source, folder / f"new-{SOUND}", settings.sound_s)
-            await self._studio.state.decoders.decode(key.name, order, "the sound", settings.decode_s)
+            notes = await self._studio.state.decoders.decode(key.name, order, "the sound", settings.decode_s)
         except RefusedError as refused:
             raise InputError(refused.message) from refused
         os.replace(folder / f"new-{SOUND}", folder / SOUND)
         for made in (PREVIEW, FILM):
             (folder / made).unlink(missing_ok=True)
         self.store.write(replace(self.store.entry(key.name, number), has_sound=True))
+        return notes
 
     async def preview(self, key: ApiKey, number: str) -> bytes:
         """The take on the default head, as a preview bundle (docs/studio.md)."""

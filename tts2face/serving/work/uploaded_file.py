@@ -91,10 +91,11 @@ def _decoding(kind: str, source: Path, *errors: type[Exception]) -> Iterator[Non
         raise RefusedFileError(f"it is no {kind} that can be decoded") from error
 
 
-def decode_sound(source: Path, target: Path, max_seconds: float) -> None:
-    """Write the sound of a file as mono 16-bit .wav at `SOUND_RATE`."""
+def decode_sound(source: Path, target: Path, max_seconds: float) -> tuple[str, ...]:
+    """Write the sound of a file as mono 16-bit .wav at `SOUND_RATE`; notes on what is guessed of it."""
     from tts2face.storage.wave_files import open_wave
     from tts2face.video.media import sound_blocks
+    from tts2face.video.sound_survey import survey_sound
 
     n_left = int(max_seconds * SOUND_RATE)
     try:
@@ -115,6 +116,7 @@ def decode_sound(source: Path, target: Path, max_seconds: float) -> None:
         raise RefusedFileError(str(wrong).replace(f"{source} ", "it ", 1)) from wrong
     if n_left == int(max_seconds * SOUND_RATE):
         raise RefusedFileError("its sound is empty")
+    return survey_sound(source, SOUND_FORMATS, max_seconds).notes(str(source))
 
 
 @contextmanager
@@ -201,8 +203,8 @@ def check_subtitles(source: Path, target: Path, max_cues: float, encoding: str |
     Path(f"{target}.json").write_text(json.dumps(numbers))
 
 
-def decode(order: FileOrder) -> None:
-    """Decode or check a file.
+def decode(order: FileOrder) -> tuple[str, ...]:
+    """Decode or check a file; notes on what is guessed of it, in which its path stands for its name.
 
     Raises
     ------
@@ -212,6 +214,8 @@ def decode(order: FileOrder) -> None:
     kind, source, target, limit, encoding = order
     if kind in RESOURCE_KINDS:
         check_resource(kind, source, target, limit)
+    elif kind == SOUND:
+        return decode_sound(source, target, limit)
     elif kind == SUBTITLES:
         check_subtitles(source, target, limit, encoding)
     elif kind == PLACES:
@@ -219,7 +223,8 @@ def decode(order: FileOrder) -> None:
     elif kind.startswith(DRAW):
         draw_resource(kind.removeprefix(DRAW), source, target)
     else:
-        {SOUND: decode_sound, PICTURE: decode_picture, VIDEO: check_video}[kind](source, target, limit)
+        {PICTURE: decode_picture, VIDEO: check_video}[kind](source, target, limit)
+    return ()
 
 
 def _measure(call: Call) -> dict[str, Any]:
@@ -250,12 +255,12 @@ def _photo_bytes(source: Path) -> int:
 def _decode(call: Call) -> dict[str, Any]:
     asked = call.content
     try:
-        decode(FileOrder(**{**asked, "source": Path(asked["source"]), "target": Path(asked["target"])}))
+        notes = decode(FileOrder(**{**asked, "source": Path(asked["source"]), "target": Path(asked["target"])}))
     except OSError as error:
         if not is_disk_full(error):
             raise
         return {"is_full": True}
-    return {"is_full": False}
+    return {"is_full": False, "notes": notes}
 
 
 def program(kind: str) -> Program:

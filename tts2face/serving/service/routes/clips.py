@@ -54,12 +54,15 @@ MULTIPART = {
 async def make_clip(request: HttpRequest) -> StreamingResponse:
     """The clip of a text as fragmented MP4, WebM, sound, or lines of curves, sent while it is made."""
     if not request.headers.get("content-type", "").startswith("multipart/form-data"):
-        return await _answer(request, _parse(await request.body()), {})
+        return await _answer(request, _parse(await request.body()), {}, Adjustments())
     async with AsyncExitStack() as stack:
         form = await stack.enter_async_context(request.form(max_files=len(FILES), max_fields=4))
         folder = await stack.enter_async_context(_folder(request))
         clip, files = await _read_form(form, folder)
-        return await _answer(request, clip, files, stack.pop_all())  # the files are read until the clip is complete
+        adjustments = Adjustments()
+        adjustments.note_sounds(folder.notes)
+        # the files are read until the clip is complete
+        return await _answer(request, clip, files, adjustments, stack.pop_all())
 
 
 def _folder(request: HttpRequest) -> "AbstractAsyncContextManager[UploadFolder]":
@@ -98,11 +101,15 @@ async def _read_form(form: FormData, folder: UploadFolder) -> tuple[ClipRequest,
 
 
 async def _answer(
-    request: HttpRequest, clip: ClipRequest, files: dict[str, str], resources: AsyncExitStack | None = None
+    request: HttpRequest,
+    clip: ClipRequest,
+    files: dict[str, str],
+    adjustments: Adjustments,
+    resources: AsyncExitStack | None = None,
 ) -> StreamingResponse:
     given: dict[str, Any] = clip.model_dump(exclude_none=True, exclude_defaults=True)
     format = given.pop("format", "mp4")
-    state, adjustments = service_state(request), Adjustments()
+    state = service_state(request)
     await adjustments.note_words(state, given.get("text", ""), given.get("language", DEFAULT_LANGUAGE))
     fields = await divide_options(state, request.state.key, given)
     picture = fields.picture | {name: files[name] for name in ("background",) if name in files}

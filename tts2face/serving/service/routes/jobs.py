@@ -23,6 +23,7 @@ from lexicon.sentence_length import marked_silence_s
 from lexicon.text_marks import parse_marks
 from tts2face.serving.batch.content_address import content_address
 from tts2face.serving.service.access import require_scope
+from tts2face.serving.service.client_names import Adjustments
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.guard import VIDEO_PATH
 from tts2face.serving.service.job_kinds.order import JobKind, JobOrder, Upload
@@ -114,7 +115,11 @@ async def _queue(request: HttpRequest, idempotency_key: str | None, kinds: Mappi
         record, is_new = await service.call(lambda client: _submit(client, order, asked, content, idempotency_key))
         if is_new:
             state.limits.add_speech(key, _expected_speech_s(order))
-    return JSONResponse(job_detail(record).model_dump(), 202 if is_new else 200, {"Location": f"/v1/jobs/{record.id}"})
+    adjustments = Adjustments()
+    adjustments.note_sounds(folder.notes)
+    answer = JSONResponse(job_detail(record).model_dump(), 202 if is_new else 200)
+    answer.headers["Location"] = f"/v1/jobs/{record.id}"
+    return adjustments.on(answer)
 
 
 @router.get("/jobs", response_model=JobPage, summary="List jobs")

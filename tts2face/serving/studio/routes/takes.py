@@ -10,6 +10,7 @@ from fastapi import Request as HttpRequest
 from fastapi.responses import FileResponse, Response
 
 from lexicon.errors import InputError
+from tts2face.serving.service.client_names import Adjustments
 from tts2face.serving.service.page_addresses import TAKES
 from tts2face.serving.studio.camera import follow_camera
 from tts2face.serving.studio.face_answer import face_answer
@@ -52,11 +53,12 @@ async def add_take(request: HttpRequest, name: Annotated[str, Query(max_length=2
 @router.put("/{number}/sound", status_code=204)
 async def add_sound(request: HttpRequest, number: str) -> Response:
     """The sound of a take, or a video that has it."""
+    adjustments = Adjustments()
     with tempfile.TemporaryDirectory(prefix="tts2face-take-") as folder:
         upload = Path(folder, "upload")
         await receive_take(request.stream(), upload)
-        await _takes(request).add_sound(request.state.key, number, upload)
-    return Response(status_code=204)
+        adjustments.note_sounds(await _takes(request).add_sound(request.state.key, number, upload))
+    return adjustments.on(Response(status_code=204))
 
 
 @router.get("/{number}/preview")
