@@ -54,6 +54,50 @@ READ = {
         "[00:01.00]<00:01.00>The <00:01.40>train <00:01.80>was late. Again. <00:03.00>\n"
         "[00:04.00]<00:04.00>We walked <00:05.00>home. <00:06.00>\n",
     ),
+    "SubViewer 1": (
+        ".sub",
+        "[TITLE]\nx\n[DELAY]\n0\n[BEGIN]\n******** START SCRIPT ********\n[00:00:01]\nThe train was late.|Again.\n"
+        "[00:00:03]\n\n[00:00:04]\nWe walked home.\n[00:00:06]\n\n[END]\n******** END SCRIPT ********\n",
+    ),
+    "SubViewer 1 in another file": (
+        ".txt",
+        "[00:00:01]\nThe train was late.\nAgain.\n[00:00:03]\n[00:00:04]\nWe walked home.\n[00:00:06]\n",
+    ),
+    "TMPlayer": (
+        ".txt",
+        "00:00:01:The train was late.|Again.\n00:00:03:\n00:00:04:We walked home.\n00:00:06:\n",
+    ),
+    "TMPlayer with rows": (
+        ".sub",
+        "0:00:01,1=The train was late.\n0:00:01,2=Again.\n0:00:03,1=\n0:00:04,1=We walked home.\n0:00:06,1=\n",
+    ),
+    "TMPlayer with spaces": (
+        ".srt",
+        "00:00:01 The train was late.|Again.\n00:00:03 \n00:00:04 We walked home.\n00:00:06 \n",
+    ),
+    "timed text": (
+        ".xml",
+        '<?xml version="1.0" encoding="utf-8" ?>\n<timedtext format="3">\n<head><pen id="1"/></head>\n<body>\n'
+        '<p t="1000" d="2000">The train was late.\nAgain.</p>\n<p t="4000" d="2000"><s p="1">We walked</s> home.</p>\n'
+        "</body>\n</timedtext>\n",
+    ),
+    "timed text of a recogniser": (
+        ".srv3",
+        '<timedtext format="3"><body><w t="0" id="1"/>'
+        '<p t="1000" d="2000" w="1"><s ac="248">The</s><s t="200"> train was late.</s><s t="800"> Again.</s></p>'
+        '<p t="2500" d="1500" w="1" a="1">\n</p>'
+        '<p t="4000" d="2000" w="1"><s>We</s><s t="300"> walked home.</s></p></body></timedtext>',
+    ),
+    "timed text of the first version": (
+        ".srv1",
+        '<?xml version="1.0" encoding="utf-8" ?><transcript><text start="1" dur="2">The train was late. &lt;i&gt;Again.'
+        '&lt;/i&gt;</text><text start="4.0" dur="2.0">We walked home.</text></transcript>',
+    ),
+    "timed text of the second version": (
+        ".srv2",
+        '<timedtext><window t="0" id="1"/><text t="1000" d="2000" w="1">The train was late.\nAgain.</text>'
+        '<text t="4000" d="2000" w="1">We walked home.</text></timedtext>',
+    ),
     "SAMI": (".smi", SAMI),
     "SAMI in another file": (".txt", SAMI),
 }
@@ -86,6 +130,33 @@ def test_a_class_of_sami_is_chosen_and_said(read: ReadText) -> None:
     assert [cue.text for cue in read(SAMI, ".smi", language="de").cues] == ["Der Zug."]
     with pytest.raises(InputError, match="there is no class 'FRCC'"):
         read(SAMI, ".smi", track="FRCC")
+
+
+def test_windows_of_timed_text_that_roll_end_where_the_next_begins(read: ReadText) -> None:
+    content = (
+        '<timedtext format="3"><body><p t="100" d="4000"><s ac="0">we</s><s t="240"> don&amp;#39;t</s></p>'
+        '<p t="2100" d="3900"><s>know</s></p><p t="9000"><s>bye</s></p><p d="5">lost</p></body></timedtext>'
+    )
+    found = read(content, ".xml")
+    assert [(cue.begin_s, cue.end_s, cue.text) for cue in found.cues] == [
+        (0.1, 2.1, "we don't"), (2.1, 6.0, "know"), (9.0, 10.0, "bye")
+    ]  # fmt: skip
+    assert [warning.message for warning in found.warnings] == ["the start of this cue cannot be read; it is left out"]
+
+
+def test_timed_text_that_ends_in_the_middle_is_read_up_to_there(read: ReadText) -> None:
+    found = read('<timedtext format="3"><body>\n<p t="1000" d="2000">Hello.</p>\n<p t="30', ".xml")
+    assert [cue.text for cue in found.cues] == ["Hello."]
+    assert "what follows is left out" in found.warnings[0].message
+
+
+def test_lines_without_instants_and_a_delay_are_said(read: ReadText) -> None:
+    lines = [f"00:00:0{at}:Go." for at in range(1, 9)]
+    found = read("\n".join([*lines, "Nothing."]), ".txt")
+    assert [warning.message for warning in found.warnings] == ["this line has no times; it is left out"]
+    found = read("[DELAY]\n5\n[BEGIN]\n[00:00:01]\nGo.\n[00:00:03]\nStop.\n[00:00:04]\n", ".sub")
+    assert [(cue.begin_s, cue.end_s) for cue in found.cues] == [(1, 3), (3, 4)]
+    assert "a delay of 5, which is not used; --shift" in found.warnings[0].message
 
 
 def write_film(path: Path, content: Path, languages: Sequence[str]) -> Path:
@@ -216,6 +287,9 @@ NO_TEXT = {
     "the index of pictures": (".idx", b"# VobSub index file, v7\n", "is the index of pictures of subtitles"),
     "an archive": (".srt", b"PK\x03\x04" + bytes(200), "is a ZIP archive"),
     "a damaged film": (".mp4", b"\x00\x00\x00\x18ftypisom" + bytes(200), "cannot be read as a film"),
+    "another XML": (".xml", b"<fcpxml><spine/></fcpxml>", "line 1: the file is XML of <fcpxml>, of which no subtitles"),
+    "clocks with frames": (".stl", b"00:00:01:12 , 00:00:03:00 , Hi.\n" * 3, "no subtitles of a format that is read"),
+    "two clocks": (".txt", b"00:00:01 00:00:03 Hi.\n" * 3, "no subtitles of a format that is read"),
     "other text": (".srt", b"Nothing here.\n", r"contains no subtitles of a format that is read \(SubRip, WebVTT"),
 }
 

@@ -1,6 +1,7 @@
 """The formats of subtitle files: their names and endings, how their content shows them, and their readers."""
 
 import re
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
 from tts2face.interchange.subtitles.blocks import read_subrip, read_webvtt
@@ -11,7 +12,9 @@ from tts2face.interchange.subtitles.lyrics import LINE, read_lyrics
 from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.interchange.subtitles.pairs import PAIR, read_pairs
 from tts2face.interchange.subtitles.sami import read_sami
+from tts2face.interchange.subtitles.stamped import is_subviewer_1, is_tmplayer, read_subviewer_1, read_tmplayer
 from tts2face.interchange.subtitles.substation import read_substation
+from tts2face.interchange.subtitles.timedtext import TIMED_TEXT, read_timed_text
 from tts2face.interchange.subtitles.ttml import read_ttml
 
 SUBRIP = "SubRip"
@@ -24,18 +27,29 @@ PAIRS = "SubViewer"
 LRC = "LRC"
 EBU_STL = "EBU STL"
 SAMI = "SAMI"
+YOUTUBE = "YouTube's timed text"
+TMPLAYER = "TMPlayer"
+SUBVIEWER_1 = "SubViewer 1"
 SUFFIXES = MappingProxyType({
     ".srt": SUBRIP, ".vtt": WEBVTT, ".ass": SUBSTATION, ".ssa": SUBSTATION, ".ttml": TTML, ".dfxp": TTML, ".itt": TTML,
     ".xml": TTML, ".sbv": PAIRS, ".sub": MICRODVD_NAME, ".mpl": MPL2_NAME, ".lrc": LRC, ".stl": EBU_STL,
-    ".smi": SAMI, ".sami": SAMI,
+    ".smi": SAMI, ".sami": SAMI, ".srv1": YOUTUBE, ".srv2": YOUTUBE, ".srv3": YOUTUBE,
 })  # fmt: skip
-NAMES = (SUBRIP, WEBVTT, SUBSTATION, TTML, MICRODVD_NAME, MPL2_NAME, "SBV", PAIRS, LRC, SAMI, EBU_STL)
+NAMES = (
+    *(SUBRIP, WEBVTT, SUBSTATION, TTML, YOUTUBE, MICRODVD_NAME, MPL2_NAME, "SBV", PAIRS, SUBVIEWER_1, TMPLAYER, LRC),
+    *(SAMI, EBU_STL),
+)
 FILM_SUFFIXES = (".mp4", ".m4v", ".mov", ".mkv", ".mks", ".webm")  # in which a track of subtitles may lie
 HEAD_LINES = 40  # within which a format shows itself
 _XML = re.compile(r"\s*<(?:\?xml|!DOCTYPE|!--|(?:\w+:)?tt[\s>])")
 _SAMI = re.compile(r"<SAMI\b|<SYNC\b", re.IGNORECASE)
 _SECTION = re.compile(r"^\s*\[(?:Script Info|V4\+? Styles|Events)\]", re.IGNORECASE | re.MULTILINE)
 _BY_LINES = ((PAIRS, PAIR), (MICRODVD_NAME, MICRODVD), (MPL2_NAME, MPL2), (LRC, LINE))
+
+_BY_NAME: Mapping[str, Callable[[Sequence[str]], tuple[list[WrittenCue], list[SubtitleWarning]]]] = MappingProxyType({
+    SUBSTATION: read_substation, PAIRS: read_pairs, MPL2_NAME: read_mpl2, LRC: read_lyrics,
+    SUBVIEWER_1: read_subviewer_1, TMPLAYER: read_tmplayer,
+})  # fmt: skip
 
 
 def subtitle_format(text: str, suffix: str) -> str:
@@ -45,15 +59,26 @@ def subtitle_format(text: str, suffix: str) -> str:
         return WEBVTT
     if _SAMI.match(head) or (_SAMI.search(head[:4000]) and not HAS_ARROW.search(head[:4000])):
         return SAMI
+    if TIMED_TEXT.match(head):
+        return YOUTUBE
     if _XML.match(text) or _SECTION.search(text):
         return TTML if _XML.match(text) else SUBSTATION
     named = SUFFIXES.get(suffix.lower(), SUBRIP)
     named = SUBRIP if named == EBU_STL else named  # which is no text
     has_arrow = HAS_ARROW.search(text) is not None
-    if has_arrow or named in {SUBSTATION, TTML}:
+    if has_arrow or named in {SUBSTATION, TTML, YOUTUBE}:
         return SUBRIP if has_arrow and named != WEBVTT else named
-    lines = text.split("\n", HEAD_LINES)[:HEAD_LINES]
-    return next((name for name, line in _BY_LINES if any(line.match(written) for written in lines)), named)
+    return _format_of_lines(text.split("\n", HEAD_LINES)[:HEAD_LINES]) or named
+
+
+def _format_of_lines(lines: Sequence[str]) -> str | None:
+    """Format whose instants stand in the first lines of a file; None without one."""
+    sung = [match for line in lines if (match := LINE.match(line))]
+    # [00:00:01] alone on its line is no line of a song
+    if is_subviewer_1(lines) and not any(match["text"].strip() for match in sung):
+        return SUBVIEWER_1
+    found = next((name for name, line in _BY_LINES if any(line.match(written) for written in lines)), None)
+    return found or (TMPLAYER if is_tmplayer(lines) else None)
 
 
 def read_format(text: str, suffix: str, options: SubtitleOptions) -> tuple[list[WrittenCue], list[SubtitleWarning]]:
@@ -61,6 +86,8 @@ def read_format(text: str, suffix: str, options: SubtitleOptions) -> tuple[list[
     kind = subtitle_format(text, suffix)
     if kind == TTML:
         return read_ttml(text)
+    if kind == YOUTUBE:
+        return read_timed_text(text)
     if kind == SAMI:
         return read_sami(text, options.language, options.track)
     lines = text.split("\n")
@@ -73,4 +100,4 @@ def read_format(text: str, suffix: str, options: SubtitleOptions) -> tuple[list[
         return cues, warnings
     if kind == MICRODVD_NAME:
         return read_microdvd(lines, options.fps)
-    return {SUBSTATION: read_substation, PAIRS: read_pairs, MPL2_NAME: read_mpl2, LRC: read_lyrics}[kind](lines)
+    return _BY_NAME[kind](lines)

@@ -8,7 +8,7 @@ from tts2face.interchange.subtitles.cues import SubtitleWarning, WrittenCue
 from tts2face.interchange.subtitles.markup import SUBRIP_MARKUP
 
 _INSTANT = r"(-?\d{1,6}:\d{1,2}:\d{1,2}(?:[.,:]\d{1,3})?)"
-PAIR = re.compile(rf"\s*{_INSTANT}\s*,\s*{_INSTANT}(?:\s+(?P<beside>.*))?$")
+PAIR = re.compile(rf"\s*{_INSTANT}\s*,\s*{_INSTANT}(?:\s+(?P<beside>[^\s,].*))?\s*$")
 _BREAK = re.compile(r"\[br\]", re.IGNORECASE)
 
 

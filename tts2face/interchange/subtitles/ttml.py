@@ -1,7 +1,4 @@
-"""Timed Text Markup Language (W3C TTML 2) and its profiles EBU-TT-D, IMSC and DFXP.
-
-The parser is expat; a document type declaration is refused, and without one there are no entities to expand or fetch.
-"""
+"""Timed Text Markup Language (W3C TTML 2) and its profiles EBU-TT-D, IMSC and DFXP."""
 
 import re
 from collections.abc import Mapping
@@ -15,11 +12,13 @@ from tts2face.interchange.subtitles.cues import SubtitleWarning, WrittenCue
 from tts2face.interchange.subtitles.markup import PLAIN_MARKUP
 from tts2face.interchange.subtitles.timing import is_likely, is_possible
 from tts2face.interchange.subtitles.unspoken import ANNOTATIONS, LYRICS, SIGNS
+from tts2face.interchange.subtitles.xml_text import parse_xml
 
 MAX_DEPTH = 64  # nested elements; real files have about six
 MAX_CUES = 200_000
 _OFFSET = re.compile(r"(-?\d{1,12}(?:\.\d{1,9})?)\s*(h|ms|m|s|f|t|)")
 _CLOCK = re.compile(r"(?:(\d{1,6}):)?(\d{1,2}):(\d{1,2})(?:[.,](\d{1,9})|:(\d{1,4})(?:\.\d{1,4})?)?")
+_ROOTS = frozenset({"tt", "body", "div"})  # also of a part of a document
 _TIMED = frozenset({"body", "div", "p", "span"})
 _UNSPOKEN = frozenset({"metadata", "desc", "title", "copyright"})
 _RUBY_TEXT = frozenset({"text", "textContainer", "delimiter"})  # TTML 2, 10.2.38: readings, not what they stand above
@@ -104,8 +103,6 @@ class _TtmlReader:
         self._cues: list[WrittenCue] = []
         self._warnings: list[SubtitleWarning] = []
         parser = expat.ParserCreate(namespace_separator=" ")
-        parser.buffer_text = True
-        parser.StartDoctypeDeclHandler = self._doctype
         parser.StartElementHandler = self._start
         parser.EndElementHandler = self._end
         parser.CharacterDataHandler = self._characters
@@ -113,30 +110,15 @@ class _TtmlReader:
 
     def read(self, text: str) -> tuple[list[WrittenCue], list[SubtitleWarning]]:
         """Parse the whole document."""
-        without_declaration = re.sub(r"^\s*<\?xml[^>]*\?>", lambda match: "\n" * match[0].count("\n"), text, count=1)
-        try:
-            self._parser.Parse(without_declaration.lstrip(" \t\r"), True)
-        except expat.ExpatError as broken:
-            reason = expat.ErrorString(broken.code)
-            if not self._cues:
-                raise DataError(
-                    f"line {broken.lineno}: the XML is not well-formed ({reason}); export the file again"
-                ) from broken
-            self._warn(f"the XML is not well-formed ({reason}); what follows is left out", broken.lineno)
-        except UnicodeEncodeError as broken:
-            raise DataError(f"the XML contains an unpaired surrogate (character {broken.start}); remove it") from broken
+        parse_xml(self._parser, text, self._cues, self._warnings)
         return self._cues, self._warnings
 
     def _warn(self, message: str, line: int | None = None) -> None:
         self._warnings.append(SubtitleWarning(line or self._parser.CurrentLineNumber, message))
 
-    def _doctype(self, *_: object) -> None:
-        raise DataError("a document type declaration is not supported; remove <!DOCTYPE ...>")
-
     def _start(self, tag: str, attributes: Attributes) -> None:
-        if len(self._elements) >= MAX_DEPTH:
-            raise DataError(f"line {self._parser.CurrentLineNumber}: elements are nested deeper than {MAX_DEPTH}")
         name = _local(tag)
+        self._check_place(name)
         own = {_local(key): value for key, value in attributes.items()}
         if name == "tt":
             self._read_rates(own)
@@ -154,6 +136,16 @@ class _TtmlReader:
             self._paragraphs.append(_Paragraph(self._parser.CurrentLineNumber))
             element.name = "cue"
         self._elements.append(element)
+
+    def _check_place(self, name: str) -> None:
+        """Refuse the first element of another kind of document, and elements that are nested too deep."""
+        if len(self._elements) >= MAX_DEPTH:
+            raise DataError(f"line {self._parser.CurrentLineNumber}: elements are nested deeper than {MAX_DEPTH}")
+        if not self._elements and name not in _ROOTS:
+            raise DataError(
+                f"line {self._parser.CurrentLineNumber}: the file is XML of <{name[:40]}>, of which no subtitles are "
+                "read; export them as .srt or .ttml"
+            )
 
     def _open(self, name: str, own: Attributes, parent: _Element) -> _Element:
         start = parent.next_s if parent.is_sequence else parent.begin_s
