@@ -39,11 +39,14 @@ class C3dFile:
         Analogue channels with k samples in a frame, as stored: neither scaled nor without their offset.
     parameters
         Its parameters by group and name.
+    n_lost
+        Frames that it states but does not hold, as it breaks off.
     """
 
     points: FloatArray
     channels: FloatArray
     parameters: Parameters
+    n_lost: int = 0
 
     def labels(self, group: str) -> list[str]:
         """Names of the markers (POINT) or channels (ANALOG); more than 255 are divided among several parameters."""
@@ -82,8 +85,10 @@ def _read_frames(file: BinaryIO, words: NDArray[Any], parameters: Parameters, pr
     start, kind = BLOCK_BYTES * (int(words[8]) - 1), _type(processor, FLOATS if scale < 0 else 2)
     n_held = (file.seek(0, 2) - start) // (width * kind.itemsize)
     n_frames = _count_frames(words, parameters, n_held)
-    if not 0 < n_frames <= n_held:
-        raise ValueError(f"it ends after {n_held} of {n_frames} frames")
+    if n_frames < 1 or n_held < 1:
+        raise ValueError(f"it has {n_held} of {n_frames} frames")
+    n_lost = max(n_frames - n_held, 0)
+    n_frames -= n_lost
     file.seek(start)
     values = _decode(file.read(n_frames * width * kind.itemsize), kind, processor).reshape(n_frames, width)
     quads = values[:, : 4 * n_points].reshape(n_frames, n_points, 4).astype(np.float64)
@@ -94,7 +99,7 @@ def _read_frames(file: BinaryIO, words: NDArray[Any], parameters: Parameters, pr
     if scale > 0 and "".join(parameters.get("ANALOG:FORMAT", [])).strip().upper() == "UNSIGNED":
         channels = channels.astype(np.uint16)
     n_channels = n_samples // per_frame if per_frame else 0
-    return C3dFile(points, channels.reshape(n_frames * per_frame, n_channels).astype(np.float64), parameters)
+    return C3dFile(points, channels.reshape(n_frames * per_frame, n_channels).astype(np.float64), parameters, n_lost)
 
 
 def _count_frames(words: NDArray[Any], parameters: Parameters, n_held: int) -> int:

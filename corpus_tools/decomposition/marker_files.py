@@ -4,26 +4,24 @@ The next format is a module with a reader that gives a `MarkerTake`, and its lin
 """
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from corpus_tools.decomposition.c3d_file import C3dFile, read_c3d_file
-from corpus_tools.decomposition.marker_take import MM_PER_UNIT, MarkerTake
+from corpus_tools.decomposition.marker_take import MM_PER_UNIT, MarkerTake, build_take, parse_cells
 from corpus_tools.decomposition.motive_table import is_motive_table, read_motive
 from corpus_tools.decomposition.trc_file import read_trc
 from corpus_tools.recordings.sound import SOUND_RATE
 from lexicon.errors import DataError, InputError
 from lexicon.values.tables import read_table
 from tts2face.models.palette import GESTURE_FPS
-from tts2face.numeric.arrays import FloatArray
 from tts2face.types import Waveform
 
 SOUND_LABELS = ("audio", "sound", "voice", "speech", "mic")  # how analogue channels that hold sound are named
 MIN_SOUND_HZ = 8000.0  # analogue channels with a lower rate are not sound
 MIN_FPS, MAX_FPS = 10.0, 1000.0
-TIME_TOLERANCE_FRAMES = 0.25  # of a frame: times in a file are rounded, often to milliseconds
-MIN_GAP_STEPS = 1.5  # of the usual step: a longer one is a gap of frames
 AXES = ("x", "y", "z")
 
 
@@ -33,7 +31,7 @@ def read_markers(path: Path, fps: float | None = None) -> MarkerTake:
     Parameters
     ----------
     fps
-        Frame rate of a table with frame numbers.
+        Frame rate of a table whose times do not show it.
     """
     readers = {
         ".c3d": lambda: read_c3d(path),
@@ -71,7 +69,8 @@ def read_c3d(path: Path) -> MarkerTake:
     names = [label.rpartition(":")[2].strip() for label in file.labels("POINT")][: file.points.shape[1]]
     points = file.points[:, : len(names)] * MM_PER_UNIT[units]
     points[(points == 0.0).all(axis=2)] = np.nan  # how old files mark a gap
-    return MarkerTake(tuple(names), points, fps, sound)
+    lost = f"the file breaks off: of {len(points) + file.n_lost} frames it has {len(points)}"
+    return MarkerTake(tuple(names), points, fps, sound, (lost,) if file.n_lost else ())
 
 
 def _analogue_sound(file: C3dFile) -> Waveform | None:
@@ -97,8 +96,10 @@ def read_marker_table(path: Path, fps: float | None = None) -> MarkerTake:
     ``NAME_z`` in mm, in any order; empty cells are gaps.
     """
     rows = [[cell.strip() for cell in row] for row in read_table(path, delimiters=",;\t")]
+    while rows and len(rows[0]) > 1 and not rows[0][-1]:  # a comma at the end of the heading
+        del rows[0][-1]
     if is_motive_table(rows):
-        return read_motive(path, rows)
+        return read_motive(path, rows, fps)
     first = rows[0][0].lower() if rows else ""
     if first not in ("time", "frame") or len(rows) < 2:
         raise DataError(
@@ -106,11 +107,21 @@ def read_marker_table(path: Path, fps: float | None = None) -> MarkerTake:
             "or the headings of Motive, Format Version, ..."
         )
     names = _parse_header(path, rows[0])
-    values = np.array([_parse_row(path, number, row, len(rows[0])) for number, row in enumerate(rows[1:], start=2)])
-    columns = [[rows[0].index(f"{name}_{axis}") for axis in AXES] for name in names]
-    points = values[:, np.array(columns)]
-    points[np.isnan(points).any(axis=2)] = np.nan
-    return _build_even_take(path, names, points, (first, values[:, 0]), fps)
+    if first == "frame" and fps is None and len(rows) > 2:
+        # whose rate no file can say
+        raise InputError(f"{path.name} has frame numbers; give its frame rate, or a column time")
+    columns = [rows[0].index(f"{name}_{axis}") for name in names for axis in AXES]
+    cells = np.array([parse_cells(row, len(rows[0])) for row in rows[1:]])
+    values = np.full((len(cells), 2 + len(columns)), np.nan)
+    values[:, 0 if first == "frame" else 1] = cells[:, 0]
+    values[:, 2:] = cells[:, columns]
+    try:
+        take = build_take(names, values, 1.0, given=fps)
+    except ValueError as broken:
+        raise DataError(f"{path} cannot be read: {broken}; check its column {first}") from broken
+    n_odd = sum(_is_odd(row, len(rows[0])) for row in rows[1:])
+    notes = (f"rows with cells that are no number or beyond the columns, which are left out: {n_odd}",) if n_odd else ()
+    return replace(take, notes=(*take.notes, *notes), fps=take.fps or GESTURE_FPS)  # of a still without a rate
 
 
 def _parse_header(path: Path, header: list[str]) -> tuple[str, ...]:
@@ -122,34 +133,6 @@ def _parse_header(path: Path, header: list[str]) -> tuple[str, ...]:
     return names
 
 
-def _parse_row(path: Path, number: int, row: list[str], n_columns: int) -> list[float]:
-    if len(row) != n_columns:
-        raise DataError(f"line {number} of {path} has {len(row)} columns, not {n_columns}; export it again")
-    try:
-        return [float(cell) if cell else np.nan for cell in row]
-    except ValueError as broken:
-        raise DataError(f"line {number} of {path} cannot be read ({broken}); export it again") from broken
-
-
-def _build_even_take(
-    path: Path, names: tuple[str, ...], points: FloatArray, counted: tuple[str, FloatArray], fps: float | None
-) -> MarkerTake:
-    """Frames at a constant rate; missing rows of a table are gaps."""
-    what, at = counted
-    if what == "frame" and fps is None and len(at) > 1:
-        raise InputError(f"{path.name} has frame numbers; give its frame rate, or a column time")
-    # whose rate no file can say
-    if len(at) == 1:  # a still
-        return MarkerTake(names, points, fps or GESTURE_FPS)
-    steps = np.diff(at)
-    if not np.isfinite(at).all() or (steps <= 0).any():
-        raise DataError(f"the column {what} of {path} must increase from row to row; export it again")
-    usual = 1.0 if what == "frame" else float(steps[steps < MIN_GAP_STEPS * np.median(steps)].mean())
-    n_frames = steps / usual
-    if np.abs(n_frames - np.rint(n_frames)).max() > TIME_TOLERANCE_FRAMES:
-        raise DataError(f"the column {what} of {path} does not increase in even steps; export it again")
-    rows = np.concatenate([[0], np.cumsum(np.rint(n_frames).astype(int))])
-    found = np.full((rows[-1] + 1, len(names), 3), np.nan)
-    found[rows] = points
-    rate = fps if what == "frame" and fps else float(np.round(rows[-1] / (at[-1] - at[0]), 2))
-    return MarkerTake(names, found, rate)
+def _is_odd(row: list[str], n_columns: int) -> bool:
+    filled = [cell for cell in row[:n_columns] if cell]
+    return any(row[n_columns:]) or bool(np.isnan(parse_cells(filled, len(filled))).any())

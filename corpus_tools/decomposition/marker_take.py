@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tts2face.numeric.arrays import FloatArray, IntArray
+from corpus_tools.decomposition.marker_clock import place_rows
+from tts2face.numeric.arrays import FloatArray
 from tts2face.types import Waveform
 
 MM_PER_UNIT = {
@@ -14,7 +15,7 @@ MM_PER_UNIT = {
     "in": 25.4, "inch": 25.4, "inches": 25.4, "ft": 304.8, "feet": 304.8,
 }  # fmt: skip
 FARTHEST_MM = 1e6  # a coordinate beyond it is how Cortex writes a gap (9999999)
-RATE_TOLERANCE = 0.02  # of a rate: two that are further apart contradict each other
+SAID_DIFFERENCE = 1e-4  # of a rate: 59.94 is 59.9401
 MAX_FRAMES = 4_000_000  # an hour at 1000 frames a second: beyond it a frame number is damaged
 
 
@@ -50,44 +51,43 @@ def parse_cells(cells: Sequence[str], n_columns: int) -> list[float]:
     return found
 
 
-def build_take(names: Sequence[str], values: FloatArray, stated_fps: float, mm_per_unit: float) -> MarkerTake:
+def build_take(
+    names: Sequence[str], values: FloatArray, mm_per_unit: float, *, stated: float = 0.0, given: float | None = None
+) -> MarkerTake:
     """Frames at a constant rate from rows (T, 2 + 3 M) of a frame number, a time in seconds, and places.
 
-    Rows that do not come after all before them are left out; missing frame numbers are gaps. The rate is the stated
-    one unless the times contradict it (ValueError: neither is there, or there are no frames).
+    Rows stand where their times say, else their numbers; what neither has is a gap, and rows that do not come after
+    those before are left out (ValueError: no rate is there, or there are no frames).
+
+    Parameters
+    ----------
+    stated, given
+        Frame rates that the file states, 0 for none, and that the user gives. Times that are good decide, then the
+        user.
     """
-    notes = list[str]()
-    numbers = values[:, 0]
-    if not np.isfinite(numbers).any():
-        numbers = np.arange(len(values), dtype=np.float64)
-    highest = np.fmax.accumulate(np.concatenate([[-np.inf], numbers]))[:-1]
-    is_later = np.isfinite(numbers) & (numbers > highest)
-    if not is_later.all():
-        notes.append(f"rows left out, as their frame number is missing or not a later one: {(~is_later).sum()}")
-    numbers, values = numbers[is_later], values[is_later]
     if not len(values):
         raise ValueError("it has no frame")
-    rows = np.rint(numbers - numbers[0]).astype(int)
-    if rows[-1] >= MAX_FRAMES:
-        raise ValueError(f"its frame numbers reach {numbers[-1]:g}")
-    fps = _frame_rate(rows, values[:, 1], stated_fps, notes)
-    places = values[:, 2:].reshape(len(values), len(names), 3) * mm_per_unit
+    notes = list[str]()
+    clock = place_rows(values[:, 0], values[:, 1], given or stated, notes)
+    if not clock.fps and len(clock.rows) > 1:
+        raise ValueError("it states no frame rate")
+    n_lost = len(values) - len(clock.rows)
+    if n_lost:
+        notes.append(f"rows left out, as their frame number and time are missing or no later ones: {n_lost}")
+    _compare_rates(clock.fps, stated, given, notes)
+    if clock.frames[-1] >= MAX_FRAMES:
+        raise ValueError(f"its frames reach number {clock.frames[-1]:g}")
+    places = values[clock.rows, 2:].reshape(len(clock.rows), len(names), 3) * mm_per_unit
     # a place of zeros, and one beyond all rooms, are how programs mark a gap
     is_gap = np.isnan(places).any(axis=2) | (places == 0.0).all(axis=2) | (np.abs(places) > FARTHEST_MM).any(axis=2)
-    points = np.full((rows[-1] + 1, len(names), 3), np.nan)
-    points[rows] = np.where(is_gap[..., None], np.nan, places)
-    return MarkerTake(short_names(names), points, fps, notes=tuple(notes))
+    points = np.full((clock.frames[-1] + 1, len(names), 3), np.nan)
+    points[clock.frames] = np.where(is_gap[..., None], np.nan, places)
+    return MarkerTake(short_names(names), points, clock.fps, notes=tuple(notes))
 
 
-def _frame_rate(rows: IntArray, times: FloatArray, stated: float, notes: list[str]) -> float:
-    there = np.flatnonzero(np.isfinite(times))
-    seconds = times[there[-1]] - times[there[0]] if len(there) > 1 else 0.0
-    timed = float((rows[there[-1]] - rows[there[0]]) / seconds) if seconds > 0 else 0.0
-    if not stated > 0 and not timed:
-        raise ValueError("it states no frame rate")
-    if not stated > 0:
-        return round(timed, 2)
-    if timed and abs(timed - stated) > RATE_TOLERANCE * timed:
-        notes.append(f"it states {stated:g} frames a second, but its times have {timed:.2f}, which are taken")
-        return round(timed, 2)
-    return stated
+def _compare_rates(taken: float, stated: float, given: float | None, notes: list[str]) -> None:
+    """Notes on rates that are not taken."""
+    if stated > 0 and abs(stated - taken) > SAID_DIFFERENCE * taken:
+        notes.append(f"it states {stated:g} frames a second; {taken:g} are taken")
+    if given and abs(given - taken) > SAID_DIFFERENCE * taken:
+        notes.append(f"{given:g} frames a second were given, but its times have {taken:g}, which are taken")

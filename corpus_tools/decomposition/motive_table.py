@@ -25,15 +25,15 @@ def is_motive_table(rows: list[list[str]]) -> bool:
     return bool(rows) and rows[0][0].strip().lower() == FIRST_CELL
 
 
-def read_motive(path: Path, rows: list[list[str]]) -> MarkerTake:
-    """The markers of a table of Motive in mm; empty cells are gaps; errors as `read_markers`."""
+def read_motive(path: Path, rows: list[list[str]], fps: float | None = None) -> MarkerTake:
+    """The markers of a table of Motive in mm; empty cells are gaps; `fps` and errors as `read_trc`."""
     try:
-        return _parse(rows)
+        return _parse(rows, fps)
     except ValueError as broken:
         raise DataError(f"{path} is a table of Motive that cannot be read: {broken}") from broken
 
 
-def _parse(rows: list[list[str]]) -> MarkerTake:
+def _parse(rows: list[list[str]], fps: float | None) -> MarkerTake:
     header = dict(zip((cell.strip().lower() for cell in rows[0][::2]), rows[0][1::2], strict=False))
     unit = header.get("length units", DEFAULT_UNIT).strip().lower()
     if unit not in MM_PER_UNIT:
@@ -46,7 +46,7 @@ def _parse(rows: list[list[str]]) -> MarkerTake:
     n_columns = max(order) + 1
     values = np.array([parse_cells(row, n_columns) for row in rows[at + 1 :]]).reshape(-1, n_columns)[:, order]
     stated = parse_cells([header.get("export frame rate", header.get("capture frame rate", ""))], 1)[0]
-    return build_take(list(columns), values, stated, MM_PER_UNIT[unit])
+    return build_take(list(columns), values, MM_PER_UNIT[unit], stated=max(np.nan_to_num(stated), 0.0), given=fps)
 
 
 def _marker_columns(headings: list[list[str]], axes: list[str]) -> dict[str, list[int]]:

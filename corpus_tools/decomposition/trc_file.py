@@ -25,7 +25,7 @@ def read_trc(path: Path, fps: float | None = None) -> MarkerTake:
     Parameters
     ----------
     fps
-        Frame rate of a file that states none.
+        Frame rate of a file whose times do not show it.
     """
     try:
         return _parse(read_text(path, LARGEST_TABLE_BYTES), fps)
@@ -55,7 +55,7 @@ def _parse(text: str, fps: float | None) -> MarkerTake:
     # the line of axes has no number
     values = np.array([row for row in rows if np.isfinite(row).any()]).reshape(-1, n_columns)
     rate = parse_cells([header.get("datarate", "")], 1)[0]
-    return build_take(names, values, rate if rate > 0 else fps or 0.0, MM_PER_UNIT[unit])
+    return build_take(names, values, MM_PER_UNIT[unit], stated=max(np.nan_to_num(rate), 0.0), given=fps)
 
 
 def _cells(line: str) -> list[str]:

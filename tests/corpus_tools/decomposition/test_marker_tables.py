@@ -95,14 +95,35 @@ def test_a_trc_file_with_comments_and_lost_frames(tmp_path: Path) -> None:
     assert take.names == NAMES
     assert np.isnan(take.points[6:8]).all()
     np.testing.assert_allclose(take.points[8:], POINTS[8:], atol=1e-4)
-    assert take.notes == ("rows left out, as their frame number is missing or not a later one: 1",)
+    assert take.notes == ("rows left out, as their frame number and time are missing or no later ones: 1",)
 
 
 def test_times_overrule_a_stated_rate_that_contradicts_them(tmp_path: Path) -> None:
     (tmp_path / "take.trc").write_text(trc_text(NAMES, POINTS, fps=100.0).replace("100.00\t", "60.00\t", 2))
     take = read_markers(tmp_path / "take.trc")
     assert take.fps == 100.0
-    assert take.notes == ("it states 60 frames a second, but its times have 100.00, which are taken",)
+    assert take.notes == ("it states 60 frames a second; 100 are taken",)
+
+
+@pytest.mark.parametrize("suffix", [".trc", ".csv"])
+def test_a_rate_is_that_of_the_times_then_the_given_then_the_stated_one(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"take{suffix}"
+    text = trc_text(NAMES, POINTS, fps=FPS) if suffix == ".trc" else motive_text(NAMES, POINTS)
+    path.write_text(text)
+    take = read_markers(path, 100.0)
+    assert (take.fps, take.notes) == (
+        FPS,
+        ("100 frames a second were given, but its times have 120, which are taken",),
+    )
+    lines = [line for line in text.splitlines() if line]
+    separator = "\t" if suffix == ".trc" else ","
+    at = next(n for n, line in enumerate(lines) if line.startswith("Frame"))
+    rows = [line.split(separator) for line in lines[at + 1 :]]
+    timeless = [separator.join([row[0], "", *row[2:]]) for row in rows]
+    path.write_text("\n".join([*lines[: at + 1], *timeless]))
+    assert (read_markers(path).fps, read_markers(path).notes) == (FPS, ())
+    take = read_markers(path, 100.0)
+    assert (take.fps, take.notes) == (100.0, ("it states 120 frames a second; 100 are taken",))
 
 
 @pytest.mark.parametrize(
