@@ -25,7 +25,7 @@ MAX_SHORTFALL_S = 0.25  # a file that ends this much before its stated end is tr
 MAX_BROKEN_S = 0.1  # of packets that cannot be decoded between others that can
 LEAST_PACKET_S = 0.001  # of what cannot be decoded and states no duration
 # Formats that state how long they are; of others FFmpeg guesses it from the first bit rates.
-STATE_DURATION = frozenset({"matroska", "webm", "mov", "mp4", "avi", "wav", "w64", "flac", "asf", "aiff", "caf"})
+STATE_DURATION = frozenset({"matroska", "webm", "mov", "mp4", "avi", "wav", "w64", "flac", "asf", "aiff", "caf", "tta"})
 BROADCASTS = ("mpegts", "mpeg")
 MAX_PRIMING_S = 0.1  # AAC begins with up to 2,112 samples that are not the recording's, .1 s at 22,050 Hz
 RIFF_HEAD = 8  # bytes before those that a RIFF file counts

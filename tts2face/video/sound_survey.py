@@ -12,6 +12,7 @@ import numpy as np
 from lexicon.errors import DataError, InputError
 from tts2face.video.channels import ChannelMeter, ChannelMix, TrackLevel, choose_track
 from tts2face.video.container import decode_packets, file_version, open_container, sound_stream, start_time
+from tts2face.video.cut_files import missing_seconds
 from tts2face.video.sound_clock import ClockMeter, SoundClock
 
 if TYPE_CHECKING:
@@ -23,14 +24,22 @@ COUNTED = frozenset({"wav", "w64", "mp3", "flac", "aac", "aiff", "caf", "au", "a
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SoundSurvey:
-    """How the channels of a file become one, and the clock of its track, which is empty where it cannot differ."""
+    """How the channels of a file become one, and the clock of its track, which is empty where it cannot differ.
+
+    `missing_s` seconds of sound that it states are missing at its end.
+    """
 
     mix: ChannelMix
     clock: SoundClock = field(default_factory=SoundClock)
+    missing_s: float = 0.0
 
     def notes(self, name: str) -> tuple[str, ...]:
         """Sentences for the user on what is guessed, filled and resampled."""
-        return tuple(filter(None, [self.mix.note(name), *self.clock.notes(name)]))
+        cut = (
+            f"{name} is cut off: the last {self.missing_s:.2f} s of sound that it states are missing, and what is "
+            "there is read; copy it again if its original is longer"
+        )
+        return tuple(filter(None, [cut * (self.missing_s > 0), self.mix.note(name), *self.clock.notes(name)]))
 
 
 def survey_sound(path: Path, formats: str | None = None, longest_s: float | None = None) -> SoundSurvey:
@@ -56,8 +65,9 @@ def _survey(path: Path, version: tuple[int, int, int], formats: str | None, long
         n_tracks = len(container.streams.audio)
         n_channels = sound_stream(container, path).codec_context.channels
         is_counted = _counts_samples(container)
+        missing_s = missing_seconds(path, (container.duration or 0) / 1e6)
     if n_tracks == 1 and n_channels == 1 and is_counted:
-        return SoundSurvey(ChannelMix(np.ones(1)))
+        return SoundSurvey(ChannelMix(np.ones(1)), missing_s=missing_s)
     tracks: list[tuple[SoundSurvey, TrackLevel]] = []
     for track in range(n_tracks):  # recorders of screens write the system's sound first, then the microphone
         tracks.append(_survey_track(path, formats, track, longest_s))
@@ -65,7 +75,7 @@ def _survey(path: Path, version: tuple[int, int, int], formats: str | None, long
             break
     chosen, passed = choose_track([level for _, level in tracks])
     found = tracks[chosen][0]
-    return replace(found, mix=replace(found.mix, track=chosen, n_tracks=n_tracks, passed=passed))
+    return replace(found, missing_s=missing_s, mix=replace(found.mix, track=chosen, n_tracks=n_tracks, passed=passed))
 
 
 def _survey_track(
