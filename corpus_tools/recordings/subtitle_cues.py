@@ -9,7 +9,9 @@ from tts2face.interchange.subtitles.film_track import Film, film_facts
 from tts2face.interchange.subtitles.formats import FILM_SUFFIXES, SUFFIXES
 from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.interchange.subtitles.reader import read_subtitles
+from tts2face.interchange.transcripts.reader import TEXT_SUFFIX
 from tts2face.interchange.transcripts.spoken import SpokenCue
+from tts2face.interchange.transcripts.written_words import is_subtitle_file, subtitle_notes_of
 
 SUBTITLE_SUFFIXES = tuple(suffix for suffix in SUFFIXES if suffix != ".xml")  # in order of preference
 OTHER_FILM_SUFFIXES = (".avi", ".mpg", ".mpeg", ".ts")  # beside which subtitles lie
@@ -18,8 +20,16 @@ CUE_MARGIN_S = 0.3  # before and after a cue; subtitles are rarely closer to the
 
 
 def find_subtitles(video: Path) -> Path | None:
-    """The subtitle file of a video, or None."""
-    return next((path for suffix in SUBTITLE_SUFFIXES if (path := video.with_suffix(suffix)).is_file()), None)
+    """The subtitle file of a video, also a text that holds subtitles, or None."""
+    named = (*((suffix, True) for suffix in SUBTITLE_SUFFIXES), (TEXT_SUFFIX, False), (TEXT_SUFFIX.upper(), False))
+    return next(
+        (
+            path
+            for suffix, is_sure in named
+            if (path := video.with_suffix(suffix)).is_file() and (is_sure or is_subtitle_file(path))
+        ),
+        None,
+    )
 
 
 def read_cues(path: Path) -> tuple[SpokenCue, ...]:
@@ -60,8 +70,7 @@ def subtitle_notes(video: Path, *, has_track: bool = False) -> tuple[str, ...]:
     except DataError as wrong:
         return (f"{wrong}; the subtitles are not used",)
     stated = (f"the subtitles of {video.name} are those of its own track",) if path == video else ()
-    found = (f"{path.name}, line {note.line}: {note.message}" for note in (*read.warnings, *read.notes))
-    return (*stated, *found)
+    return (*stated, *subtitle_notes_of(read))
 
 
 def _joined(cues: Sequence[Cue]) -> list[tuple[float, float, str]]:

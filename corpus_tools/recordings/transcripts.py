@@ -1,32 +1,35 @@
 """Transcripts beside videos: which file of a recording is read, what it says, and which files are passed over."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 
 from corpus_tools.recordings.subtitle_cues import SUBTITLE_SUFFIXES, read_cues
+from lexicon.errors import DataError
 from tts2face.interchange.subtitles.decoding import read_text
 from tts2face.interchange.transcripts.reader import READERS, TEXT_SUFFIX, encoding_note, find_reader
-from tts2face.interchange.transcripts.reader import read_transcript as read_timed
+from tts2face.interchange.transcripts.written_words import WrittenWords, is_subtitle_file, read_written_words
 
 # in order of preference: the words of a person before tables of programs
 _FIRST = (TEXT_SUFFIX, ".textgrid", ".align", *SUBTITLE_SUFFIXES)
 SUFFIXES = (*_FIRST, *(suffix for suffix in READERS if suffix not in _FIRST))
+OTHERS_TOO = frozenset({".tsv", ".rec"})  # tables of anything, recordings of television
 MAX_NAMED = 8  # files in a note
-
-
-@dataclass(frozen=True, slots=True)
-class WrittenWords:
-    """Text of a transcript, and sentences about what was chosen of the file or left out."""
-
-    text: str
-    notes: tuple[str, ...] = ()
 
 
 def find_transcript(video: Path) -> Path | None:
     """The transcript beside a video, in the order of `SUFFIXES`; None without one."""
     beside = {path.suffix.lower(): path for path in sorted(video.parent.iterdir()) if path.stem == video.stem}
-    return next((beside[suffix] for suffix in SUFFIXES if suffix in beside), None)
+    return next((beside[suffix] for suffix in SUFFIXES if suffix in beside and _may_be(beside[suffix])), None)
+
+
+def _may_be(path: Path) -> bool:
+    """Whether a file can be a transcript: of endings of other files, too, the content decides."""
+    if path.suffix.lower() not in OTHERS_TOO:
+        return True
+    try:
+        return find_reader(path) is not None
+    except DataError:
+        return False
 
 
 def read_transcript(transcript: Path, tier: str | None = None) -> WrittenWords:
@@ -39,13 +42,13 @@ def read_transcript(transcript: Path, tier: str | None = None) -> WrittenWords:
     DataError
         The file cannot be read, or has no word.
     """
-    if transcript.suffix.lower() in SUBTITLE_SUFFIXES:
+    if is_subtitle_file(transcript):
         return WrittenWords(" ".join(cue.text for cue in read_cues(transcript)))
-    if find_reader(transcript) is None:
+    found = read_written_words(transcript, tier)
+    if found is None:
         note = encoding_note(transcript)
         return WrittenWords(read_text(transcript), (note,) if note else ())
-    found = read_timed(transcript, tier)
-    return WrittenWords(found.text, found.notes)
+    return found
 
 
 def passed_over(videos: Iterable[Path], transcripts: Iterable[Path]) -> str:

@@ -225,6 +225,26 @@ def test_a_guessed_encoding_of_words_is_said(write, suffix, content):
     assert read_transcript(write(suffix, content)).notes == ()
 
 
+def test_subtitles_and_tables_of_any_name_have_their_times(write, tmp_path):
+    (tmp_path / "take.mp4").touch()
+    path = write(".txt", SRT)
+    recordings = find_recordings(tmp_path)
+    assert [recording.transcript for recording in recordings] == ["Place blue at F two", "now – café"]
+    assert recordings[1].span[0] > 60.0
+    notes = recording_notes(recordings)
+    assert notes[0] == "take.txt holds subtitles by its lines, whose times are not words"
+    assert not any("is not read" in note for note in notes)
+    path.unlink()
+    write(".tsv", "start\tend\ttext\n0\t1500\tplace blue\n")
+    (recording,) = find_recordings(tmp_path)
+    assert [word for word, _ in pronounce_recording(recording)] == ["place", "blue"]
+    write(".tsv", "time\tjawOpen\n0\t0.1\n")
+    write(".rec", b"\x47\x00\x00" * 99)
+    (recording,) = find_recordings(tmp_path)
+    assert recording.transcript is None
+    assert recording_notes([recording])[0].startswith("take.rec, take.tsv lie beside videos and are not read")
+
+
 def test_a_tier_is_named_for_all_recordings(tmp_path):
     (tmp_path / "take.mp4").touch()
     (tmp_path / "take.TextGrid").write_text(LONG_GRID)

@@ -3,8 +3,6 @@
 import pytest
 
 from lexicon.errors import DataError
-from tts2face.interchange.transcripts.reader import read_transcript
-from tts2face.interchange.transcripts.slots import interpolated
 
 SLOTS = {"s0": 500, "s1": 1000, "s2": None, "s3": 2000, "s4": 2400, "s5": 2600}
 WORD_TIER = """<TIER LINGUISTIC_TYPE_REF="w" TIER_ID="Anna-words" PARENT_REF="Anna">
@@ -48,15 +46,6 @@ def eaf(tiers: str, header: str = "") -> str:
 
 def tier(content: str, name: str = "Anna") -> str:
     return f'<TIER LINGUISTIC_TYPE_REF="default-lt" TIER_ID="{name}">{content}</TIER>'
-
-
-@pytest.fixture
-def read(tmp_path):
-    def read_file(name, content, tier=None):
-        (tmp_path / name).write_text(content, encoding="utf-8")
-        return read_transcript(tmp_path / name, tier)
-
-    return read_file
 
 
 def test_utterances_share_their_time_among_their_words(read):
@@ -170,16 +159,3 @@ def test_compounds_of_timed_words_are_words(read):
     found = read("v.cha", "@Begin\n*CHI:\tto New_York .\n%wor:\tto •500_600• New_York •600_1400• .\n@End\n")
     assert [(word.text, word.start) for word in found.words][:2] == [("to", 0.5), ("New", 0.6)]
     assert (found.words[2].text, found.words[2].end) == ("York", 1.4)
-
-
-@pytest.mark.parametrize(
-    ("times", "filled"),
-    [
-        ([0.0, None, None, 3.0], [0, 1, 2, 3]),
-        ([None, 1.0, None, 2.0, None], [1, 1, 1.5, 2, 2]),
-        ([None, None], [0, 0]),
-        ([], []),
-    ],
-)
-def test_missing_times_are_divided_evenly(times, filled):
-    assert interpolated(times) == filled

@@ -5,22 +5,13 @@ import re
 import pytest
 
 from lexicon.errors import DataError
-from tts2face.interchange.transcripts.reader import find_reader, find_reader_of_text, read_transcript
+from tts2face.interchange.transcripts.reader import find_reader, find_reader_of_text
 
 WORDS = (("bin", 0.55, 0.75), ("red", 0.75, 1.05), ("now", 1.9, 2.3))
 CTM = "".join(f"v A {start:.2f} {end - start:.2f} {word} 0.98\n" for word, start, end in WORDS)
 HTK = "0 5500000 sil\n" + "".join(f"{round(start * 1e7)} {round(end * 1e7)} {word}\n" for word, start, end in WORDS)
 TIMIT = "".join(f"{round(start * 16000)} {round(end * 16000)} {word}\n" for word, start, end in WORDS)
 XLABEL = "separator ;\nnfields 1\n#\n0.55 125 pau\n0.75 125 bin\n1.05 125 red\n1.9 125 pau\n2.3 125 now\n"
-
-
-@pytest.fixture
-def read(tmp_path):
-    def read_file(name, content, tier=None):
-        (tmp_path / name).write_text(content, encoding="utf-8")
-        return read_transcript(tmp_path / name, tier)
-
-    return read_file
 
 
 @pytest.mark.parametrize(

@@ -149,12 +149,20 @@ def test_words_of_other_programs_are_imported(studio: TestClient) -> None:
     found = {}
     for name, content, choices in (
         ("a.TextGrid", grid, {}), ("a.txt", grid, {"tier": "Ben words"}), ("b.txt", table, {}),
-        ("c.txt", "bin red", {}),
+        ("c.txt", "bin red", {}), ("d.txt", "1\n00:00:01,000 --> 00:00:02,000\nbin red\n", {}),
+        ("e.tsv", "start\tend\ttext\n0\t1500\tbin red\n", {}),
     ):  # fmt: skip
         answer = studio.post("/api/imports", files={"file": (name, content.encode())}, data=choices).json()
         project = studio.get(f"/api/projects/{answer['id']}/project.json").json()
         found[name, *choices] = project["request"]["text"], len(answer["notes"])
-    assert list(found.values()) == [("bin red by k seven now", 1), ("hello", 0), ("bin red", 0), ("bin red", 0)]
+    assert list(found.values()) == [
+        ("bin red by k seven now", 1),
+        ("hello", 0),
+        ("bin red", 0),
+        ("bin red", 0),
+        ("bin red", 1),
+        ("bin red", 2),
+    ]
     wrong = studio.post("/api/imports", files={"file": ("x.eaf", b"<html/>")})
     assert wrong.json()["error"]["message"].startswith("x.eaf is no file of ELAN")
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
 from tts2face.interchange.subtitles.blocks import read_subrip, read_webvtt
-from tts2face.interchange.subtitles.clock import HAS_ARROW, without_frames
+from tts2face.interchange.subtitles.clock import HAS_ARROW, TIMING, without_frames
 from tts2face.interchange.subtitles.cues import SubtitleWarning, WrittenCue
 from tts2face.interchange.subtitles.frames import MICRODVD, MPL2, read_microdvd, read_mpl2
 from tts2face.interchange.subtitles.lyrics import LINE, read_lyrics
@@ -14,6 +14,7 @@ from tts2face.interchange.subtitles.pairs import PAIR, read_pairs
 from tts2face.interchange.subtitles.sami import read_sami
 from tts2face.interchange.subtitles.stamped import is_subviewer_1, is_tmplayer, read_subviewer_1, read_tmplayer
 from tts2face.interchange.subtitles.substation import read_substation
+from tts2face.interchange.subtitles.timed_lines import has_timed_lines, read_timed_lines
 from tts2face.interchange.subtitles.timedtext import TIMED_TEXT, read_timed_text
 from tts2face.interchange.subtitles.ttml import read_ttml
 
@@ -30,6 +31,7 @@ SAMI = "SAMI"
 YOUTUBE = "YouTube's timed text"
 TMPLAYER = "TMPlayer"
 SUBVIEWER_1 = "SubViewer 1"
+TIMED_LINES = "lines with times"
 SUFFIXES = MappingProxyType({
     ".srt": SUBRIP, ".vtt": WEBVTT, ".ass": SUBSTATION, ".ssa": SUBSTATION, ".ttml": TTML, ".dfxp": TTML, ".itt": TTML,
     ".xml": TTML, ".sbv": PAIRS, ".sub": MICRODVD_NAME, ".mpl": MPL2_NAME, ".lrc": LRC, ".stl": EBU_STL,
@@ -37,19 +39,40 @@ SUFFIXES = MappingProxyType({
 })  # fmt: skip
 NAMES = (
     *(SUBRIP, WEBVTT, SUBSTATION, TTML, YOUTUBE, MICRODVD_NAME, MPL2_NAME, "SBV", PAIRS, SUBVIEWER_1, TMPLAYER, LRC),
-    *(SAMI, EBU_STL),
+    *(SAMI, EBU_STL, TIMED_LINES),
 )
 FILM_SUFFIXES = (".mp4", ".m4v", ".mov", ".mkv", ".mks", ".webm")  # in which a track of subtitles may lie
+MIN_SHARE = 0.8  # of the lines of a text that are those of a format
 HEAD_LINES = 40  # within which a format shows itself
 _XML = re.compile(r"\s*<(?:\?xml|!DOCTYPE|!--|(?:\w+:)?tt[\s>])")
 _SAMI = re.compile(r"<SAMI\b|<SYNC\b", re.IGNORECASE)
 _SECTION = re.compile(r"^\s*\[(?:Script Info|V4\+? Styles|Events)\]", re.IGNORECASE | re.MULTILINE)
+_LRC_TAG = re.compile(r"\s*\[[a-z#]{2,8}:[^\]]*\]\s*", re.IGNORECASE)
+_TTML = re.compile(r"\s*(?:<\?xml[^>]*>\s*)?(?:<!--.*?-->\s*)*<(?:\w+:)?tt[\s>]", re.DOTALL)
 _BY_LINES = ((PAIRS, PAIR), (MICRODVD_NAME, MICRODVD), (MPL2_NAME, MPL2), (LRC, LINE))
 
 _BY_NAME: Mapping[str, Callable[[Sequence[str]], tuple[list[WrittenCue], list[SubtitleWarning]]]] = MappingProxyType({
     SUBSTATION: read_substation, PAIRS: read_pairs, MPL2_NAME: read_mpl2, LRC: read_lyrics,
-    SUBVIEWER_1: read_subviewer_1, TMPLAYER: read_tmplayer,
+    SUBVIEWER_1: read_subviewer_1, TMPLAYER: read_tmplayer, TIMED_LINES: read_timed_lines,
 })  # fmt: skip
+
+
+def is_subtitle_text(text: str) -> bool:
+    """Whether a text of any name is unmistakably one of subtitles: by its head, its first lines, or most of all."""
+    head = text.lstrip("\ufeff \t\r\n")
+    if head.startswith("WEBVTT") or any(mark.match(head) for mark in (_SAMI, _TTML, TIMED_TEXT, _SECTION)):
+        return True
+    lines = [line for line in head.splitlines() if line.strip()]
+    # a number, or an identifier, may stand before the first times
+    if any(map(TIMING.match, lines[:2])) or any(map(PAIR.match, lines[:HEAD_LINES])) or has_timed_lines(lines):
+        return True
+    if is_tmplayer(lines) or is_subviewer_1(lines):
+        return True
+    return any(
+        any(map(line.match, lines)) and sum(bool(line.match(row) or _LRC_TAG.fullmatch(row)) for row in lines) >= share
+        for _, line in _BY_LINES[1:]
+        if (share := max(MIN_SHARE * len(lines), 2))
+    )
 
 
 def subtitle_format(text: str, suffix: str) -> str:
@@ -68,7 +91,8 @@ def subtitle_format(text: str, suffix: str) -> str:
     has_arrow = HAS_ARROW.search(text) is not None
     if has_arrow or named in {SUBSTATION, TTML, YOUTUBE}:
         return SUBRIP if has_arrow and named != WEBVTT else named
-    return _format_of_lines(text.split("\n", HEAD_LINES)[:HEAD_LINES]) or named
+    shown = _format_of_lines(text.split("\n", HEAD_LINES)[:HEAD_LINES])
+    return shown or (TIMED_LINES if has_timed_lines(text.split("\n")) else named)
 
 
 def _format_of_lines(lines: Sequence[str]) -> str | None:

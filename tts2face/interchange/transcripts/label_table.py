@@ -1,21 +1,28 @@
-"""Tables of labels as Audacity exports them: start, end and label in columns, frequencies in lines of their own."""
+"""Tables of labels: start, end and label in columns, as of Audacity, or in those that are named, as of Whisper."""
 
 import re
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from statistics import median
 
+from lexicon.dictionary import word_set
 from lexicon.errors import DataError
 from tts2face.interchange.subtitles.decoding import read_text
 from tts2face.interchange.transcripts.spoken import SpokenCue, Tier
 
+MAX_WORD_S = 5.0  # of half of the words, in seconds; whole numbers above are milliseconds
 _NUMBER = r"-?\d+(?:[.,]\d+)?"
 _ROW = re.compile(rf"\s*({_NUMBER})\t\s*({_NUMBER})(?:\t(.*))?")
 _SPACED_ROW = re.compile(r"\s*(\d+\.\d+) +(\d+\.\d+)(?: +(.*))?")  # numbers of words have no decimals
-_SCORED = re.compile(
-    r"(.*\S)(?:\t\s*-?\d[\d.,eE+-]*|\s+-?\d+\.\d+(?:[eE][+-]?\d+)?|\s+-\d+)\s*"
-)  # bin -201.5, bin 0.98
+# a confidence or likelihood behind a label: bin -201.5
+_SCORED = re.compile(r"(.*\S)(?:\t\s*-?\d[\d.,eE+-]*|\s+-?\d+\.\d+(?:[eE][+-]?\d+)?|\s+-\d+)\s*")
 _FREQUENCIES = re.compile(rf"\\\s*{_NUMBER}\s+{_NUMBER}\s*")
-_NAMES = re.compile(r"\s*(?:start|begin|from|tmin|xmin|onset|time)\b[^\t]*\t.*", re.IGNORECASE)
+# names of columns
+_STARTS = word_set("start begin from tmin xmin onset time start_time starttime begin_time start_s start_ms")
+_ENDS = word_set("end stop to tmax xmax offset end_time endtime stop_time end_s end_ms")
+_TEXTS = word_set("text label labels transcript transcription word words utterance sentence value annotation content")
+_TIERS = word_set("tier tiername")
 
 
 def is_label_table(text: str) -> bool:
@@ -24,32 +31,84 @@ def is_label_table(text: str) -> bool:
 
 
 def read_label_table(path: Path) -> list[Tier]:
-    """The labels of a table, in seconds; labels of points have no length."""
+    """The labels of a table, by the names of their tiers where it has them; labels of points have no length."""
     rows = _rows(read_text(path))
     if not rows:
         raise DataError(f"{path} is no table of labels (start, end and label in seconds, divided by tabs); correct it")
-    return [Tier("", tuple(rows), all(row.start == row.end for row in rows), is_speech=True)]
+    tiers: dict[str, list[SpokenCue]] = {}
+    for name, cue in rows:
+        tiers.setdefault(name, []).append(cue)
+    rate, notes = _unit(path, [cue for _, cue in rows])
+    return [
+        Tier(
+            name,
+            tuple(replace(cue, start=cue.start / rate, end=cue.end / rate) for cue in cues),
+            all(cue.start == cue.end for cue in cues),
+            is_speech=not name,
+            notes=notes,
+        )
+        for name, cues in tiers.items()
+    ]
 
 
-def _rows(text: str) -> list[SpokenCue]:
+def _unit(path: Path, cues: Sequence[SpokenCue]) -> tuple[float, tuple[str, ...]]:
+    """Units a second of the times, and a note where they are no seconds."""
+    lasting = [(cue.end - cue.start) / n_words for cue in cues if (n_words := len(cue.text.split()))]
+    is_whole = all(time.is_integer() for cue in cues for time in (cue.start, cue.end))
+    if not is_whole or not lasting or median(lasting) <= MAX_WORD_S:
+        return 1.0, ()
+    reason = f"as seconds half of its words last {median(lasting):g} s"
+    return 1000.0, (f"times of {path.name} are read as milliseconds: {reason}",)
+
+
+def _rows(text: str) -> list[tuple[str, SpokenCue]]:
+    """Labels with the names of their tiers, which are empty without a column of them; none of another text."""
     lines = [line for line in text.splitlines() if line.strip() and not _FREQUENCIES.fullmatch(line.strip())]
-    if lines and _NAMES.fullmatch(lines[0]):
-        lines = lines[1:]
-    rows = []
+    columns = _columns(lines[0]) if lines else None
+    try:
+        rows = list(_of_columns(lines[1:], columns) if columns else _unnamed(lines))
+    except ValueError:
+        return []
+    return [] if any(cue.start > cue.end for _, cue in rows) else rows
+
+
+def _columns(line: str) -> dict[str, int] | None:
+    """Places of the columns of a line of names; None for another line."""
+    names = [name.strip("\ufeff \"'").lower().replace(" ", "_") for name in line.split("\t")]
+    kinds = {"start": _STARTS, "end": _ENDS, "text": _TEXTS, "tier": _TIERS}
+    found = {
+        kind: next(at for at, name in enumerate(names) if name in of)
+        for kind, of in kinds.items()
+        if any(name in of for name in names)
+    }
+    return found if {"start", "end", "text"} <= set(found) else None
+
+
+def _of_columns(lines: Sequence[str], columns: dict[str, int]) -> Iterator[tuple[str, SpokenCue]]:
+    last = max(columns["start"], columns["end"])
     for line in lines:
-        match = _ROW.fullmatch(line) or _SPACED_ROW.fullmatch(line)
-        if match is None:
-            return []
-        start, end = (float(number.replace(",", ".")) for number in match.group(1, 2))
-        if start > end:
-            return []
-        rows.append(SpokenCue(start, end, (match[3] or "").strip()))
-    return _without_scores(rows)
+        fields = line.split("\t")
+        if len(fields) <= last:
+            raise ValueError
+        start, end = _number(fields[columns["start"]]), _number(fields[columns["end"]])
+        text = fields[columns["text"]].strip() if columns["text"] < len(fields) else ""
+        tier = fields[columns["tier"]].strip() if columns.get("tier", len(fields)) < len(fields) else ""
+        yield tier, SpokenCue(start, end, text)
 
 
-def _without_scores(rows: list[SpokenCue]) -> list[SpokenCue]:
-    """Rows without a column of confidences or likelihoods behind all labels."""
-    scored = [_SCORED.fullmatch(row.text) for row in rows if row.text]
-    if not scored or not all(scored):
-        return rows
-    return [replace(row, text=match[1]) if (match := _SCORED.fullmatch(row.text)) else row for row in rows]
+def _unnamed(lines: Sequence[str]) -> Iterator[tuple[str, SpokenCue]]:
+    matches = [_ROW.fullmatch(line) or _SPACED_ROW.fullmatch(line) for line in lines]
+    rows = [match.groups(default="") for match in matches if match]
+    if len(rows) < len(lines):
+        raise ValueError
+    scored = [_SCORED.fullmatch(text) for _, _, text in rows if text.strip()]
+    has_scores = bool(scored) and all(scored)
+    for start, end, text in rows:
+        match = _SCORED.fullmatch(text) if has_scores else None
+        yield "", SpokenCue(_number(start), _number(end), (match[1] if match else text).strip())
+
+
+def _number(written: str) -> float:
+    if not re.fullmatch(_NUMBER, written.strip()):
+        raise ValueError
+    return float(written.strip().replace(",", "."))

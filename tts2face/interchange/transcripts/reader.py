@@ -33,7 +33,8 @@ from tts2face.interchange.transcripts.timit import is_timit_prompt, read_timit
 from tts2face.interchange.transcripts.utterances import shared_words
 
 TEXT_SUFFIX = ".txt"
-LABEL_SUFFIX = ".lab"  # also plain words, as the Montreal Forced Aligner reads them
+BY_CONTENT = frozenset({".lab", ".rec", ".tsv"})  # also plain words, as the Montreal Forced Aligner reads .lab
+PLAIN_SUFFIXES = frozenset({"", ".ssml", ".md", ".xml"})  # of texts to speak, whatever their lines look like
 OVERLAP_S = 1e-3  # edges that differ by less are one edge, rounded twice
 MAX_NAMED = 6  # labels in a note
 ReadTiers = Callable[[Path], list[Tier]]
@@ -49,6 +50,7 @@ READERS: Mapping[str, ReadTiers] = MappingProxyType(
         ".wrd": read_timit,
         ".lab": read_lab,
         ".rec": read_lab,
+        ".tsv": read_label_table,
     }
 )
 _MARKS: Mapping[str, ReadTiers] = MappingProxyType(
@@ -112,13 +114,16 @@ def encoding_note(path: Path) -> str:
 
 
 def find_reader(path: Path) -> ReadTiers | None:
-    """The reader of a file; None for plain text and other files."""
+    """The reader of a file, by its ending, in other texts by its content; None for plain text and other files."""
     suffix = path.suffix.lower()
-    if suffix == LABEL_SUFFIX and not is_label_file(read_text(path)):
+    if suffix in PLAIN_SUFFIXES:
         return None
-    if suffix in READERS:
+    if suffix in READERS and suffix not in BY_CONTENT:
         return READERS[suffix]
-    return find_reader_of_text(read_text(path)) if suffix == TEXT_SUFFIX else None
+    text = read_text(path)
+    if suffix in {".lab", ".rec"} and is_label_file(text):
+        return read_lab
+    return find_reader_of_text(text)
 
 
 def find_reader_of_text(text: str) -> ReadTiers | None:

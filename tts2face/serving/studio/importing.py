@@ -12,11 +12,12 @@ from lexicon.errors import DataError, InputError
 from lexicon.values.json_text import parse_json
 from tts2face.gestures.elements import StyleSpan
 from tts2face.gestures.timeline import Timeline
-from tts2face.interchange.subtitles.formats import SUFFIXES
+from tts2face.interchange.subtitles.decoding import read_text
+from tts2face.interchange.subtitles.formats import SUFFIXES, is_subtitle_text
 from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.interchange.subtitles.reader import read_subtitles
-from tts2face.interchange.transcripts.reader import READERS, find_reader, find_reader_of_text, read_transcript
-from tts2face.interchange.transcripts.spoken import Transcript
+from tts2face.interchange.transcripts.reader import PLAIN_SUFFIXES, READERS, find_reader_of_text
+from tts2face.interchange.transcripts.written_words import BY_LINES, WrittenWords, read_written_words
 from tts2face.request import Request
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
@@ -31,8 +32,7 @@ SOUND_SUFFIXES = (
     ".wav", ".mp3", ".ogg", ".oga", ".opus", ".flac", ".aac", ".m4a", ".mp4", ".mov", ".webm", ".mkv", ".aiff",
     ".ts", ".mpg", ".mpeg", ".avi", ".m4v", ".ac3", ".wma", ".caf",
 )  # fmt: skip
-PLAIN_SUFFIXES = (".ssml", ".md")
-TEXT_SUFFIXES = (".txt", *PLAIN_SUFFIXES)
+TEXT_SUFFIXES = (".txt", ".ssml", ".md")
 RECORDING = "recording.wav"
 SAMPLE_TEXT = "Hello! This face was learnt from a real talker. Paint a style on the timeline, and watch it change."
 SAMPLE_TIMELINE = Timeline(
@@ -94,16 +94,20 @@ async def import_file(
     suffix, title = Path(name).suffix.lower(), _title(Path(name).stem)
     if suffix == ".json":
         return Imported(await _import_project(studio, key, path))
-    if suffix in READERS or suffix in TEXT_SUFFIXES:
+    is_text = suffix in READERS or suffix in TEXT_SUFFIXES
+    is_by_lines = is_text and suffix not in PLAIN_SUFFIXES and await asyncio.to_thread(_holds_subtitles, path, name)
+    if is_text and not is_by_lines:
         words = await asyncio.to_thread(_timed_words, path, name, choices.tier)
         if words is not None:
             return Imported(await import_text(studio, key, words.text, title), words.notes)
         return Imported(await import_text(studio, key, _read_text(path, name), title))
-    if suffix in SUFFIXES:
+    if suffix in SUFFIXES or is_by_lines:
+        suffix = suffix if suffix in SUFFIXES else ".srt"  # the content tells which subtitles
         async with _decoded(studio.state, key, (SUBTITLES, path, suffix), choices.encoding) as (checked, _):
             read = await asyncio.to_thread(read_subtitles, checked, choices.encoding, choices.subtitles)
         text = "\n".join(cue.text for cue in read.cues if cue.text)
-        notes = tuple(f"line {note.line}: {note.message}" for note in (*read.warnings, *read.notes))
+        stated = (BY_LINES,) if is_by_lines else ()
+        notes = (*stated, *(f"line {note.line}: {note.message}" for note in (*read.warnings, *read.notes)))
         return Imported(await import_text(studio, key, text, title), notes)
     if suffix in SOUND_SUFFIXES:
         async with _decoded(studio.state, key, (SOUND, path, ".wav")) as (checked, guessed):
@@ -114,7 +118,16 @@ async def import_file(
     raise InputError(f"a file {name[-40:]!r} cannot be imported; give one that ends in {', '.join(kinds)}")
 
 
-def _timed_words(path: Path, name: str, tier: str | None) -> Transcript | None:
+def _holds_subtitles(path: Path, name: str) -> bool:
+    """Whether the lines of an uploaded text are those of subtitles."""
+    _check_size(path, name)
+    try:
+        return Path(name).suffix.lower() not in READERS and is_subtitle_text(read_text(path))
+    except DataError:
+        return False  # said where it is read
+
+
+def _timed_words(path: Path, name: str, tier: str | None) -> WrittenWords | None:
     """Words of an uploaded file of another program; None for plain text."""
     _check_size(path, name)
     suffix = Path(name).suffix.lower()
@@ -122,15 +135,15 @@ def _timed_words(path: Path, name: str, tier: str | None) -> Transcript | None:
         named = Path(folder, f"transcript{suffix}")
         shutil.copyfile(path, named)
         try:
-            return None if suffix in PLAIN_SUFFIXES or find_reader(named) is None else read_transcript(named, tier)
+            return read_written_words(named, tier)
         except (DataError, InputError) as wrong:
             # the place on the server is nobody's business
             raise InputError(str(wrong).replace(str(named), name[-40:])) from wrong
 
 
-def _words_of_text(text: str, tier: str | None) -> Transcript | None:
-    """Words of a text that is a table of labels or a TextGrid; None for plain text."""
-    if find_reader_of_text(text) is None:
+def _words_of_text(text: str, tier: str | None) -> WrittenWords | None:
+    """Words of a text that is a table of labels, a TextGrid or subtitles; None for plain text."""
+    if find_reader_of_text(text) is None and not is_subtitle_text(text):
         return None
     with tempfile.TemporaryDirectory(prefix="tts2face-upload-") as folder:
         path = Path(folder, "transcript.txt")
