@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from corpus_tools.recordings.subtitle_cues import find_subtitles, read_cues, subtitle_notes
-from corpus_tools.recordings.transcripts import WrittenWords, find_transcript, passed_over, read_transcript
+from corpus_tools.recordings.transcripts import find_transcript, passed_over, read_transcript
 from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import DataError, InputError
 from lexicon.function_words import fitting_forms
 from lexicon.normalize import normalize
 from lexicon.values.tables import read_table
 from tts2face.interchange.subtitles.film_track import has_text_track
+from tts2face.interchange.transcripts.written_words import WrittenWords
 from tts2face.sound.word_lattice import PronouncedWords, Pronunciations
 
 VIDEO_SUFFIXES = frozenset({".mkv", ".mp4", ".mov", ".webm", ".avi", ".mpg", ".mpeg", ".m4v", ".ts", ".mts"})
