@@ -3,12 +3,12 @@
 import asyncio
 import json
 import random
-import re
 from collections import Counter
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import httpx
 import websockets
@@ -40,14 +40,20 @@ class Soak:
     rng: random.Random = field(default_factory=lambda: random.Random(SEED))
     statuses: Counter[tuple[str, int]] = field(default_factory=Counter)
     jobs: list[str] = field(default_factory=list)
+    begun: set[asyncio.Task[Any] | None] = field(default_factory=set)  # whose answer has a whole head
+
+    async def note_begun(self, _: httpx.Response) -> None:
+        """Note that the answer to the request of the present task has begun."""
+        self.begun.add(asyncio.current_task())
 
     async def one(self, client: Client, name: str) -> None:
         """One request of `KINDS`; a client that vanishes has the status 0."""
+        self.begun.discard(asyncio.current_task())
         try:
             status = await KINDS[name][1](self, client)
         except (httpx.HTTPError, OSError, websockets.WebSocketException) as error:
-            # h11 has two sentences: for an end within a chunk, and for one within the line before it
-            is_cut = isinstance(error, httpx.RemoteProtocolError) and re.search("incomplete|unexpectedly", str(error))
+            # an answer that fails ends within the trailer that says why, one of a killed server anywhere in its body
+            is_cut = isinstance(error, httpx.RemoteProtocolError) and asyncio.current_task() in self.begun
             status = CUT if is_cut else LOST
             print(f"  {name}: {error!r}", flush=True)
         self.statuses[name, status] += 1
@@ -136,7 +142,8 @@ KINDS: Mapping[str, tuple[float, Callable[[Soak, Client], Awaitable[int]], set[i
 
 def client_of(soak: Soak) -> Client:
     limits = httpx.Limits(max_connections=AT_ONCE, max_keepalive_connections=0)
-    return Client(base_url=soak.server.url, limits=limits, timeout=300)
+    hooks = {"response": [soak.note_begun]}
+    return Client(base_url=soak.server.url, limits=limits, timeout=300, event_hooks=hooks)
 
 
 async def drive(soak: Soak, n: int) -> None:
