@@ -10,6 +10,8 @@ from parselmouth.praat import call
 
 from lexicon.errors import DataError
 from tests.interchange.transcripts.grids import PHONES, WORDS, textgrid
+from tts2face.interchange.transcripts.file_text import MAX_BYTES
+from tts2face.interchange.transcripts.reader import read_transcript
 from tts2face.interchange.transcripts.textgrid import read_textgrid
 
 pytestmark = pytest.mark.formats
@@ -139,3 +141,18 @@ def test_a_binary_file_that_is_cut_is_damaged(tmp_path):
         (tmp_path / "b.TextGrid").write_bytes(whole[:length])
         with pytest.raises(DataError, match="damaged TextGrid: it ends early"):
             read_textgrid(tmp_path / "b.TextGrid")
+
+
+@pytest.mark.parametrize("name", ["v.TextGrid", "v.txt"])
+def test_a_textgrid_may_be_longer_than_subtitles(name, tmp_path):
+    (tmp_path / name).write_text(textgrid(words=WORDS) + "\n" * (9 << 20))
+    assert read_transcript(tmp_path / name).text == "bin red by k seven now"
+
+
+@pytest.mark.parametrize("head", [textgrid(words=WORDS).encode(), b"ooBinaryFile\x08TextGrid"])
+def test_a_textgrid_of_any_length_is_not_read(head, tmp_path):
+    with (tmp_path / "v.TextGrid").open("wb") as file:
+        file.write(head)
+        file.truncate(MAX_BYTES + 100)
+    with pytest.raises(DataError, match=r"v\.TextGrid is larger than 64 MiB"):
+        read_textgrid(tmp_path / "v.TextGrid")

@@ -148,7 +148,7 @@ def test_words_of_other_programs_are_imported(studio: TestClient) -> None:
     table = "0.5\t0.9\tbin\n0.9\t1.2\tred\n"
     found = {}
     for name, content, choices in (
-        ("a.TextGrid", grid, {}), ("a.txt", grid, {"tier": "Ben words"}), ("b.txt", table, {}),
+        ("a.TextGrid", grid + "\n" * 2_000_000, {}), ("a.txt", grid, {"tier": "Ben words"}), ("b.txt", table, {}),
         ("c.txt", "bin red", {}), ("d.txt", "1\n00:00:01,000 --> 00:00:02,000\nbin red\n", {}),
         ("e.tsv", "start\tend\ttext\n0\t1500\tbin red\n", {}),
     ):  # fmt: skip

@@ -31,7 +31,9 @@ def read_text(path: Path, encoding: str | None = None, language: str | None = No
     return decode_file(path, encoding, language).text
 
 
-def decode_file(path: Path, encoding: str | None = None, language: str | None = None) -> Decoded:
+def decode_file(
+    path: Path, encoding: str | None = None, language: str | None = None, *, max_bytes: int = MAX_BYTES
+) -> Decoded:
     """Characters of a text file: by its byte order mark, else as UTF-8 or UTF-16, else in the likely encoding.
 
     Parameters
@@ -40,15 +42,17 @@ def decode_file(path: Path, encoding: str | None = None, language: str | None = 
         Encoding of files without a byte order mark that are not UTF-8, such as ``cp1250``; None: it is guessed.
     language
         Language of the words, where it is known, which decides the guess.
+    max_bytes
+        Size above which a file is refused.
     """
     check_regular_file(path)
     try:
         with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
+            content = file.read(max_bytes + 1)
     except OSError as refused:
         raise DataError(f"{path} cannot be read ({refused.strerror}); check the file") from refused
-    if len(content) > MAX_BYTES:
-        raise DataError(f"{path} is larger than {MAX_BYTES >> 20} MiB; give the transcript only")
+    if len(content) > max_bytes:
+        raise DataError(f"{path} is larger than {max_bytes >> 20} MiB; give the transcript only")
     decoded = _decode(content, path, encoding, language)
     if "\0" in decoded.text:
         raise DataError(f"{path} is not text (it contains zero bytes); save it as UTF-8")

@@ -5,7 +5,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from lexicon.errors import DataError
-from tts2face.interchange.subtitles.decoding import read_text
+from tts2face.interchange.transcripts.file_text import read_text
 
 _DOCTYPE = re.compile(r"<!(?:DOCTYPE|ENTITY)", re.IGNORECASE)
 _DECLARATION = re.compile(r"^\s*<\?xml[^>]*\?>")

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from lexicon.errors import DataError
-from tts2face.interchange.subtitles.decoding import read_text
+from tts2face.interchange.transcripts.file_text import read_text
 from tts2face.interchange.transcripts.slots import interpolated
 from tts2face.interchange.transcripts.spoken import SpokenCue, Tier
 

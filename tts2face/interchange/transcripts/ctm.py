@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from lexicon.errors import DataError
-from tts2face.interchange.subtitles.decoding import read_text
+from tts2face.interchange.transcripts.file_text import read_text
 from tts2face.interchange.transcripts.spoken import SpokenCue, Tier
 
 N_FIELDS = 5  # a sixth is the confidence

@@ -5,7 +5,7 @@ from pathlib import Path
 from statistics import median
 
 from lexicon.errors import DataError
-from tts2face.interchange.subtitles.decoding import read_text
+from tts2face.interchange.transcripts.file_text import read_text
 from tts2face.interchange.transcripts.spoken import SpokenCue, Tier
 
 UNITS_PER_S = 25_000  # Cooke et al. 2006: samples of the 25 kHz sound

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lexicon.errors import DataError
-from tts2face.interchange.subtitles.decoding import read_text
+from tts2face.interchange.transcripts.file_text import read_text
 from tts2face.interchange.transcripts.spoken import SpokenCue, Tier
 from tts2face.interchange.transcripts.tiers import has_phones
 

@@ -8,7 +8,7 @@ from statistics import median
 
 from lexicon.dictionary import word_set
 from lexicon.errors import DataError
-from tts2face.interchange.subtitles.decoding import read_text
+from tts2face.interchange.transcripts.file_text import read_text
 from tts2face.interchange.transcripts.spoken import SpokenCue, Tier
 
 MAX_WORD_S = 5.0  # of half of the words, in seconds; whole numbers above are milliseconds

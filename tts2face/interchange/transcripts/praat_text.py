@@ -12,7 +12,8 @@ Item = str | float
 # Melder_atof of Praat: a number may have a percent sign, a fraction bar, and letters behind it
 _NUMBER = re.compile(r"[+-]?\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?(?![eE])")
 _ITEM = re.compile(
-    r'"(?P<text>(?:[^"]|"")*)"(?!\S)|(?P<open>")|![^\n]*|(?P<flag><[^>\s]*>)|(?P<number>[-\d][^\s;]*|\+[^\s;]+)|\S+'
+    r'"(?P<text>(?:[^"]|"")*)"(?!\S)|(?P<open>")|![^\n]*|(?P<flag><[^>\s]*>)|(?P<number>[-\d][^\s;]*|\+[^\s;]+)'
+    r'|(?:[^\s\d"!<+-]\S*+\s*+)++|\S+'
 )
 
 

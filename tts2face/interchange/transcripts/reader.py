@@ -15,11 +15,11 @@ from pathlib import Path
 from types import MappingProxyType
 
 from lexicon.errors import DataError
-from tts2face.interchange.subtitles.decoding import decode_file, read_text
 from tts2face.interchange.transcripts.chat import read_cha
 from tts2face.interchange.transcripts.ctm import read_ctm
 from tts2face.interchange.transcripts.elan import read_eaf
 from tts2face.interchange.transcripts.exmaralda import read_exb
+from tts2face.interchange.transcripts.file_text import decode_text, read_text
 from tts2face.interchange.transcripts.grid_align import read_align
 from tts2face.interchange.transcripts.htk import is_label_file, is_unnamed_label_file, read_lab
 from tts2face.interchange.transcripts.label_table import is_label_table, read_label_table
@@ -105,7 +105,7 @@ def read_transcript(path: Path, tier: str | None = None) -> Transcript:
 def encoding_note(path: Path) -> str:
     """A sentence about the encoding of a text, if it was guessed; empty if it was not."""
     try:
-        decoded = decode_file(path)
+        decoded = decode_text(path)
     except DataError:
         return ""  # a binary TextGrid; what cannot be read is said where it is read
     if not decoded.is_guess:

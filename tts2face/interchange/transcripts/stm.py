@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 from lexicon.errors import DataError
-from tts2face.interchange.subtitles.decoding import read_text
 from tts2face.interchange.transcripts.ctm import tiers_of_file
+from tts2face.interchange.transcripts.file_text import read_text
 from tts2face.interchange.transcripts.silence import without_variants
 from tts2face.interchange.transcripts.spoken import SpokenCue, Tier
 

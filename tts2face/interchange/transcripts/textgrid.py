@@ -7,7 +7,7 @@ from pathlib import Path
 
 from lexicon.errors import DataError
 from lexicon.values.files import check_regular_file
-from tts2face.interchange.subtitles.decoding import MAX_BYTES, read_text
+from tts2face.interchange.transcripts.file_text import MAX_BYTES, read_text
 from tts2face.interchange.transcripts.praat_text import DamagedError, PraatItems
 from tts2face.interchange.transcripts.spoken import SpokenCue, Tier
 
@@ -113,9 +113,12 @@ def _read_binary(path: Path) -> bytes | None:
         with path.open("rb") as file:
             if file.read(len(BINARY_MARK)) != BINARY_MARK:
                 return None
-            return file.read(MAX_BYTES)
+            content = file.read(MAX_BYTES + 1)
     except OSError as refused:
         raise DataError(f"{path} cannot be read ({refused.strerror}); check the file") from refused
+    if len(content) > MAX_BYTES:
+        raise DataError(f"{path} is larger than {MAX_BYTES >> 20} MiB; divide it")
+    return content
 
 
 class _Bytes:

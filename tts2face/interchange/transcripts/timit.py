@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from lexicon.errors import DataError
-from tts2face.interchange.subtitles.decoding import read_text
+from tts2face.interchange.transcripts.file_text import read_text
 from tts2face.interchange.transcripts.spoken import SpokenCue, Tier
 
 RATE = 16_000  # Hz; Garofolo et al. 1993

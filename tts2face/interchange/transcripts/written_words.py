@@ -6,9 +6,9 @@ from pathlib import Path
 
 from lexicon.errors import DataError, InputError
 from tts2face.interchange.subtitles.cues import Subtitles
-from tts2face.interchange.subtitles.decoding import read_text
 from tts2face.interchange.subtitles.formats import FILM_SUFFIXES, SUFFIXES, is_subtitle_text
 from tts2face.interchange.subtitles.reader import read_subtitles
+from tts2face.interchange.transcripts.file_text import read_text
 from tts2face.interchange.transcripts.reader import PLAIN_SUFFIXES, READERS, find_reader, read_transcript
 
 BY_LINES = "holds subtitles by its lines, whose times are not words"

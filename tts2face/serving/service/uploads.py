@@ -24,6 +24,7 @@ RESOURCE_TIMEOUT_S = 300.0  # a check takes 3 to 7 s; with other work on the mac
 UPLOAD_PREFIX = "tts2face-upload-"  # of names of private folders
 # of transcripts, subtitles and tables
 MAX_TEXT_BYTES = 1_000_000
+MAX_TRANSCRIPT_BYTES = 4_000_000  # half an hour of speech with the times of its phones is 2.8 MB
 # read at a time
 BLOCK_BYTES = 1 << 20
 
@@ -55,12 +56,12 @@ class UploadFolder:
         """Decoded picture of an upload, a .png file; errors as `sound`."""
         return await self._decode(PICTURE, name, upload, ".png", self.settings.upload_pixels)
 
-    async def text(self, name: str, upload: UploadFile, suffix: str) -> Path:
-        """Text of an upload, at most `MAX_TEXT_BYTES`; its reader checks it."""
+    async def text(self, name: str, upload: UploadFile, suffix: str, max_bytes: int = MAX_TEXT_BYTES) -> Path:
+        """Text of an upload, at most `max_bytes`; its reader checks it."""
         path = self.path / f"{name}{suffix}"
-        content = await upload.read(MAX_TEXT_BYTES + 1)
-        if len(content) > MAX_TEXT_BYTES:
-            raise RefusedError(413, "too_large", f"{name} has more than {MAX_TEXT_BYTES} bytes; send less")
+        content = await upload.read(max_bytes + 1)
+        if len(content) > max_bytes:
+            raise RefusedError(413, "too_large", f"{name} has more than {max_bytes} bytes; send less")
         path.write_bytes(content)
         return path
 

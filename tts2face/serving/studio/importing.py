@@ -22,7 +22,7 @@ from tts2face.request import Request
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.state import ServiceState
-from tts2face.serving.service.uploads import MAX_TEXT_BYTES
+from tts2face.serving.service.uploads import MAX_TEXT_BYTES, MAX_TRANSCRIPT_BYTES
 from tts2face.serving.studio.requests import check_project
 from tts2face.serving.studio.studio_host import StudioHost
 from tts2face.serving.work.uploaded_file import SOUND, SUBTITLES, FileOrder
@@ -187,8 +187,9 @@ async def _decoded(
 
 
 def _check_size(path: Path, name: str) -> None:
-    if path.stat().st_size > MAX_TEXT_BYTES:
-        raise InputError(f"{name[-40:]} has more than {MAX_TEXT_BYTES} bytes; divide it")
+    limit = MAX_TRANSCRIPT_BYTES if Path(name).suffix.lower() in READERS else MAX_TEXT_BYTES
+    if path.stat().st_size > limit:
+        raise InputError(f"{name[-40:]} has more than {limit} bytes; divide it")
 
 
 def _read_text(path: Path, name: str) -> str:

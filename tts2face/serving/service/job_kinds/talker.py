@@ -11,6 +11,7 @@ from starlette.datastructures import UploadFile
 from tts2face.models.consent import states_consent
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.job_kinds.order import FormPart, JobKind, JobOrder
+from tts2face.serving.service.uploads import MAX_TRANSCRIPT_BYTES
 from tts2face.serving.work.client import JobClient
 from tts2face.serving.work.jobs import OPEN_STATES
 from tts2face.serving.work.resource_check import TALKER
@@ -65,7 +66,7 @@ async def add_words(order: JobOrder, part: str, file: UploadFile, number: int) -
     if number > 1 or {f"{RECORDING}.txt", *(f"{RECORDING}{suffix}" for suffix in SUBTITLE_SUFFIXES)} & set(files):
         raise RefusedError(422, "invalid_request", "there are words twice; send a transcript, or subtitles")
     if part == "transcript":
-        files[f"{RECORDING}.txt"] = await folder.text(part, file, ".txt")
+        files[f"{RECORDING}.txt"] = await folder.text(part, file, ".txt", MAX_TRANSCRIPT_BYTES)
         return
     # a byte order mark may stand before WEBVTT
     suffix = ".vtt" if (await file.read(6)).lstrip(b"\xef\xbb\xbf").startswith(b"WEB") else ".srt"
