@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from tts2face.interchange.subtitles.decoding import Decoded, decode_file
+from tts2face.interchange.subtitles.decoding import decode_file
+from tts2face.interchange.subtitles.encodings import Decoded
 
 # two hours with words and phones are 11 MB in Praat's long form, 22 MB in UTF-16; .4 s each MB
 MAX_BYTES = 64 << 20
