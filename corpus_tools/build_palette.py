@@ -18,7 +18,7 @@ from corpus_tools.decomposition.blend_weights import (
 )
 from corpus_tools.decomposition.capture import FaceRecording
 from corpus_tools.decomposition.capture_files import MarkerOptions
-from corpus_tools.decomposition.decompose import Decomposition, decompose, weight_displacements
+from corpus_tools.decomposition.decompose import LEAST_PIECE_S, Decomposition, decompose, weight_displacements
 from corpus_tools.decomposition.derived_styles import read_derived_styles
 from corpus_tools.decomposition.learnt_style import add_style
 from corpus_tools.decomposition.marker_sets import read_marker_set
@@ -159,12 +159,14 @@ def decompose_recordings(
     estimator: Estimator,
     on_progress: Progress = ignore_progress,
 ) -> list[Decomposition]:
-    """Decompositions of recordings of one person, after correction of pose-dependent errors."""
+    """Decompositions of recordings of one person, between long gaps, after correction of pose-dependent errors."""
     leak = fit_pose_correction(captured)
-    parts = []
+    parts = list[Decomposition]()
     for number, recording in enumerate(captured, start=1):
-        parts.append(decompose(leak.apply(recording), basis, estimator))
+        parts += decompose(leak.apply(recording), basis, estimator).measured_pieces()
         on_progress(number, len(captured))
+    if not parts:
+        raise DataError(f"no recording shows the face for {LEAST_PIECE_S:g} s without a long gap; capture it again")
     return parts
 
 

@@ -10,7 +10,7 @@ from corpus_tools.recordings.sound import SOUND_RATE
 from lexicon.errors import DataError, InputError
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.palette import FEATURES, GESTURE_FPS
-from tts2face.numeric.arrays import FloatArray
+from tts2face.numeric.arrays import FloatArray, Mask
 from tts2face.types import HEAD_CHANNELS, Waveform
 from tts2face.video.media import read_sound
 
@@ -36,6 +36,8 @@ class FaceRecording:
         provides them; otherwise they are computed from landmarks.
     missing
         Features of `tts2face.models.palette.FEATURES` that the source does not contain.
+    left_out : (T,)
+        Frames in which the face is hidden for too long to be interpolated: no style is learnt from them. None: none.
     notes
         Interpolations and assumptions, one sentence each.
     """
@@ -49,6 +51,7 @@ class FaceRecording:
     eyes: NDArray[np.float32] | None = None
     missing_features: frozenset[str] = frozenset()
     notes: tuple[str, ...] = ()
+    left_out: Mask | None = None
 
     def __post_init__(self) -> None:
         """Check the shapes of landmarks and head poses, and the names of features."""
@@ -59,6 +62,8 @@ class FaceRecording:
             )
         if not n_frames or not np.isfinite(self.landmarks).all() or not np.isfinite(self.head).all():
             raise DataError(f"{self.name} has no frame, or frames without a face; record it again")
+        if self.left_out is not None and len(self.left_out) != n_frames:
+            raise DataError(f"{self.name} has {n_frames} frames, not {len(self.left_out)}; record it again")
         unknown = self.missing_features - set(FEATURES)
         if unknown:
             raise InputError(f"there is no feature {sorted(unknown)[0]!r}; gestures consist of {', '.join(FEATURES)}")
@@ -68,13 +73,24 @@ def resample_to_gesture_rate(captured: FaceRecording) -> FaceRecording:
     """The recording at `GESTURE_FPS` frames a second."""
     if abs(captured.fps - GESTURE_FPS) < RATE_TOLERANCE_FPS:
         return captured
+    landmarks = resample(captured.landmarks, captured.fps, GESTURE_FPS).astype(np.float32)
+    is_out = captured.left_out
     return replace(
         captured,
         fps=GESTURE_FPS,
-        landmarks=resample(captured.landmarks, captured.fps, GESTURE_FPS).astype(np.float32),
+        landmarks=landmarks,
         head=resample(captured.head, captured.fps, GESTURE_FPS).astype(np.float32),
         eyes=None if captured.eyes is None else resample(captured.eyes, captured.fps, GESTURE_FPS).astype(np.float32),
+        left_out=None if is_out is None else _resample_mask(is_out, captured.fps, len(landmarks)),
     )
+
+
+def _resample_mask(frames: Mask, fps: float, n_frames: int) -> Mask:
+    """Frames (N,) at `GESTURE_FPS`, True where one of both of `frames` (T,) beside them is."""
+    at = np.arange(n_frames) / GESTURE_FPS * fps
+    low, high = np.floor(at + RATE_TOLERANCE_FPS), np.ceil(at - RATE_TOLERANCE_FPS)
+    last = len(frames) - 1
+    return np.asarray(frames[np.minimum(low, last).astype(int)] | frames[np.minimum(high, last).astype(int)])
 
 
 def resample(values: NDArray[np.floating], fps: float, target_fps: float) -> FloatArray:

@@ -14,6 +14,7 @@ from lexicon.values.fields import check_fields
 from tts2face.face.landmarks import moved_landmarks, rest_landmarks
 from tts2face.lips.performer import match_shapes
 from tts2face.models.face import Face
+from tts2face.numeric.arrays import Mask
 from tts2face.types import Trajectory
 from tts2face.video.livelink import FaceCapture, is_capture_table, read_livelink
 
@@ -69,7 +70,18 @@ def read_livelink_recording(path: Path, face: Face, fps: float | None = None) ->
         eyes=eye_motion(face, motion),
         missing_features=_missing_features(capture),
         notes=capture.notes,
+        left_out=_frames_in_gaps(capture),
     )
+
+
+def _frames_in_gaps(capture: FaceCapture) -> Mask:
+    """Frames (T,) of a capture without a face."""
+    times = capture.weights.times
+    half_frame = 0.5 / capture.weights.fps
+    found: Mask = np.zeros(len(times), np.bool_)
+    for start, end in capture.gaps:
+        found |= (times > start + half_frame) & (times < end - half_frame)
+    return found
 
 
 def eye_motion(face: Face, motion: Trajectory) -> NDArray[np.float32]:

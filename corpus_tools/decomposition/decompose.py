@@ -4,7 +4,7 @@ N is the face at rest, B_i are basis expressions, c_i their slow weights, P the 
 motion of the other regions, R and T the head's pose. Lids and gaze are computed from the residual at the eyes.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,9 @@ from tts2face.models.palette import (
     GESTURE_FPS,
     REGION_FEATURES,
 )
-from tts2face.numeric.arrays import Float32Array, interpolate_columns
+from tts2face.numeric.arrays import Float32Array, Mask, interpolate_columns, true_runs
 
+LEAST_PIECE_S = 1.0  # between gaps: fields compare 10 frames before and 6 after, .53 s together
 TREMOR_SMOOTHING_S = 0.03  # standard deviation of the Gaussian that removes tracking noise from head, brows and cheeks
 # Of tracked lids that touch; first percentile of 40 minutes of one person (docs/gestures.md).
 CLOSED_LID_APERTURE = 0.055
@@ -49,6 +50,8 @@ class Decomposition:
     speech : (T, M, 3)
         P: displacement of `MOUTH_REGION`, mm.
     intensity, pitch : (T,)
+    left_out : (T,)
+        Frames from which nothing is learnt, as in `FaceRecording`.
     """
 
     name: str
@@ -56,6 +59,24 @@ class Decomposition:
     speech: Float32Array
     intensity: Float32Array
     pitch: Float32Array
+    left_out: Mask | None = None
+
+    def measured_pieces(self) -> list["Decomposition"]:
+        """Pieces of at least `LEAST_PIECE_S` without frames that are left out."""
+        if self.left_out is None or not self.left_out.any():
+            return [self]
+        return [
+            replace(
+                self,
+                motion={name: values[start:end] for name, values in self.motion.items()},
+                speech=self.speech[start:end],
+                intensity=self.intensity[start:end],
+                pitch=self.pitch[start:end],
+                left_out=None,
+            )
+            for start, end in true_runs(~self.left_out).tolist()
+            if end - start >= LEAST_PIECE_S * GESTURE_FPS
+        ]
 
 
 def decompose(captured: FaceRecording, basis: ExpressionBasis, estimator: Estimator) -> Decomposition:
@@ -95,6 +116,7 @@ def decompose(captured: FaceRecording, basis: ExpressionBasis, estimator: Estima
         left[:, list(MOUTH_REGION)].astype(np.float32),
         prosody[:, 0],
         prosody[:, 1],
+        recorded.left_out,
     )
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.decomposition.marker_gaps import check_gap
+from corpus_tools.decomposition.marker_gaps import describe_long_gaps, find_long_gaps
 from lexicon.errors import DataError
-from tts2face.numeric.arrays import FloatArray, interpolate_columns
+from tts2face.numeric.arrays import FloatArray, Mask, interpolate_columns
 from tts2face.video.pose import similarity_transforms
 
 MIN_VISIBLE_MARKERS = 3  # markers that show a pose
@@ -28,11 +28,14 @@ class HeadPoses:
         The head's markers about their middle, mm.
     rotations, places : (T, 3, 3), (T, 3)
         ``world = rotations @ head + places``.
+    left_out : (T,)
+        Frames in gaps of the pose that are too long to be filled.
     """
 
     reference: FloatArray
     rotations: FloatArray
     places: FloatArray
+    left_out: Mask
 
     def remove_from(self, points: FloatArray) -> FloatArray:
         """(T, M, 3) points in the head's own axes."""
@@ -60,7 +63,9 @@ def fit_head_poses(
         raise DataError(f"the file has {len(names)} markers of the head; its pose needs at least {MIN_VISIBLE_MARKERS}")
     is_visible = np.asarray(np.isfinite(points).all(axis=2))
     posed = np.asarray(is_visible.sum(axis=1) >= MIN_VISIBLE_MARKERS)
-    check_gap("head's pose", ~posed, fps)
+    if not posed.any():
+        raise DataError("no frame shows three markers of the head; capture it again")
+    left_out = find_long_gaps(~posed, fps)
     head = _first_reference(points, is_visible) if reference is None else reference
     spreads = np.linalg.svd(head - head.mean(axis=0), compute_uv=False)
     if spreads[1] <= MAX_COLLINEAR_RATIO * spreads[0]:
@@ -78,8 +83,12 @@ def fit_head_poses(
         raise DataError(
             f"the head's markers do not move rigidly (deviation {misfit:.1f} mm); list only those on the skull as head"
         )
-    notes = () if posed.all() else (f"the head's pose was interpolated in {int((~posed).sum())} frames",)
-    return HeadPoses(head, *_interpolate_poses(rotations, places, posed)), notes
+    notes = list[str]()
+    if left_out.any():
+        notes.append(describe_long_gaps("head's pose", left_out, fps))
+    if n_filled := int((~posed & ~left_out).sum()):
+        notes.append(f"the head's pose was interpolated in {n_filled} frames")
+    return HeadPoses(head, *_interpolate_poses(rotations, places, posed), left_out), tuple(notes)
 
 
 def _interpolate_poses(

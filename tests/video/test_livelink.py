@@ -69,6 +69,7 @@ def test_a_second_without_a_face_keeps_its_time(tmp_path: Path) -> None:
     times = np.concatenate([FOUR_S[:121], FOUR_S[121:] + 1.0])
     found = read(tmp_path, rows_of(times, [timecode(TEN + time) for time in times]))
     assert len(found.weights) == 300
+    np.testing.assert_allclose(found.gaps, [(2.0, 3.0 + 1 / 60)])
     assert found.notes == ("there is no face from 2.00 to 3.02 s; the pose relaxes there to the take's usual one",)
     values = found.weights.values[:, found.weights.channels.index("jawOpen")]
     assert np.abs(values[:121] - jaw(np.arange(121) / 60)).max() < 1e-6

@@ -6,6 +6,7 @@ A take cannot be made again: what can be read of it is read, and notes say what 
 import csv
 from collections import Counter
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -37,12 +38,14 @@ HEAD_SIGNS = np.array([1.0, -1.0, 1.0])  # as of its eyes: pitch down (EyePitch 
 class FaceCapture:
     """Weights (T, 52) by ARKit name and head pose (T, 6) with zero translation, at a uniform frame rate.
 
-    `notes` say what is missing in the file and what is guessed about it, one sentence each.
+    `notes` say what is missing in the file and what is guessed about it, one sentence each; `gaps` are the times in
+    seconds in which there is no face, from and to.
     """
 
     weights: Trajectory
     head: Trajectory
     notes: tuple[str, ...] = ()
+    gaps: tuple[tuple[float, float], ...] = ()
 
 
 def read_livelink(path: Path, fps: float | None = None) -> FaceCapture:
@@ -215,6 +218,7 @@ def _build_capture(
         Trajectory(channels, moved[:, : len(shapes)], clock.fps),
         Trajectory(HEAD_CHANNELS, pose, clock.fps),
         (*clock.notes, *notes),
+        _long_gaps(clock.times),
     )
 
 
@@ -254,19 +258,25 @@ def _fill_cells(values: FloatArray, times: FloatArray) -> FloatArray:
     return whole
 
 
+def _long_gaps(times: FloatArray) -> tuple[tuple[float, float], ...]:
+    """Times from and to which there is no face for too long to be interpolated."""
+    return tuple((a, b) for a, b in pairwise(times.tolist()) if b - a > MAX_SHORT_GAP_S)
+
+
 def _relax_in_gaps(values: FloatArray, clock: CaptureTimes, notes: list[str]) -> tuple[FloatArray, FloatArray]:
     """Values and times with the take's median pose in gaps that are too long to be interpolated; notes on all gaps."""
     steps = np.diff(clock.times)
+    gaps = _long_gaps(clock.times)
     is_long = steps > MAX_SHORT_GAP_S
     is_short = (steps > GAP_STEPS / clock.fps) & ~is_long
     if is_short.any():
         n_lost = int(np.rint(steps[is_short] * clock.fps - 1).sum())
         at = clock.times[:-1][is_short]
         notes.append(f"frames missing from {at[0]:.2f} s on, which are interpolated: {n_lost}")
-    if not is_long.any():
+    if not gaps:
         return values, clock.times
-    starts, ends = clock.times[:-1][is_long], clock.times[1:][is_long]
-    quoted = ", ".join(f"{a:.2f} to {b:.2f} s" for a, b in list(zip(starts, ends, strict=True))[:MAX_QUOTED])
+    starts, ends = np.array(gaps).T
+    quoted = ", ".join(f"{a:.2f} to {b:.2f} s" for a, b in gaps[:MAX_QUOTED])
     more = f" and {len(starts) - MAX_QUOTED} more" if len(starts) > MAX_QUOTED else ""
     notes.append(f"there is no face from {quoted}{more}; the pose relaxes there to the take's usual one")
     added = np.concatenate([starts + RELAX_S, ends - RELAX_S])

@@ -22,6 +22,7 @@ from tts2face.face.landmarks import moved_landmarks, rest_landmarks
 from tts2face.lips.performer import match_shapes
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_LANDMARKS
+from tts2face.numeric.arrays import true_runs
 from tts2face.types import Trajectory, Waveform
 from tts2face.video.livelink import read_livelink
 
@@ -116,6 +117,18 @@ def test_a_live_link_capture_moves_the_face_with_its_head_and_sound(capture: Pat
     assert np.corrcoef(jaw, -found.landmarks[:, 152, 1])[0, 1] > 0.95
     read = resample_to_gesture_rate(found)
     assert len(read.landmarks) == (len(found.landmarks) + 1) // 2
+
+
+def test_nothing_is_learnt_where_a_capture_has_no_face(face: Face, tmp_path: Path) -> None:
+    times = np.arange(240) / 60 + (np.arange(240) > 120)
+    lines = ["Time,JawOpen,BrowInnerUp", *(f"{time:.4f},{time % 1:.3f},0.1" for time in times)]
+    (tmp_path / "take.csv").write_text("\n".join(lines))
+    found = read_livelink_recording(tmp_path / "take.csv", face)
+    assert found.left_out is not None
+    assert true_runs(found.left_out).tolist() == [[121, 181]]
+    left_out = resample_to_gesture_rate(found).left_out
+    assert left_out is not None
+    assert true_runs(left_out).tolist() == [[61, 91]]
 
 
 def test_sound_of_the_same_name_is_found(tmp_path: Path) -> None:

@@ -75,6 +75,23 @@ def test_a_slow_expression_is_recovered_by_its_weight(basis: ExpressionBasis) ->
     assert np.abs(made.motion["brows"][inner]).max() < 0.3  # mm; the expression moves brows by up to 1 mm
 
 
+@pytest.mark.parametrize("fps", [FPS, 50.0, 120.0])
+def test_frames_in_long_gaps_are_in_no_piece(basis: ExpressionBasis, fps: float) -> None:
+    times = np.arange(round(fps * SECONDS)) / fps
+    left_out = ((times >= 2) & (times < 3.5)) | ((times >= 4) & (times < 5))  # with half a second between them
+    recording = FaceRecording(
+        "made", fps, np.tile(basis.rest, (len(times), 1, 1)).astype(np.float32), np.zeros((len(times), 6), np.float32),
+        left_out=left_out,
+    )  # fmt: skip
+    made = decompose(recording, basis, build_least_squares_estimator(weight_displacements(basis.expressions)))
+    pieces = made.measured_pieces()
+    assert len(pieces) == 2
+    np.testing.assert_allclose([len(piece.intensity) / FPS for piece in pieces], [2.0, 7.0], atol=0.07)
+    for piece in pieces:
+        assert {len(values) for values in (*piece.motion.values(), piece.speech, piece.pitch)} == {len(piece.intensity)}
+    assert replace(made, left_out=np.ones(len(made.intensity), bool)).measured_pieces() == []
+
+
 def test_quick_brows_are_independent_motion_and_no_expression(basis: ExpressionBasis) -> None:
     brows = feature_landmarks("brows")
     raised = 2.0 * np.sin(2 * np.pi * 1.5 * TIMES)

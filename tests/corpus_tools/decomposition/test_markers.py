@@ -97,20 +97,40 @@ def test_gaps_are_filled_and_reported(
     np.testing.assert_allclose(found.head, whole.head, atol=1e-3)
 
 
-def test_a_long_gap_is_refused_with_its_time(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> None:
-    points = made.points.copy()
-    points[120:150, made.names.index("LBRO2")] = np.nan
-    with pytest.raises(DataError, match=r"take\.csv: the marker LBRO2 is hidden for 0\.25 s from 1\.00 s on"):
-        read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, marker_set)
-
-
-def test_a_marker_missing_in_all_frames_is_refused(
-    made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path
+def test_long_gaps_are_left_out_with_their_times(
+    made: Made, whole: FaceRecording, face: Face, marker_set: MarkerSet, tmp_path: Path
 ) -> None:
     points = made.points.copy()
-    points[:, made.names.index("LBRO2")] = np.nan
-    with pytest.raises(DataError, match="LBRO2 is never visible"):
-        read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, marker_set)
+    points[120:150, made.names.index("LBRO2")] = np.nan
+    points[130:160, made.names.index("LIP3")] = np.nan
+    points[:30, made.names.index("JAW1")] = np.nan
+    found = read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, marker_set)
+    assert found.left_out is not None
+    assert true_runs(found.left_out).tolist() == [[0, 30], [120, 160]]
+    advice = ", which is left out: gaps up to 0.2 s are filled"
+    assert f"the marker LBRO2 is hidden from 1.00 to 1.25 s{advice}" in found.notes
+    assert f"the marker LIP3 is hidden from 1.08 to 1.33 s{advice}" in found.notes
+    measured = ~found.left_out
+    assert np.abs(found.landmarks - whole.landmarks)[measured].max() < 1.0  # mm: the median at rest is of other frames
+    assert whole.left_out is not None
+    assert not whole.left_out.any()
+
+
+@pytest.mark.parametrize("share", [1.0, 0.7])
+def test_a_marker_that_is_rarely_seen_counts_as_absent(
+    made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path, share: float
+) -> None:
+    points = made.points.copy()
+    points[: round(share * len(points)), made.names.index("LIP3")] = np.nan
+    rest = at_rest(made, tmp_path / "rest.csv")
+    found = read_marker_recording(write_table(tmp_path / "a.csv", made.names, points), face, marker_set, neutral=rest)
+    one = [number for number, name in enumerate(made.names) if name != "LIP3"]
+    names = tuple(made.names[k] for k in one)
+    wanted = read_marker_recording(
+        write_table(tmp_path / "b.csv", names, made.points[:, one]), face, marker_set, neutral=rest
+    )
+    assert found.notes == ("most frames hide the marker LIP3; its region is interpolated from the others",)
+    np.testing.assert_allclose(found.landmarks, wanted.landmarks, atol=1e-4)
 
 
 def test_a_missing_marker_is_reported_and_a_missing_region_refused(
@@ -166,8 +186,10 @@ def test_a_pose_that_no_three_markers_show_is_interpolated_and_reported(
     assert "the head's pose was interpolated in 10 frames" in found.notes
     assert np.degrees(np.abs(found.head - whole.head)[:, :3]).max() < 0.2  # over 0.08 s
     points[200:240, head[:5]] = np.nan
-    with pytest.raises(DataError, match=r"the head's pose is hidden for 0\.33 s from 1\.67 s on"):
-        read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, marker_set)
+    found = read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, marker_set)
+    assert found.left_out is not None
+    assert true_runs(found.left_out).tolist() == [[200, 240]]
+    assert any(note.startswith("the head's pose is hidden from 1.67 to 2.00 s, which is left") for note in found.notes)
 
 
 def test_two_markers_show_no_head(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> None:
@@ -356,9 +378,10 @@ def test_a_gap_is_bridged_without_overshoot() -> None:
     track = np.zeros((40, 1, 3))
     track[20:] = 1.0
     track[15:25] = np.nan
-    whole, notes = fill_marker_gaps(track, ("A",), 100.0)
-    assert whole.min() >= 0.0
-    assert whole.max() <= 1.0
-    assert notes == ("gaps were filled in A (10 frames)",)
+    found = fill_marker_gaps(track, ("A",), 100.0)
+    assert found.points.min() >= 0.0
+    assert found.points.max() <= 1.0
+    assert found.notes == ("gaps were filled in A (10 frames)",)
+    assert not found.left_out.any()
     assert true_runs(np.isnan(track[:, 0, 0])).tolist() == [[15, 25]]
     assert MAX_MARKER_GAP_S * 100.0 > 10
