@@ -43,13 +43,13 @@ from cli.process import (
 )
 from cli.render import convert, render
 from cli.tool_flags import Tier
-from cli.transcript import TextFile
+from cli.transcript import TextFile, note_transcript_beside
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
 from lexicon.values.files import LARGEST_TEXT_BYTES, decode_utf8, read_bounded
 from tts2face import __version__
 from tts2face.picture.options import Picture
 from tts2face.processes.collection import pause_collection
-from tts2face.request import GESTURES, Request
+from tts2face.request import GESTURES, FromPhones, Recorded, Request
 from tts2face.session.named_models import Models
 from tts2face.storage.temporary import remove_held
 
@@ -178,6 +178,9 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     request = options_from_flags(
         Request, options, text=_read_text(text if text_option is None else text_option, words, is_needed=needs_text)
     )
+    match request.source:
+        case Recorded(audio=audio, lips=FromPhones(text="")) if not quiet:
+            note_transcript_beside(audio)
     speak_options = SpeakOptions(
         out,
         Models(talker, face or "", identity, palette, hair, hair_color),

@@ -1,5 +1,6 @@
 """Words of a file of another program, given with ``--file`` or ``--transcript``."""
 
+import shlex
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,6 +40,18 @@ class TextFile:
             return read_text(self.path)
         _write_notes(self, words.notes)
         return words.text
+
+
+def note_transcript_beside(recording: Path) -> None:
+    """Say that words lie beside a recording, which a command does not take unless they are given."""
+    if not recording.is_file():
+        return
+    from tts2face.interchange.transcripts.beside import find_transcript
+
+    found = find_transcript(recording)
+    if found is not None:
+        given = shlex.quote(str(found))
+        write_message(f"tts2face: note: {found} lies beside the recording: --transcript {given} uses its words")
 
 
 def _write_notes(file: TextFile, notes: Iterable[str]) -> None:

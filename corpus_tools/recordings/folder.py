@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from corpus_tools.recordings.subtitle_cues import find_subtitles, read_cues, subtitle_notes
-from corpus_tools.recordings.transcripts import find_transcript, passed_over, read_transcript
+from corpus_tools.recordings.transcripts import passed_over, read_transcript
 from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import DataError, InputError
 from lexicon.function_words import fitting_forms
 from lexicon.normalize import normalize
 from lexicon.values.tables import read_table
 from tts2face.interchange.subtitles.film_track import has_text_track
+from tts2face.interchange.transcripts.beside import find_transcript
 from tts2face.interchange.transcripts.written_words import WrittenWords
 from tts2face.sound.word_lattice import PronouncedWords, Pronunciations
 
@@ -54,7 +55,7 @@ def find_recordings(folder: Path, tier: str | None = None) -> tuple[Recording, .
 
     Two layouts are supported: ``manifest.csv`` (columns clip, transcript) beside a folder ``clips``, as for the GRID
     corpus, where single letters are names of letters; and videos with subtitles (.srt, .vtt; each cue is a recording)
-    or a transcript (`corpus_tools.recordings.transcripts.SUFFIXES`) of the same name.
+    or a transcript (`tts2face.interchange.transcripts.beside.SUFFIXES`) of the same name.
 
     Parameters
     ----------

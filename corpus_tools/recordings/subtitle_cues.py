@@ -6,14 +6,14 @@ from pathlib import Path
 from lexicon.errors import DataError
 from tts2face.interchange.subtitles.cues import Cue, Subtitles
 from tts2face.interchange.subtitles.film_track import Film, film_facts
-from tts2face.interchange.subtitles.formats import FILM_SUFFIXES, SUFFIXES
+from tts2face.interchange.subtitles.formats import FILM_SUFFIXES
 from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.interchange.subtitles.reader import read_subtitles
+from tts2face.interchange.transcripts.beside import SUBTITLE_SUFFIXES
 from tts2face.interchange.transcripts.reader import TEXT_SUFFIX
 from tts2face.interchange.transcripts.spoken import SpokenCue
 from tts2face.interchange.transcripts.written_words import is_subtitle_file, subtitle_notes_of
 
-SUBTITLE_SUFFIXES = tuple(suffix for suffix in SUFFIXES if suffix != ".xml")  # in order of preference
 OTHER_FILM_SUFFIXES = (".avi", ".mpg", ".mpeg", ".ts")  # beside which subtitles lie
 MAX_JOINED_S = 1.0  # between a word without a length and the next one
 CUE_MARGIN_S = 0.3  # before and after a cue; subtitles are rarely closer to the speech

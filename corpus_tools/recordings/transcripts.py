@@ -1,35 +1,15 @@
-"""Transcripts beside videos: which file of a recording is read, what it says, and which files are passed over."""
+"""Transcripts beside videos: what they say, and which files are passed over."""
 
 from collections.abc import Iterable
 from pathlib import Path
 
-from corpus_tools.recordings.subtitle_cues import SUBTITLE_SUFFIXES, read_cues
-from lexicon.errors import DataError
+from corpus_tools.recordings.subtitle_cues import read_cues
 from tts2face.interchange.subtitles.decoding import read_text
-from tts2face.interchange.transcripts.reader import READERS, TEXT_SUFFIX, encoding_note, find_reader
+from tts2face.interchange.transcripts.beside import SUFFIXES
+from tts2face.interchange.transcripts.reader import encoding_note
 from tts2face.interchange.transcripts.written_words import WrittenWords, is_subtitle_file, read_written_words
 
-# in order of preference: the words of a person before tables of programs
-_FIRST = (TEXT_SUFFIX, ".textgrid", ".align", *SUBTITLE_SUFFIXES)
-SUFFIXES = (*_FIRST, *(suffix for suffix in READERS if suffix not in _FIRST))
-OTHERS_TOO = frozenset({".tsv", ".rec"})  # tables of anything, recordings of television
 MAX_NAMED = 8  # files in a note
-
-
-def find_transcript(video: Path) -> Path | None:
-    """The transcript beside a video, in the order of `SUFFIXES`; None without one."""
-    beside = {path.suffix.lower(): path for path in sorted(video.parent.iterdir()) if path.stem == video.stem}
-    return next((beside[suffix] for suffix in SUFFIXES if suffix in beside and _may_be(beside[suffix])), None)
-
-
-def _may_be(path: Path) -> bool:
-    """Whether a file can be a transcript: of endings of other files, too, the content decides."""
-    if path.suffix.lower() not in OTHERS_TOO:
-        return True
-    try:
-        return find_reader(path) is not None
-    except DataError:
-        return False
 
 
 def read_transcript(transcript: Path, tier: str | None = None) -> WrittenWords:

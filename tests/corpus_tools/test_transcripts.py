@@ -9,9 +9,10 @@ import pytest
 from corpus_tools.recordings.folder import find_recordings, pronounce_recording, recording_notes
 from corpus_tools.recordings.observe import recordings_to_check
 from corpus_tools.recordings.subtitle_cues import find_subtitles, read_cues, subtitle_notes
-from corpus_tools.recordings.transcripts import find_transcript, read_transcript
+from corpus_tools.recordings.transcripts import read_transcript
 from lexicon.errors import DataError
 from tts2face.interchange.subtitles.decoding import MAX_BYTES, read_text
+from tts2face.interchange.transcripts.beside import find_transcript
 from tts2face.interchange.transcripts.reader import READERS
 from tts2face.interchange.transcripts.reader import read_transcript as read_timed
 from tts2face.interchange.transcripts.spoken import SpokenCue

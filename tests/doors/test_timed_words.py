@@ -62,3 +62,29 @@ def test_wrong_tiers_and_files_are_refused(
     assert run(arguments) == 2
     assert reason in capsys.readouterr().err
     assert not (tmp_path / "a.wav").exists()
+
+
+@pytest.mark.parametrize(
+    ("beside", "shown"),
+    [
+        (["a.TextGrid", "a.ctm"], "a.TextGrid"),
+        (["a.txt", "a.TextGrid"], "a.txt"),
+        (["a.vtt"], "a.vtt"),
+        (["a.tsv"], ""),
+        (["b.TextGrid", "a.TextGrid.bak", "a.png"], ""),
+    ],
+)
+def test_words_beside_a_recording_are_named_and_not_taken(
+    beside: list[str], shown: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.wav", *beside):
+        (tmp_path / name).write_text("no table")
+    assert run(["--audio", "a.wav", "--out", "a.mp4"]) == 3
+    said = capsys.readouterr().err
+    note = f"note: {shown} lies beside the recording: --transcript {shown} uses its words"
+    assert (note in said) == bool(shown)
+    assert shown or "lies beside" not in said
+    for words in (["--text", "Hello."], ["--quiet"], ["--audio-map", "network"]):
+        run(["--audio", "a.wav", "--out", "a.mp4", *words])
+        assert "lies beside" not in capsys.readouterr().err
