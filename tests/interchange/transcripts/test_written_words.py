@@ -124,6 +124,22 @@ def test_a_table_of_praat_has_tiers(tmp_path):
     assert read_transcript(tmp_path / "v.txt", "phones").text == "b I n"
 
 
+def test_words_beside_their_phones_are_said_once(tmp_path):
+    rows = (("", "sil"), *(("very", phone) for phone in "veriveri"), ("go", "g"), ("go", "@U"))
+    table = "phone\tstart\tend\tword\n" + "".join(
+        f"{phone}\t{at / 10}\t{(at + 1) / 10}\t{word}\n" for at, (word, phone) in enumerate(rows)
+    )
+    (tmp_path / "v.tsv").write_text(table)
+    found = read_transcript(tmp_path / "v.tsv")
+    assert [(word.text, word.start, word.end) for word in found.words] == [
+        ("very", 0.1, 0.5), ("very", 0.5, 0.9), ("go", 0.9, 1.1),
+    ]  # fmt: skip
+    assert "its tier 'words'; 'phones' is taken for phones or notes" in found.notes[0]
+    (tmp_path / "v.tsv").write_text(table.replace("word", "note"))
+    with pytest.raises(DataError, match="has no tier with words; 'phones' seems to hold phones"):
+        read_transcript(tmp_path / "v.tsv")
+
+
 def test_other_tables_are_no_transcripts(tmp_path):
     (tmp_path / "v.tsv").write_text("timecode\tjawOpen\n0\t0.5\n")
     assert read_written_words(tmp_path / "v.tsv") is None

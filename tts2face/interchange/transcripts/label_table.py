@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 from statistics import median
 
@@ -21,7 +22,9 @@ _FREQUENCIES = re.compile(rf"\\\s*{_NUMBER}\s+{_NUMBER}\s*")
 # names of columns
 _STARTS = word_set("start begin from tmin xmin onset time start_time starttime begin_time start_s start_ms")
 _ENDS = word_set("end stop to tmax xmax offset end_time endtime stop_time end_s end_ms")
-_TEXTS = word_set("text label labels transcript transcription word words utterance sentence value annotation content")
+_WORDS = word_set("word words")
+_TEXTS = word_set("text label labels transcript transcription utterance sentence value annotation content")
+_PHONES = word_set("phone phones phoneme phonemes phon")
 _TIERS = word_set("tier tiername")
 
 
@@ -75,25 +78,44 @@ def _rows(text: str) -> list[tuple[str, SpokenCue]]:
 def _columns(line: str) -> dict[str, int] | None:
     """Places of the columns of a line of names; None for another line."""
     names = [name.strip("\ufeff \"'").lower().replace(" ", "_") for name in line.split("\t")]
-    kinds = {"start": _STARTS, "end": _ENDS, "text": _TEXTS, "tier": _TIERS}
+    kinds = {"start": _STARTS, "end": _ENDS, "word": _WORDS, "text": _TEXTS, "tier": _TIERS, "phone": _PHONES}
     found = {
         kind: next(at for at, name in enumerate(names) if name in of)
         for kind, of in kinds.items()
         if any(name in of for name in names)
     }
-    return found if {"start", "end", "text"} <= set(found) else None
+    text = found.get("word", found.get("text", found.get("phone")))
+    return found | {"text": text} if {"start", "end"} <= set(found) and text is not None else None
 
 
 def _of_columns(lines: Sequence[str], columns: dict[str, int]) -> Iterator[tuple[str, SpokenCue]]:
-    last = max(columns["start"], columns["end"])
-    for line in lines:
-        fields = line.split("\t")
-        if len(fields) <= last:
-            raise ValueError
-        start, end = _number(fields[columns["start"]]), _number(fields[columns["end"]])
-        text = fields[columns["text"]].strip() if columns["text"] < len(fields) else ""
-        tier = fields[columns["tier"]].strip() if columns.get("tier", len(fields)) < len(fields) else ""
-        yield tier, SpokenCue(start, end, text)
+    rows = [line.split("\t") for line in lines]
+    if any(len(row) <= max(columns["start"], columns["end"]) for row in rows):
+        raise ValueError
+
+    def field(row: Sequence[str], kind: str) -> str:
+        at = columns.get(kind, len(row))
+        return row[at].strip() if at < len(row) else ""
+
+    cues = [SpokenCue(_number(field(row, "start")), _number(field(row, "end")), field(row, "text")) for row in rows]
+    phones = [field(row, "phone") for row in rows]
+    if "phone" not in columns:
+        yield from ((field(row, "tier"), cue) for row, cue in zip(rows, cues, strict=True))
+        return
+    yield from (("phones", replace(cue, text=phone)) for cue, phone in zip(cues, phones, strict=True))
+    if columns["text"] != columns["phone"]:
+        yield from (("words", word) for word in _beside_phones(cues, phones))
+
+
+def _beside_phones(cues: Sequence[SpokenCue], phones: Sequence[str]) -> Iterator[SpokenCue]:
+    """Words that stand beside each of their phones, once; said twice, their phones recur."""
+    for _, group in groupby(range(len(cues)), lambda at: cues[at].text):
+        run = list(group)
+        said = [phones[at] for at in run]
+        n_times = next(n for n in range(len(run), 0, -1) if len(run) % n == 0 and said == said[: len(run) // n] * n)
+        length = len(run) // (n_times if cues[run[0]].text else 1)
+        for first in run[::length]:
+            yield SpokenCue(cues[first].start, cues[first + length - 1].end, cues[first].text)
 
 
 def _unnamed(lines: Sequence[str]) -> Iterator[tuple[str, SpokenCue]]:
