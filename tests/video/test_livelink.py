@@ -220,11 +220,14 @@ def with_times(labels: dict[int, str]) -> Callable[[list[list[str]]], list[list[
         (with_times({60: "10:00:00:45.000"}), {ONE_LEFT_OUT}),  # a possible number, a quarter second early
         (with_times({60: "10:00:01:10.000"}), {ONE_LEFT_OUT}),  # and late: no row after it is lost
         (with_times({60: "10:00:09:59.000", 61: "10:00:09:60.000"}), {ONE_LEFT_OUT[:-1] + "2"}),
+        (with_times({3: "10:00:40:10.000"}), {ONE_LEFT_OUT}),  # soon after the first row
+        (with_times({60: "01:00:00:10.000", 61: "10:00:30:00.000"}), {ONE_LEFT_OUT[:-1] + "2"}),
         (with_times({60: "10:00:00:59.000", 61: "10:00:01;00"}), set()),  # one sign of drop frame
         (with_cell(60, "timecode", "600"), {ONE_LEFT_OUT}),
         (with_cell(60, "jawopen", "23"), {"cells that no face can have are left out: JawOpen 23 at 0.98 s"}),
         (with_cell(60, "jawopen", "-1e40"), {"cells that no face can have are left out: JawOpen -1e+40 at 0.98 s"}),
         (with_cell(1, "mouthclose", "99"), {"cells that no face can have are left out: MouthClose 99 at 0.00 s"}),
+        (with_cell(60, "jawopen", "-1.8"), {"cells that no face can have are left out: JawOpen -1.8 at 0.98 s"}),
         (with_cell(60, "headyaw", "7.5"), {"cells that no face can have are left out: HeadYaw 7.5 at 0.98 s"}),
         (with_cell(60, "headroll", "inf"), {"cells without a number, which are interpolated: 1"}),
         (lambda rows: [[*rows[0], ""], *rows[1:]], set()),  # a comma at the end of the heading

@@ -11,6 +11,7 @@ from tts2face.video.timecode import FrameClock
 MAX_SHORT_GAP_S = 0.5  # a longer one hides a word: the pose in it is not interpolated
 MAX_LONG_GAP_S = 60.0  # a longer one is a clock that was set, or another take
 MAX_ASTRAY_END = 2  # rows before the first leap, or after the last one, that are damaged and no take
+MAX_ASTRAY_RUNS = 3  # beside each other, each with times of its own
 STANDARD_RATES = (12.0, 15.0, 24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 90.0, 100.0, 120.0)
 NTSC_RATES = tuple(nominal * 1000 / 1001 for nominal in (24, 30, 48, 60, 120))
 RATE_TOLERANCE = 0.02  # of a rate: a capture of few frames is that far from it
@@ -64,19 +65,29 @@ def _cross_midnight(times: FloatArray, day_s: float) -> FloatArray:
 def _astray(times: FloatArray) -> Mask:
     """Rows (T,) of runs whose times lie far from those on both sides, which fit each other; a row or two at an end."""
     found: Mask = np.zeros(len(times), np.bool_)
-    borders = [0, *(np.flatnonzero(np.abs(np.diff(times)) > MAX_SHORT_GAP_S) + 1).tolist(), len(times)]
-    runs = list(pairwise(borders))
+    if not len(times):
+        return found
+    runs = _runs(times)
+    at = 0
+    while at < len(runs):
+        last = times[runs[at][1] - 1]
+        beyond = runs[at + 2 : at + 2 + MAX_ASTRAY_RUNS]
+        fitting = (number for number, run in enumerate(beyond) if 0 < times[run[0]] - last <= MAX_SHORT_GAP_S)
+        n_astray = next(fitting, -1) + 1
+        if n_astray:
+            found[runs[at][1] : runs[at + 1 + n_astray][0]] = True
+        at += 1 + n_astray
+    kept = np.flatnonzero(~found)
+    runs = _runs(times[kept])
     for first, end in (runs[0], runs[-1]):
         if len(runs) > 1 and end - first <= MAX_ASTRAY_END:
-            found[first:end] = True
-    before = 0  # end of the last run that is not astray
-    for (first, end), (after, _) in pairwise(runs):
-        inside = times[first:end]
-        if before and 0 < times[after] - times[before - 1] <= MAX_SHORT_GAP_S:
-            found[first:end] |= bool(inside.max() < times[before - 1] or inside.min() > times[after])
-        if not found[first]:
-            before = end
+            found[kept[first:end]] = True
     return found
+
+
+def _runs(times: FloatArray) -> list[tuple[int, int]]:
+    """First row and one past the last of each run of times without a leap."""
+    return list(pairwise([0, *(np.flatnonzero(np.abs(np.diff(times)) > MAX_SHORT_GAP_S) + 1).tolist(), len(times)]))
 
 
 def _continue_clock(times: FloatArray, notes: list[str]) -> FloatArray:

@@ -14,6 +14,8 @@ SEEN_WEIGHT = 1e-6  # weights below it say nothing about the unit
 BULK, NEARLY_ALL = 0.75, 0.95  # shares of cells
 WILD_QUANTILE = 0.995  # of weights: twice what it is, within the next two limits, is beyond what the take has
 LEAST_WILD_WEIGHT, MOST_WILD_WEIGHT = 2.0, 10.0
+LEAST_SPIKE = 1.1  # a weight beyond one
+LARGEST_LEAP = 1.0  # of such a weight from those of the rows around
 LARGEST_VALUE = 1e6  # of any shape
 MAX_QUOTED = 2  # cells quoted in a note
 
@@ -30,7 +32,18 @@ def read_weights(cells: FloatArray, is_known: Mask, notes: list[str]) -> FloatAr
         weights, sizes = cells / 100.0, sizes / 100.0
     usual = 2 * float(np.quantile(sizes, WILD_QUANTILE, method="lower"))
     limits = np.where(is_known, np.clip(usual, LEAST_WILD_WEIGHT, MOST_WILD_WEIGHT), LARGEST_VALUE)
-    return np.where(np.abs(weights) > limits, np.nan, weights)
+    return _without_spikes(np.where(np.abs(weights) > limits, np.nan, weights), is_known)
+
+
+def _without_spikes(weights: FloatArray, is_known: Mask) -> FloatArray:
+    """Weights (T, C), NaN where one of ARKit's is large and leaves the median of five rows for a row or two."""
+    rows, columns = np.nonzero((np.abs(weights) > LEAST_SPIKE) & is_known)
+    around = np.clip(rows[:, None] + np.arange(-2, 3), 0, len(weights) - 1)
+    usual = np.nanmedian(weights[around, columns[:, None]], axis=1)
+    is_spike = np.abs(weights[rows, columns] - usual) > LARGEST_LEAP
+    whole = weights.copy()
+    whole[rows[is_spike], columns[is_spike]] = np.nan
+    return whole
 
 
 def read_turns(cells: FloatArray, notes: list[str]) -> FloatArray:
