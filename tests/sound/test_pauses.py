@@ -60,6 +60,14 @@ def test_stretches_cover_the_sound_and_none_is_too_long() -> None:
     assert max(end - begin for begin, end in found) <= 5.0
 
 
+@pytest.mark.parametrize("lengths", [(3.0, 0.31, 2.0, 0.57, 3.013, 0.4, 4.0), (4.007, 0.06, 4.0), (0.9, 0.25) * 40])
+def test_parts_begin_with_a_frame_of_the_whole(lengths: tuple[float, ...]) -> None:
+    found = cut_at_pauses(speech_with_pauses(*lengths), longest=4.99)
+    frames = np.array([start for start, _ in found]) * 50
+    assert frames == pytest.approx(np.round(frames), abs=1e-6)
+    assert max(end - begin for begin, end in found) <= 4.99
+
+
 def test_speech_without_a_pause_is_cut_where_it_is_quietest() -> None:
     sound = speech_with_pauses(4.0, 0.06, 4.0)
     (_, cut), _ = cut_at_pauses(sound, longest=5.0)

@@ -23,6 +23,9 @@ LATEST_ONSET_DB = -20.0  # of the loudest window: speech without silence has no 
 MAX_CLOSURE_S = 0.025  # quiet within a sound that begins: between the burst of a stop and its vowel, within a trill
 MIN_SOUND_S, BREATH_DB = 0.02, -25.0  # what is shorter is a click; a weak sound before silence is a breath
 LONG_PAUSE_S = 1.0  # a pause that may be cut outside of its middle
+FRAMES_PER_S = (
+    50  # of a recogniser, at which sounds are cut: frames of a part are frames of the whole, and its edges too
+)
 MIN_STRETCH_SHARE = 0.5  # least length of a part, relative to the largest one; the last part may be shorter
 
 LOUD_S, LOUD_RANGE_DB = 0.5, 30.0  # what is at most so far below the loudest half second is speech; a slam is shorter
@@ -129,7 +132,7 @@ def speech_onset(sound: Waveform, *, is_recording: bool = False) -> float:
 
 
 def cut_at_pauses(sound: Waveform, longest: float) -> tuple[Span, ...]:
-    """Divide a sound into spans of at most `longest` seconds, cut in the middle of long pauses.
+    """Divide a sound into spans of at most `longest` seconds, cut in the middle of long pauses, between two frames.
 
     Speech without a pause is cut at its quietest time.
 
@@ -147,7 +150,8 @@ def cut_at_pauses(sound: Waveform, longest: float) -> tuple[Span, ...]:
         earliest, latest = cuts[-1] + MIN_STRETCH_SHARE * longest, cuts[-1] + longest
         middles = [(end - start, _place_in(start, end, earliest, latest)) for start, end in found]
         middles = [(length, place) for length, place in middles if earliest <= place <= latest]
-        cuts.append(max(middles)[1] if middles else _quietest_instant(levels, earliest, latest))
+        place = max(middles)[1] if middles else _quietest_instant(levels, earliest, latest)
+        cuts.append(min(round(place * FRAMES_PER_S), int(latest * FRAMES_PER_S + 1e-6)) / FRAMES_PER_S)
     cuts.append(sound.duration)
     return tuple(pairwise(cuts))
 
