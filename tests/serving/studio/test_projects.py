@@ -150,6 +150,7 @@ def test_words_of_other_programs_are_imported(studio: TestClient) -> None:
     for name, content, choices in (
         ("a.TextGrid", grid + "\n" * 2_000_000, {}), ("a.txt", grid, {"tier": "Ben words"}), ("b.txt", table, {}),
         ("c.txt", "bin red", {}), ("d.txt", "1\n00:00:01,000 --> 00:00:02,000\nbin red\n", {}),
+        ("f.json", '{"segments": [{"start": 0, "end": 1, "text": " bin red"}]}', {}),
         ("e.tsv", "start\tend\ttext\n0\t1500\tbin red\n", {}),
     ):  # fmt: skip
         answer = studio.post("/api/imports", files={"file": (name, content.encode())}, data=choices).json()
@@ -160,6 +161,7 @@ def test_words_of_other_programs_are_imported(studio: TestClient) -> None:
         ("hello", 0),
         ("bin red", 0),
         ("bin red", 0),
+        ("bin red", 1),
         ("bin red", 1),
         ("bin red", 2),
     ]

@@ -10,7 +10,7 @@ SUBTITLE_SUFFIXES = tuple(suffix for suffix in ALL_SUBTITLES if suffix != ".xml"
 # in order of preference: the words of a person before tables of programs
 _FIRST = (TEXT_SUFFIX, ".textgrid", ".align", *SUBTITLE_SUFFIXES)
 SUFFIXES = (*_FIRST, *(suffix for suffix in READERS if suffix not in _FIRST))
-OTHERS_TOO = frozenset({".tsv", ".rec"})  # tables of anything, recordings of television
+OTHERS_TOO = frozenset({".tsv", ".json", ".rec"})  # tables and facts of anything, recordings of television
 
 
 def find_transcript(recording: Path) -> Path | None:

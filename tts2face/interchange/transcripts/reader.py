@@ -23,6 +23,7 @@ from tts2face.interchange.transcripts.file_text import decode_text, read_text
 from tts2face.interchange.transcripts.grid_align import read_align
 from tts2face.interchange.transcripts.htk import is_label_file, is_unnamed_label_file, read_lab
 from tts2face.interchange.transcripts.label_table import is_label_table, read_label_table
+from tts2face.interchange.transcripts.recogniser_json import is_recogniser_json, read_recogniser_json
 from tts2face.interchange.transcripts.silence import spoken_label
 from tts2face.interchange.transcripts.speakers import without_speakers
 from tts2face.interchange.transcripts.spoken import SpokenCue, Tier, Transcript
@@ -33,7 +34,7 @@ from tts2face.interchange.transcripts.timit import is_timit_prompt, read_timit
 from tts2face.interchange.transcripts.utterances import shared_words
 
 TEXT_SUFFIX = ".txt"
-BY_CONTENT = frozenset({".lab", ".rec", ".tsv"})  # also plain words, as the Montreal Forced Aligner reads .lab
+BY_CONTENT = frozenset({".lab", ".rec", ".tsv", ".json"})  # also plain words, as the Montreal Forced Aligner reads .lab
 PLAIN_SUFFIXES = frozenset({"", ".ssml", ".md", ".xml"})  # of texts to speak, whatever their lines look like
 OVERLAP_S = 1e-3  # edges that differ by less are one edge, rounded twice
 MAX_NAMED = 6  # labels in a note
@@ -51,6 +52,7 @@ READERS: Mapping[str, ReadTiers] = MappingProxyType(
         ".lab": read_lab,
         ".rec": read_lab,
         ".tsv": read_label_table,
+        ".json": read_recogniser_json,
     }
 )
 _MARKS: Mapping[str, ReadTiers] = MappingProxyType(
@@ -136,6 +138,8 @@ def find_reader_of_text(text: str) -> ReadTiers | None:
             return read
     if is_timit_prompt(text):
         return read_timit
+    if is_recogniser_json(text):
+        return read_recogniser_json
     if is_unnamed_label_file(text):
         return read_lab
     return read_label_table if is_label_table(text) else None

@@ -9,7 +9,7 @@ from tts2face.interchange.subtitles.cues import Subtitles
 from tts2face.interchange.subtitles.formats import FILM_SUFFIXES, SUFFIXES, is_subtitle_text
 from tts2face.interchange.subtitles.reader import read_subtitles
 from tts2face.interchange.transcripts.file_text import read_text
-from tts2face.interchange.transcripts.reader import PLAIN_SUFFIXES, READERS, find_reader, read_transcript
+from tts2face.interchange.transcripts.reader import BY_CONTENT, PLAIN_SUFFIXES, READERS, find_reader, read_transcript
 
 BY_LINES = "holds subtitles by its lines, whose times are not words"
 
@@ -53,7 +53,7 @@ def is_subtitle_file(path: Path) -> bool:
     suffix = path.suffix.lower()
     if suffix in SUFFIXES:
         return suffix not in PLAIN_SUFFIXES
-    if suffix in READERS or suffix in PLAIN_SUFFIXES:
+    if suffix in PLAIN_SUFFIXES or (suffix in READERS and suffix not in BY_CONTENT):
         return False
     try:
         text = read_text(path)

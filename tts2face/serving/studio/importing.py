@@ -92,7 +92,7 @@ async def import_file(
         Its name at the client.
     """
     suffix, title = Path(name).suffix.lower(), _title(Path(name).stem)
-    if suffix == ".json":
+    if suffix == ".json" and not await asyncio.to_thread(_holds_words, path, name):
         return Imported(await _import_project(studio, key, path))
     is_text = suffix in READERS or suffix in TEXT_SUFFIXES
     is_by_lines = is_text and suffix not in PLAIN_SUFFIXES and await asyncio.to_thread(_holds_subtitles, path, name)
@@ -114,7 +114,7 @@ async def import_file(
             words = await asyncio.to_thread(_words_of_text, choices.transcript, choices.tier)
             text, notes = (choices.transcript, ()) if words is None else (words.text, words.notes)
             return Imported(await add_recording(studio, key, checked, title, text), (*guessed, *notes))
-    kinds = (*TEXT_SUFFIXES, *READERS, *SUFFIXES, *SOUND_SUFFIXES, ".json")
+    kinds = (*TEXT_SUFFIXES, *READERS, *SUFFIXES, *SOUND_SUFFIXES)
     raise InputError(f"a file {name[-40:]!r} cannot be imported; give one that ends in {', '.join(kinds)}")
 
 
@@ -123,6 +123,15 @@ def _holds_subtitles(path: Path, name: str) -> bool:
     _check_size(path, name)
     try:
         return Path(name).suffix.lower() not in READERS and is_subtitle_text(read_text(path))
+    except DataError:
+        return False  # said where it is read
+
+
+def _holds_words(path: Path, name: str) -> bool:
+    """Whether an uploaded JSON is that of a recogniser of speech, and no project."""
+    _check_size(path, name)
+    try:
+        return find_reader_of_text(read_text(path)) is not None
     except DataError:
         return False  # said where it is read
 
