@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lexicon.errors import DataError
-from tts2face.interchange.subtitles.cues import Cue, Subtitles
+from tts2face.interchange.subtitles.cues import Cue, Subtitles, without_options
 from tts2face.interchange.subtitles.film_track import Film, film_facts
 from tts2face.interchange.subtitles.formats import FILM_SUFFIXES
 from tts2face.interchange.subtitles.options import SubtitleOptions
@@ -68,7 +68,7 @@ def subtitle_notes(video: Path, *, has_track: bool = False) -> tuple[str, ...]:
     try:
         read = read_beside(path)
     except DataError as wrong:
-        return (f"{wrong}; the subtitles are not used",)
+        return (f"{without_options(str(wrong))}; the subtitles are not used",)
     stated = (f"the subtitles of {video.name} are those of its own track",) if path == video else ()
     return (*stated, *subtitle_notes_of(read))
 

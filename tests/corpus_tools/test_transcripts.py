@@ -195,7 +195,16 @@ def test_guesses_about_subtitles_are_said(write, tmp_path):
     (tmp_path / "take.mp4").touch()
     write(".srt", "1\n00:00:01,000 --> 00:00:02,000\nMůžete přijít\n".encode("cp1250"))
     (note,) = subtitle_notes(tmp_path / "take.mp4")
-    assert note.startswith("take.srt, line 1: the encoding is not stated and was guessed as cp1250")
+    assert note == "take.srt, line 1: the encoding is not stated and was guessed as cp1250; save it as UTF-8"
+
+
+def test_notes_about_subtitles_name_no_option_of_batches(write, tmp_path):
+    (tmp_path / "take.mp4").touch()
+    cues = ("10:00:01,000 --> 10:00:02,000\nANNA: Hi. [a bell]", "10:00:03,000 --> 10:00:04,000\n♪ la ♪ Bye.")
+    write(".srt", "\n\n".join(cues))
+    notes = subtitle_notes(tmp_path / "take.mp4")
+    assert len(notes) == 4
+    assert not any("--" in note for note in notes)
 
 
 def test_text_takes_precedence_over_other_transcripts(write, tmp_path):

@@ -7,6 +7,7 @@ import pysubs2
 import pytest
 
 from lexicon.errors import DataError, InputError
+from tts2face.interchange.subtitles.cues import without_options
 from tts2face.interchange.subtitles.reader import read_subtitles
 
 pytestmark = pytest.mark.formats
@@ -353,3 +354,26 @@ def test_reading_time_is_linear(unit: str, tmp_path: Path) -> None:
     began = time.process_time()
     read_subtitles(path)
     assert time.process_time() - began < 4.0  # s of this process; a quadratic scan takes minutes
+
+
+ADVICE = {
+    "the encoding is not stated and was guessed as cp1250; --encoding names another":
+        "the encoding is not stated and was guessed as cp1250; save it as UTF-8",
+    "3 bytes are no UTF-8, as the rest is; --encoding names another encoding":
+        "3 bytes are no UTF-8, as the rest is; save it as UTF-8",
+    "2 signs, such as 'Exit', are not spoken; --keep signs speaks them": "2 signs, such as 'Exit', are not spoken",
+    "each word is spoken once (--keep repeats speaks all)": "each word is spoken once",
+    "names before a colon: ANN (2); --no-speakers makes the names words": "names before a colon: ANN (2)",
+    "track 1 is read, --track names another one": "track 1 is read",
+    "25 a second are taken (--subtitle-fps)": "25 a second are taken",
+    "the times cannot be meant; give the film's rate as --subtitle-fps": "the times cannot be meant",
+    "choose the subtitles of this film, or move them with --shift": "choose the subtitles of this film",
+    "by the time code of a tape; --shift -36000 sets it to the film": "by the time code of a tape",
+    "a delay of 5, which is not used; --shift moves the times": "a delay of 5, which is not used",
+    "this cue overlaps the next one by 0.50 s": "this cue overlaps the next one by 0.50 s",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("message", "left"), ADVICE.items())
+def test_messages_name_no_option_where_there_is_none(message: str, left: str) -> None:
+    assert without_options(message) == left

@@ -1,9 +1,14 @@
 """Cues of a subtitle file, as they are written and as they are spoken."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from tts2face.interchange.subtitles.markup import SUBRIP_MARKUP, Markup
+
+# What a message says about an option: "; --keep signs speaks them", "(--subtitle-fps)", ", or move them with --shift".
+_OPTION = re.compile(r"(?:[;,] | (?=\())\(?(?:or [a-z ]+ with |[a-z]+ [a-z' ]+ as )?--[a-z-]+[^;()]*\)?")
+_ENCODING = "--encoding"
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +107,11 @@ class SubtitleWarning:
 
     line: int
     message: str
+
+
+def without_options(message: str) -> str:
+    """A message of the reader at a door without its options: what was found, and what to do about the file itself."""
+    return _OPTION.sub(lambda match: "; save it as UTF-8" if _ENCODING in match[0] else "", message)
 
 
 @dataclass(frozen=True, slots=True)

@@ -50,7 +50,7 @@ def placed(
         warnings.append(
             SubtitleWarning(
                 kept[0].line,
-                f"the first cue begins after {kept[0].begin_s / HOUR_S:.1f} hours; if that is the time code of a tape, "
+                f"the first cue begins after {kept[0].begin_s / HOUR_S:.1f} hours, perhaps by the time code of a tape; "
                 f"--shift -{kept[0].begin_s // HOUR_S * HOUR_S:.0f} sets it to the film",
             )
         )

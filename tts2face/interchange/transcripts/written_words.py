@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lexicon.errors import DataError, InputError
-from tts2face.interchange.subtitles.cues import Subtitles
+from tts2face.interchange.subtitles.cues import Subtitles, without_options
 from tts2face.interchange.subtitles.formats import FILM_SUFFIXES, SUFFIXES, is_subtitle_text
 from tts2face.interchange.subtitles.reader import read_subtitles
 from tts2face.interchange.transcripts.file_text import read_text
@@ -63,11 +63,14 @@ def is_subtitle_file(path: Path) -> bool:
 
 
 def subtitle_notes_of(read: Subtitles) -> Iterator[str]:
-    """Sentences about subtitles that were read, with their lines, and that a text of another name holds them."""
+    """Sentences about subtitles that were read, with their lines, and that a text of another name holds them.
+
+    Words of recordings and of single commands take no options of batches, so that they name none.
+    """
     if read.path.suffix.lower() not in {*SUFFIXES, *FILM_SUFFIXES}:
         yield f"{read.path.name} {BY_LINES}"
     for note in (*read.warnings, *read.notes):
-        yield f"{read.path.name}, line {note.line}: {note.message}"
+        yield f"{read.path.name}, line {note.line}: {without_options(note.message)}"
 
 
 def check_has_tiers(path: Path, tier: str | None) -> None:
