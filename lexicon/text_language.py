@@ -74,6 +74,12 @@ def _of_words(text: str, default: str) -> str:
     return language if is_clear else default
 
 
+def common_words(language: str) -> frozenset[str]:
+    """Frequent words of a language in Latin letters, by its code or that of its variety; empty if none are known."""
+    base = language.partition("-")[0]
+    return next((words for known, (words, _) in _tables().items() if known.partition("-")[0] == base), frozenset())
+
+
 @cache
 def _tables() -> dict[str, tuple[frozenset[str], str]]:
     """Common words, and letters of its own, of each language."""

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from lexicon.errors import DataError
 from lexicon.values.files import check_regular_file
+from tts2face.interchange.subtitles.bilingual import in_one_language
 from tts2face.interchange.subtitles.binary import HEAD_BYTES, check_text, is_ebu, is_film
 from tts2face.interchange.subtitles.cues import Cue, Subtitles, SubtitleWarning, WrittenCue
 from tts2face.interchange.subtitles.decoding import MAX_BYTES, decode_file
@@ -77,6 +78,7 @@ def read_subtitles(path: Path | str, encoding: str | None = None, options: Subti
         raise DataError(_nothing(path, file.warnings))
     notes: list[SubtitleWarning] = []
     if REPEATS not in options.keep:
+        cues = in_one_language(cues, options.language, notes)
         cues = without_carried(without_copies(cues, file.warnings), notes)
     cues = _without_styles_of_all(with_credits(cues))
     timed = _timed(cues, options, file.warnings, notes)

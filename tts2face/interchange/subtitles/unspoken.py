@@ -21,7 +21,7 @@ KINDS = MappingProxyType({
     SIGNS: "writing in the picture: styles such as Sign or Title, and placed text",
     EFFECTS: "frames and syllables of karaoke and other effects",
     CREDITS: "who made the subtitles",
-    REPEATS: "what a cue shows again of the cue before it, and copies in layers or regions",
+    REPEATS: "what a cue shows again of the cue before it, copies in layers or regions, and a second language",
 })  # fmt: skip
 MAX_SHOWN = 40  # characters of an example in a note
 FIRST_CUES, LAST_CUES = 3, 4  # of a file, among which credits stand
