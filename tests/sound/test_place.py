@@ -77,6 +77,11 @@ def test_text_far_longer_than_the_sound_has_its_places(monkeypatch: pytest.Monke
     assert found[-5:].tolist() == [1] * 5
 
 
+def test_a_word_is_never_in_a_part_between_its_phones() -> None:
+    recognised = [list("pata"), [], list("i")]
+    assert assign_words([tuple("pat"), tuple("ai")], recognised).tolist() == [0, 0]
+
+
 def test_silence_holds_all_words() -> None:
     assert assign_words([("p",), ("a",)], [[], []]).tolist() == [0, 0]
 

@@ -1,7 +1,9 @@
 """Alignment of a transcript with a recording of any length."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import count
+
+import numpy as np
 
 from lexicon.dictionary import Dictionary, cmudict_lookup
 from lexicon.errors import DataError
@@ -11,7 +13,7 @@ from lexicon.marked_text import MarkedText
 from lexicon.pronounce import Word, pronounce
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.sound.alignment import Aligner, TextMismatch, join_alignments, unwritten_part
-from tts2face.sound.pauses import cut_at_pauses, cut_sound
+from tts2face.sound.pauses import SILENCE_DB, cut_at_pauses, cut_sound
 from tts2face.sound.word_assignment import assign_words
 from tts2face.sound.word_lattice import PronouncedWords, Pronunciations
 from tts2face.types import Progress, Waveform, ignore_progress
@@ -104,7 +106,10 @@ def align_recording(
         heard.append(aligner.hear(part))
         # each part is heard first and aligned later: two steps of progress
         on_progress(at, 2 * n_parts)
-    recognised = [[phone for word in sentence.words() for phone in word] for sentence in heard]
+    recognised = [
+        [] if is_silent else [phone for word in sentence.words() for phone in word]
+        for sentence, is_silent in zip(heard, _silent_parts(sound, parts), strict=True)
+    ]
     if not any(recognised):
         raise DataError("the recording contains no speech; give another recording")
     places = assign_words([alternatives[0] for _, alternatives in words], recognised)
@@ -120,6 +125,12 @@ def align_recording(
     return joined.phones, joined.words, joined.mismatches
 
 
+def _silent_parts(sound: Waveform, parts: Sequence[Waveform]) -> list[bool]:
+    """Whether each part of a sound is silent beside the whole; in zeros alone the recogniser hears a vowel."""
+    least = float(np.abs(sound.samples).max(initial=0.0)) * 10.0 ** (-SILENCE_DB / 20.0)
+    return [float(np.abs(part.samples).max(initial=0.0)) <= least for part in parts]
+
+
 def recognise_phones(sound: Waveform, on_progress: Progress = ignore_progress) -> PhoneSequence:
     """Phones that are heard in a sound of any length, from 0 s to its end; `on_progress` is called after each part.
 
@@ -130,10 +141,10 @@ def recognise_phones(sound: Waveform, on_progress: Progress = ignore_progress) -
     """
     aligner, found = Aligner(), []
     spans = cut_at_pauses(sound, MAX_STRETCH_S)
-    for span in spans:
-        part = cut_sound(sound, span)
+    parts = [cut_sound(sound, span) for span in spans]
+    for part, is_silent in zip(parts, _silent_parts(sound, parts), strict=True):
         try:
-            found.append(aligner.align(part, None))
+            found.append(unwritten_part(part, 0) if is_silent else aligner.align(part, None))
         except DataError:  # nobody speaks
             found.append(unwritten_part(part, 0))
         on_progress(len(found), len(spans))

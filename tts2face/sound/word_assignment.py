@@ -50,10 +50,16 @@ def assign_words(words: Sequence[Phones], recognised: Sequence[Phones]) -> NDArr
     places = part_of_sounded[np.clip(partner, 0, len(sounded) - 1)]
     ends = np.cumsum([len(word) for word in words])
     found = [
-        int(np.median(places[max(end - len(word), 0) : end])) if len(word) else int(places[min(end, len(places) - 1)])
+        _most_frequent(places[max(end - len(word), 0) : end]) if len(word) else int(places[min(end, len(places) - 1)])
         for word, end in zip(words, ends, strict=True)
     ]
     return np.maximum.accumulate(np.array(found, np.int64))
+
+
+def _most_frequent(places: NDArray[np.int64]) -> int:
+    """The part that has most phones of a word, the first of several; never one between two that have them."""
+    found, counts = np.unique(places, return_counts=True)
+    return int(found[counts.argmax()])
 
 
 @kernel
