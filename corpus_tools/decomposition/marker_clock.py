@@ -47,6 +47,7 @@ def place_rows(numbers: FloatArray, times: FloatArray, rate: float, notes: list[
 
 def _frames_of_rows(numbers: FloatArray, seconds: FloatArray) -> FloatArray:
     """Frames (T,) of rows, NaN where neither their number nor their time says one."""
+    numbers = np.where(np.isfinite(numbers) & (numbers == np.rint(numbers)), numbers, np.nan)
     is_numbered, is_timed = _increase(numbers), _increase(seconds + SAME_TIME_S * np.arange(len(seconds)))
     if not _are_most(is_numbered):
         return _frames_of_times(seconds) if _are_most(_increase(seconds)) else np.arange(len(numbers), dtype=np.float64)

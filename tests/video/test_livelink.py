@@ -198,6 +198,11 @@ def with_slates(rows: list[list[str]]) -> list[list[str]]:
     return rows
 
 
+def without_last_times(rows: list[list[str]]) -> list[list[str]]:
+    """The column of times stands last, and some rows end before it."""
+    return [[*row[1:], *([] if 100 <= number < 105 else row[:1])] for number, row in enumerate(rows)]
+
+
 def with_cell(row: int, name: str, value: str) -> Callable[[list[list[str]]], list[list[str]]]:
     return lambda rows: [
         [value if (number, column) == (row, AT[name]) else cell for column, cell in enumerate(cells)]
@@ -234,6 +239,7 @@ def with_times(labels: dict[int, str]) -> Callable[[list[list[str]]], list[list[
         (lambda rows: [rows[0], *([*row, "", ""] for row in rows[1:])], set()),  # at the ends of rows
         (lambda rows: [rows[0][:-3], *(row[:-2] for row in rows[1:])], set()),  # of headings, without the last names
         (with_slates, set()),
+        (without_last_times, {"rows left out, as their time is missing, damaged or no later one: 5"}),
         (lambda rows: [["Anna; take 3; 60 fps; good"], *rows], set()),
         (lambda rows: [["a\tb\tc; d"], [], *rows], set()),
     ],

@@ -144,11 +144,14 @@ def _parse_rows(names: list[str], rows: list[list[str]]) -> tuple[list[str], Flo
         if len(row) > 2 and _filled_length(row, len(names)) not in lengths:
             n_cut += 1
             continue
-        numbers = _parse_numbers(cells + [""] * (len(names) - len(cells)))
+        cells += [""] * (len(names) - len(cells))
+        label = cells[at]
+        cells[at] = "nan"  # mostly it is no number: so all others are parsed at once
+        numbers = _parse_numbers(cells)
         if np.isnan([numbers[column] for column in shapes]).all():
             n_empty += 1
             continue
-        labels.append(cells[at])
+        labels.append(label)
         values.append(numbers)
     notes = []
     if n_cut:

@@ -27,7 +27,16 @@ def place(counted: np.ndarray, seconds: np.ndarray, rate: float = 0.0) -> tuple[
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"_3": 5000.0}, {"_100": 3.0}, {"_0": 900.0}, {"_199": 1e9}, {"_60": -4.0, "_61": 1e6}]
+    "wrong",
+    [
+        {"_3": 5000.0},
+        {"_100": 3.0},
+        {"_50": 50.5},
+        {"_9": np.inf},
+        {"_0": 900.0},
+        {"_199": 1e9},
+        {"_60": -4.0, "_61": 1e6},
+    ],
 )
 @pytest.mark.parametrize("digits", [2, 3, 6, None])
 def test_a_wrong_frame_number_costs_its_row_at_most(wrong: dict[str, float], digits: int | None) -> None:
