@@ -102,7 +102,7 @@ async def import_file(
             return Imported(await import_text(studio, key, words.text, title), words.notes)
         return Imported(await import_text(studio, key, _read_text(path, name), title))
     if suffix in SUFFIXES or is_by_lines:
-        suffix = suffix if suffix in SUFFIXES else ".srt"  # the content tells which subtitles
+        suffix = suffix if suffix in SUFFIXES else ".srt"  # its lines show which subtitles
         async with _decoded(studio.state, key, (SUBTITLES, path, suffix), choices.encoding) as (checked, _):
             read = await asyncio.to_thread(read_subtitles, checked, choices.encoding, choices.subtitles)
         text = "\n".join(cue.text for cue in read.cues if cue.text)
