@@ -15,7 +15,7 @@ from corpus_tools.decomposition.motive_table import is_motive_table, read_motive
 from corpus_tools.decomposition.trc_file import read_trc
 from corpus_tools.recordings.sound import SOUND_RATE
 from lexicon.errors import DataError, InputError
-from lexicon.values.tables import read_table
+from lexicon.values.tables import MAX_HEADING_LINES, read_table
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.types import Waveform
 
@@ -23,6 +23,7 @@ SOUND_LABELS = ("audio", "sound", "voice", "speech", "mic")  # how analogue chan
 MIN_SOUND_HZ = 8000.0  # analogue channels with a lower rate are not sound
 MIN_FPS, MAX_FPS = 10.0, 1000.0
 AXES = ("x", "y", "z")
+FIRST_COLUMNS = ("time", "frame")  # of this project's tables
 
 
 def read_markers(path: Path, fps: float | None = None) -> MarkerTake:
@@ -95,13 +96,15 @@ def read_marker_table(path: Path, fps: float | None = None) -> MarkerTake:
     The first column of the latter is ``time`` in seconds or ``frame``, the others are ``NAME_x``, ``NAME_y``,
     ``NAME_z`` in mm, in any order; empty cells are gaps.
     """
-    rows = [[cell.strip() for cell in row] for row in read_table(path, delimiters=",;\t")]
+    table = read_table(path, delimiters=",;\t", is_heading=_is_heading)
+    first_row = next((number for number, row in enumerate(table[:MAX_HEADING_LINES]) if _is_heading(row)), 0)
+    rows = [[cell.strip() for cell in row] for row in table[first_row:]]
     while rows and len(rows[0]) > 1 and not rows[0][-1]:  # a comma at the end of the heading
         del rows[0][-1]
     if is_motive_table(rows):
         return read_motive(path, rows, fps)
     first = rows[0][0].lower() if rows else ""
-    if first not in ("time", "frame") or len(rows) < 2:
+    if first not in FIRST_COLUMNS or len(rows) < 2:
         raise DataError(
             f"{path} is not a CSV table of markers: it needs the columns time or frame, then NAME_x, ...; "
             "or the headings of Motive, Format Version, ..."
@@ -122,6 +125,13 @@ def read_marker_table(path: Path, fps: float | None = None) -> MarkerTake:
     n_odd = sum(_is_odd(row, len(rows[0])) for row in rows[1:])
     notes = (f"rows with cells that are no number or beyond the columns, which are left out: {n_odd}",) if n_odd else ()
     return replace(take, notes=(*take.notes, *notes), fps=take.fps or GESTURE_FPS)  # of a still without a rate
+
+
+def _is_heading(row: list[str]) -> bool:
+    if not row:
+        return False
+    has_places = any(cell.strip().endswith(f"_{AXES[0]}") for cell in row)
+    return is_motive_table([row]) or (row[0].strip().lower() in FIRST_COLUMNS and has_places)
 
 
 def _parse_header(path: Path, header: list[str]) -> tuple[str, ...]:

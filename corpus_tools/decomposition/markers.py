@@ -58,7 +58,7 @@ def read_marker_recording(
     neutral
         A recording of the person at rest; by default the median of the recording.
     fps
-        Frame rate of a table with frame numbers.
+        Frame rate of a table whose times do not show it.
     """
     take = read_markers(path, fps)
     check_regions(path, take, marker_set)

@@ -314,6 +314,7 @@ def test_a_table_without_markers_is_refused(made: Made, tmp_path: Path, change: 
     ("change", "lost", "notes"),
     [
         (lambda lines: [lines[0] + ",", *lines[1:]], [], []),
+        (lambda lines: ["Anna; take 3; good; time", "a\tb", *lines], [], []),
         (lambda lines: [lines[0], lines[1] + ",1", *lines[2:]], [], ["beyond the columns"]),
         (lambda lines: [*lines[:2], "x" + lines[2][1:], *lines[3:]], [1], ["no later ones: 1", "cells that are no"]),
         (lambda lines: [lines[0], lines[2], lines[1], *lines[3:]], [1], ["no later ones: 1"]),
