@@ -98,6 +98,13 @@ READ = {
         '<timedtext><window t="0" id="1"/><text t="1000" d="2000" w="1">The train was late.\nAgain.</text>'
         '<text t="4000" d="2000" w="1">We walked home.</text></timedtext>',
     ),
+    "timed text as JSON": (
+        ".json3",
+        '{"wireMagic": "pb3", "pens": [{}], "events": [\n{"tStartMs": 0, "dDurationMs": 9000, "id": 1},\n'
+        '{"tStartMs": 1000, "dDurationMs": 2000, "wWinId": 1, "segs": [{"utf8": "The train was late."}, '
+        '{"utf8": " Again.", "tOffsetMs": 300}]},\n{"tStartMs": 3000, "aAppend": 1, "segs": [{"utf8": "\\n"}]},\n'
+        '{"tStartMs": 4000, "dDurationMs": 2000, "segs": [{"utf8": "We walked home."}]}]}',
+    ),
     "SAMI": (".smi", SAMI),
     "SAMI in another file": (".txt", SAMI),
 }
@@ -148,6 +155,18 @@ def test_timed_text_that_ends_in_the_middle_is_read_up_to_there(read: ReadText) 
     found = read('<timedtext format="3"><body>\n<p t="1000" d="2000">Hello.</p>\n<p t="30', ".xml")
     assert [cue.text for cue in found.cues] == ["Hello."]
     assert "what follows is left out" in found.warnings[0].message
+
+
+def test_events_without_a_start_are_said_with_their_lines(read: ReadText) -> None:
+    content = (
+        '{"events": [\n{"tStartMs": 1000, "dDurationMs": 1500, "segs": [{"utf8": "Hello."}]},\n'
+        '{"tStartMs": "x", "segs": [{"utf8": "Lost."}]},\n{"tStartMs": 4000, "segs": [{"utf8": "Bye."}]}]}'
+    )
+    found = read(content, ".json3")
+    assert [(cue.begin_s, cue.end_s, cue.text, cue.line) for cue in found.cues] == [
+        (1.0, 2.5, "Hello.", 2), (4.0, 5.0, "Bye.", 4)
+    ]  # fmt: skip
+    assert [warning.line for warning in found.warnings] == [3]
 
 
 def test_lines_without_instants_and_a_delay_are_said(read: ReadText) -> None:
@@ -287,6 +306,7 @@ NO_TEXT = {
     "the index of pictures": (".idx", b"# VobSub index file, v7\n", "is the index of pictures of subtitles"),
     "an archive": (".srt", b"PK\x03\x04" + bytes(200), "is a ZIP archive"),
     "a damaged film": (".mp4", b"\x00\x00\x00\x18ftypisom" + bytes(200), "cannot be read as a film"),
+    "JSON without captions": (".json3", b'{"wireMagic": "pb3", "events": 1}', "the JSON has no list of events"),
     "another XML": (".xml", b"<fcpxml><spine/></fcpxml>", "line 1: the file is XML of <fcpxml>, of which no subtitles"),
     "clocks with frames": (".stl", b"00:00:01:12 , 00:00:03:00 , Hi.\n" * 3, "no subtitles of a format that is read"),
     "two clocks": (".txt", b"00:00:01 00:00:03 Hi.\n" * 3, "no subtitles of a format that is read"),

@@ -52,6 +52,9 @@ WORDS = (
     "BBC: the news at ten.",
     "LIVE: from London.",
     "LATEST: rain.",
+    "COMING UP: more.",
+    "THE END: so it was.",
+    "NASA: to the moon.",
     "FIRST OF ALL: no.",
     "WEDNESDAY: fish.",
     "HERE'S THE DEAL: no.",
@@ -140,6 +143,12 @@ def test_headings_of_a_file_of_capitals_are_no_script(read: ReadText) -> None:
 def test_signs_beside_capitals_tell_speakers_in_a_file_of_capitals(text: str, speaker: str, read: ReadText) -> None:
     found = read(srt((1, 2, text), (3, 4, "IT IS LATE."), (5, 6, "JOHN: SO IT IS."), (7, 8, "GO."), (9, 10, "NO.")))
     assert (found.cues[0].speaker, found.cues[0].text) == (speaker, "HELLO.")
+
+
+def test_headings_in_a_script_of_capitals_are_words(read: ReadText) -> None:
+    texts = ["JOHN: GO.", "EVE: NO.", "JOHN: WHY?", "TODAY'S TOPIC: BREAD.", "A QUICK WORD: STAY.", "MAN #2: COME."]
+    found = read(srt(*[(at, at + 1, text) for at, text in enumerate(texts)]))
+    assert [cue.speaker for cue in found.cues] == ["JOHN", "EVE", "JOHN", "", "", "MAN #2"]
 
 
 def test_two_names_in_a_cue_of_capitals_are_speakers(read: ReadText) -> None:

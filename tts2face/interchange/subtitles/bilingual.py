@@ -66,7 +66,7 @@ def in_one_language(cues: Sequence[WrittenCue], language: str | None, notes: lis
 
 def _instants(cues: Sequence[WrittenCue]) -> Iterator[list[_Line]]:
     """Lines with words of the cues of each start."""
-    for _, group in groupby(enumerate(cues), key=lambda one: round(one[1].begin_s / SAME_S)):
+    for _, group in groupby(enumerate(cues), key=lambda numbered: round(numbered[1].begin_s / SAME_S)):
         lines = [
             (number, line)
             for number, cue in group

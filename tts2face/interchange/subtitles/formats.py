@@ -36,6 +36,7 @@ SUFFIXES = MappingProxyType({
     ".srt": SUBRIP, ".vtt": WEBVTT, ".ass": SUBSTATION, ".ssa": SUBSTATION, ".ttml": TTML, ".dfxp": TTML, ".itt": TTML,
     ".xml": TTML, ".sbv": PAIRS, ".sub": MICRODVD_NAME, ".mpl": MPL2_NAME, ".lrc": LRC, ".stl": EBU_STL,
     ".smi": SAMI, ".sami": SAMI, ".srv1": YOUTUBE, ".srv2": YOUTUBE, ".srv3": YOUTUBE,
+    ".json3": YOUTUBE,
 })  # fmt: skip
 NAMES = (
     *(SUBRIP, WEBVTT, SUBSTATION, TTML, YOUTUBE, MICRODVD_NAME, MPL2_NAME, "SBV", PAIRS, SUBVIEWER_1, TMPLAYER, LRC),

@@ -67,7 +67,7 @@ _NO_SPEAKERS = word_set(
     "pros cons goal goals task tasks day week month year level round case exhibit item point points option options "
     "words word line lines deal weather headlines forecast traffic sports live new latest exclusive developing recap "
     "volume vol book books season seasons phase phases stage stages series unit module edition issue verse chorus "
-    "article amendment canto psalm war wars top fact-check more ahead next-up plot rumor rumour truth "
+    "article amendment end up canto psalm war wars top fact-check more ahead next-up plot rumor rumour truth "
     "choice choices thing things way ways "
     "pin password username id ref re cc bcc fwd subject from to via as at by for is was are were it this that these "
     "those here there what who why how when where which i you he she we they me him her us them "
@@ -81,10 +81,10 @@ _NO_SPEAKERS = word_set(
 _INTRODUCING = word_set(
     "note ps warning attention remember reminder step chapter rule fact tip breaking important caution danger hint"
 )
-# Names only where something else says so: days and months, and what is counted.
+# Names only where something else says so: days, months, acronyms, and what is counted.
 _SELDOM_NAMES = word_set(
     "monday tuesday wednesday thursday friday saturday sunday january february march april may june july august "
-    "september october november december number"
+    "september october november december number nasa nato unesco unicef covid aids fifa opec"
 )
 _EVERYBODY = word_set("all both everyone everybody alle beide tous todos tutti")  # "FIRST OF ALL:" is nobody
 # Those that introduce one of several parts: "PART TWO OF THREE", "EPISODE IV A NEW HOPE".
@@ -208,12 +208,13 @@ def find_speakers(texts: Sequence[str]) -> Mapping[str, str]:
     # in capitals a heading looks like a name: people speak again
     has_sign = not is_shouted or any(counts[key] > 1 for key in named)
     is_script = n_named >= MIN_CUES and n_named >= MIN_SHARE * len(texts) and has_sign
+    in_script = {key for key in named if is_script and (" " not in key or not is_shouted)}
     small = frozenset(word for word in _LOWER_WORD.findall("\n".join(texts) if counts else "") if word != word.upper())
     for labels in found:
         is_dialogue = any(label.has_dash for label in labels)
         is_pair = is_shouted and sum(label.key in named and not label.is_inner for label in labels) > 1
         for label in labels:
-            is_likely = counts[label.key] > 1 or is_script or is_pair or (is_dialogue and label.has_dash)
+            is_likely = counts[label.key] > 1 or label.key in in_script or is_pair or (is_dialogue and label.has_dash)
             is_ordinary = label.name.lower() in small
             if label.key in named and (
                 label.has_manner

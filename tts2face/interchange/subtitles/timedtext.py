@@ -1,28 +1,35 @@
-"""YouTube's timed text (``.srv1``, ``.srv2``, ``.srv3``, ``.xml``): paragraphs with a start and a length."""
+"""YouTube's timed text (``.srv1`` to ``.srv3``, ``.xml``, ``.json3``): paragraphs with a start and a length."""
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 from xml.parsers import expat
 
+from lexicon.errors import DataError
+from lexicon.values.json_text import parse_json
 from tts2face.interchange.subtitles.cues import SubtitleWarning, WrittenCue
 from tts2face.interchange.subtitles.markup import WEBVTT_MARKUP
 from tts2face.interchange.subtitles.xml_text import parse_xml
 
-TIMED_TEXT = re.compile(r"\s*(?:<\?xml[^>]*\?>\s*)?(?:<!--.*?-->\s*)*<(?:timedtext|transcript)[\s>]", re.DOTALL)
+TIMED_TEXT = re.compile(
+    r"\s*(?:(?:<\?xml[^>]*\?>\s*)?(?:<!--.*?-->\s*)*<(?:timedtext|transcript)[\s>]|\{(?=.{0,4000}\"tStartMs\"))",
+    re.DOTALL,
+)
 _NUMBER = re.compile(r"-?\d{1,12}(?:\.\d{1,9})?")
+_START = re.compile(r'"tStartMs"')
 # Start and length of a paragraph: in milliseconds, in the first version in seconds.
-_TIMES = {"p": ("t", "d", 0.001), "text": ("t", "d", 0.001)}
-_TIMES_1 = ("start", "dur", 1.0)
+_PARAGRAPHS = frozenset({"p", "text"})
+_TIMES, _TIMES_1 = ("t", "d", 0.001), ("start", "dur", 1.0)
 _LANGUAGES = ("lang", "xml:lang")
 
 
 @dataclass(slots=True)
 class _Paragraph:
-    """An open paragraph; `rolls` says that it is of a window in which words appear one by one."""
+    """Text with its start and length in seconds; `rolls` says that its window shows words one by one."""
 
-    begin_s: float | None
-    end_s: float | None
+    start_s: float | None
+    length_s: float | None
     line: int
     rolls: bool = False
     text: list[str] = field(default_factory=list)
@@ -30,18 +37,68 @@ class _Paragraph:
 
 def read_timed_text(text: str) -> tuple[list[WrittenCue], list[SubtitleWarning]]:
     """Cues of a document; one of a window that rolls ends where the next one begins."""
-    return _Reader().read(text)
+    if text.lstrip("\ufeff \t\n").startswith("{"):
+        return _cues(_json_paragraphs(text), None, [])
+    return _XmlReader().read(text)
 
 
-class _Reader:
+def _cues(
+    paragraphs: Sequence[_Paragraph], language: str | None, warnings: list[SubtitleWarning]
+) -> tuple[list[WrittenCue], list[SubtitleWarning]]:
+    worded = [paragraph for paragraph in paragraphs if "".join(paragraph.text).strip()]
+    cues = []
+    for paragraph, after in zip(worded, [*worded[1:], None], strict=True):
+        if paragraph.start_s is None:
+            message = "the start of this cue cannot be read; it is left out"
+            warnings.append(SubtitleWarning(paragraph.line, message))
+            continue
+        end = None if paragraph.length_s is None else paragraph.start_s + paragraph.length_s
+        until = after.start_s if after else None
+        if paragraph.rolls and end is not None and until is not None and paragraph.start_s < until < end:
+            end = until
+        text = "".join(paragraph.text).strip()
+        cues.append(WrittenCue(paragraph.start_s, end, text, paragraph.line, language=language, markup=WEBVTT_MARKUP))
+    return cues, warnings
+
+
+def _json_paragraphs(text: str) -> list[_Paragraph]:
+    """Paragraphs of the events of ``.json3``; the line of each is that of its start."""
+    content = parse_json(text.lstrip("\ufeff"), "the JSON")
+    events = content.get("events") if isinstance(content, Mapping) else None
+    if not isinstance(events, list):
+        raise DataError("the JSON has no list of events; export the captions again")
+    paragraphs: list[_Paragraph] = []
+    line, at = 1, 0
+    starts = _START.finditer(text)
+    for event in events:
+        if not isinstance(event, Mapping):
+            continue
+        mark = next(starts, None) if "tStartMs" in event else None
+        if mark is not None:
+            line, at = line + text.count("\n", at, mark.start()), mark.start()
+        segments = [segment for segment in _list(event.get("segs")) if isinstance(segment, Mapping)]
+        rolls = any("tOffsetMs" in segment or "acAsrConf" in segment for segment in segments)
+        words = [str(segment.get("utf8", "")) for segment in segments]
+        start, length = (_milliseconds(event.get(key)) for key in ("tStartMs", "dDurationMs"))
+        paragraphs.append(_Paragraph(start, length, line, rolls, words))
+    return paragraphs
+
+
+def _list(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else []
+
+
+def _milliseconds(value: Any) -> float | None:
+    return value / 1000.0 if isinstance(value, int | float) and not isinstance(value, bool) else None
+
+
+class _XmlReader:
     """Handlers of the elements of one document."""
 
     def __init__(self) -> None:
-        self._paragraph: _Paragraph | None = None
+        self._is_open = False
         self._language: str | None = None
-        self._cues: list[WrittenCue] = []
-        self._rolling: list[bool] = []
-        self._warnings: list[SubtitleWarning] = []
+        self._paragraphs: list[_Paragraph] = []
         self._parser = expat.ParserCreate()
         self._parser.StartElementHandler = self._start
         self._parser.EndElementHandler = self._end
@@ -49,57 +106,30 @@ class _Reader:
 
     def read(self, text: str) -> tuple[list[WrittenCue], list[SubtitleWarning]]:
         """Parse the whole document."""
-        parse_xml(self._parser, text, self._cues, self._warnings)
-        following = [*(cue.begin_s for cue in self._cues[1:]), None]
-        cues = [
-            replace(cue, end_s=until)
-            if rolls and until is not None and cue.end_s is not None and cue.begin_s < until < cue.end_s
-            else cue
-            for cue, rolls, until in zip(self._cues, self._rolling, following, strict=True)
-        ]
-        return cues, self._warnings
+        warnings: list[SubtitleWarning] = []
+        parse_xml(self._parser, text, self._paragraphs, warnings)
+        # a paragraph that the damage cuts off has lost words
+        return _cues(self._paragraphs[:-1] if self._is_open else self._paragraphs, self._language, warnings)
 
     def _start(self, name: str, attributes: Mapping[str, str]) -> None:
         if name in {"timedtext", "transcript"}:
             self._language = next((attributes[key] for key in _LANGUAGES if attributes.get(key)), None)
-        elif name in _TIMES:
-            first, length, unit = _TIMES_1 if "start" in attributes else _TIMES[name]
-            begin, lasts = (_seconds(attributes.get(key), unit) for key in (first, length))
-            end = None if begin is None or lasts is None else begin + lasts
-            self._paragraph = _Paragraph(begin, end, self._parser.CurrentLineNumber)
-        elif name == "s" and self._paragraph is not None:
-            self._paragraph.rolls |= "t" in attributes or "ac" in attributes
-        elif name == "br" and self._paragraph is not None:
-            self._paragraph.text.append("\n")
+        elif name in _PARAGRAPHS:
+            first, length, unit = _TIMES_1 if "start" in attributes else _TIMES
+            start_s, length_s = (_seconds(attributes.get(key), unit) for key in (first, length))
+            self._paragraphs.append(_Paragraph(start_s, length_s, self._parser.CurrentLineNumber))
+            self._is_open = True
+        elif self._is_open and name == "s":
+            self._paragraphs[-1].rolls |= "t" in attributes or "ac" in attributes
+        elif self._is_open and name == "br":
+            self._paragraphs[-1].text.append("\n")
 
     def _end(self, name: str) -> None:
-        paragraph = self._paragraph
-        if paragraph is None or name not in _TIMES:
-            return
-        self._paragraph = None
-        text = "".join(paragraph.text).strip()
-        if not text:
-            return
-        if paragraph.begin_s is None:
-            self._warnings.append(
-                SubtitleWarning(paragraph.line, "the start of this cue cannot be read; it is left out")
-            )
-            return
-        self._cues.append(
-            WrittenCue(
-                paragraph.begin_s,
-                paragraph.end_s,
-                text,
-                paragraph.line,
-                language=self._language,
-                markup=WEBVTT_MARKUP,
-            )
-        )
-        self._rolling.append(paragraph.rolls)
+        self._is_open = self._is_open and name not in _PARAGRAPHS
 
     def _characters(self, text: str) -> None:
-        if self._paragraph is not None:
-            self._paragraph.text.append(text)
+        if self._is_open:
+            self._paragraphs[-1].text.append(text)
 
 
 def _seconds(written: str | None, unit: float) -> float | None:
