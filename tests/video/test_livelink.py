@@ -132,9 +132,13 @@ def test_seconds_with_a_fraction_are_read(tmp_path: Path) -> None:
     found = read(tmp_path, rows_of(FOUR_S, [f"10:00:{time + 5:06.3f}" for time in FOUR_S]))
     assert found.weights.fps == 60.0
     assert jaw_error(found) < 0.01
-    numbers = read(tmp_path, rows_of(FOUR_S, [f"{time:.4f}" for time in FOUR_S]))
+    rows = rows_of(FOUR_S, [f"{time:.4f}" for time in FOUR_S])
+    numbers = read(tmp_path, rows)
     assert numbers.weights.fps == 60.0
     assert numbers.notes == ()
+    assert read(tmp_path, rows, fps=25.0).notes == (
+        "it has times; the 25 frames a second that were given are not used",
+    )
 
 
 def test_frame_numbers_count_to_60_without_an_option(tmp_path: Path) -> None:

@@ -63,7 +63,7 @@ def parse_times(labels: list[str], rate: float | None = None, column: str = "") 
         return _parse_numbers(numbers, rate, column)
     if _have_fractions_of_seconds(codes):
         seconds = [np.nan if code is None or code[4] in (":", ";") else _seconds(code) for code in codes]
-        return FrameClock(np.array(seconds))
+        return FrameClock(np.array(seconds), notes=_unused(rate))
     fields = np.array([(np.nan,) * 3 if code is None else _fields(code) for code in codes])
     sign = Counter(code[4] for code in codes if code).most_common(1)[0][0]
     fitting = fields[_fit_neighbours(fields)]
@@ -104,15 +104,15 @@ def _parse_numbers(numbers: FloatArray, rate: float | None, column: str) -> Fram
     steps = np.abs(np.diff(known))
     step = float(np.median(steps[steps > 0])) if steps.any() else 0.0
     if (unit := TIME_COLUMNS.get(column)) is not None:
-        return FrameClock(numbers / unit, np.inf)
+        return FrameClock(numbers / unit, np.inf, _unused(rate))
     # seconds at less than 5 frames have fractions; frame numbers have none
     if step <= MAX_STEP_S or (step < 1 and np.mean(known == np.rint(known)) < MOST):
-        return FrameClock(numbers, np.inf)
+        return FrameClock(numbers, np.inf, _unused(rate if step else None))
     is_counted = column.startswith(COUNTED) or (rate is not None and MIN_FRAME_S <= step / rate <= MAX_FRAME_S)
     part = next((part for part in PARTS if MIN_FRAME_S <= step / part <= MAX_FRAME_S), None)
     if part is not None and not is_counted:
         note = f"its times are {step:g} apart; they are taken for {PARTS[part]}"
-        return FrameClock(numbers / part, np.inf, (note,))
+        return FrameClock(numbers / part, np.inf, (note, *_unused(rate)))
     if rate is not None:
         return FrameClock(numbers / rate, np.inf)
     note = (
@@ -120,6 +120,11 @@ def _parse_numbers(numbers: FloatArray, rate: float | None, column: str) -> Fram
         f"{RATE_OPTIONS}"
     )
     return FrameClock(numbers / DEFAULT_TIMECODE_RATE, np.inf, (note,))
+
+
+def _unused(rate: float | None) -> tuple[str, ...]:
+    """A note on a frame rate that is given for times."""
+    return () if rate is None else (f"it has times; the {rate:g} frames a second that were given are not used",)
 
 
 def _number(label: str) -> float:
