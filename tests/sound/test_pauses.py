@@ -119,6 +119,16 @@ def test_long_silence_is_cut_beside_the_speech() -> None:
     assert any(start <= 30.0 and end >= 36.3 for start, end in spans)
 
 
+@pytest.mark.parametrize("softer_db", [32.0, 36.0, 45.0])
+@pytest.mark.parametrize("noise", [0.001, 0.02])
+def test_pauses_of_speech_behind_a_jingle_are_found(softer_db: float, noise: float) -> None:
+    speech = speech_with_pauses(*[1.0, 0.5] * 12, 1.0, level=0.2, noise=noise)
+    loud = np.random.default_rng(0).uniform(-0.8, 0.8, 2 * speech.rate).astype(np.float32)
+    joined = np.concatenate([loud, speech.samples / 0.2 * 0.45 * np.float32(10.0 ** (-softer_db / 20.0))])
+    found = np.array(find_pauses(Waveform(joined, speech.rate)))
+    assert found - 2.0 == pytest.approx(np.array(find_pauses(speech)), abs=0.03)
+
+
 @pytest.mark.parametrize("softer_db", [20.0, 26.0, 29.0, 32.0])
 def test_speech_behind_a_jingle_is_no_silence(softer_db: float) -> None:
     speech = speech_with_pauses(*[1.0, 0.5] * 12, 1.0)

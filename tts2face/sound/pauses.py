@@ -32,6 +32,7 @@ LOUD_S, LOUD_RANGE_DB = 0.5, 30.0  # what is at most so far below the loudest ha
 NEAR_SPEECH_S = 1.0  # of speech: the pauses between sentences belong to it
 NEAR_SOUND_S = 0.3  # of silence before and after sound
 SPEECH_RANGE_DB = 15.0  # least range of speech with its pauses; noise has half of it in windows of 10 ms
+SMOOTH_RANGE_DB = 12.0  # the same of levels over 30 ms, in which noise has less
 SILENCE_DB = 60.0  # below the loudest half second: digital silence and noise of a converter, no room
 Span = tuple[float, float]
 
@@ -42,13 +43,28 @@ def is_near_speech(levels: NDArray[np.floating], step_s: float) -> NDArray[np.bo
     Measures of a whole recording are taken from these, so that they do not depend on how much else it holds. Where most
     of what sounds is softer, and has the range of speech, the loud part is a jingle or applause.
     """
-    near = _is_near(levels >= loudest_level(levels, step_s) - LOUD_RANGE_DB, round(NEAR_SPEECH_S / step_s))
-    sounding = is_near_sound(levels, step_s)
-    softer = levels[sounding & ~near]
-    if 2 * len(softer) <= np.count_nonzero(sounding):
-        return near
+    near, sounding = _is_near_loud(levels, step_s), is_near_sound(levels, step_s)
+    return sounding if _is_speech_softer(levels[sounding], near[sounding], SPEECH_RANGE_DB) else near
+
+
+def _is_near_loud(levels: NDArray[np.floating], step_s: float) -> NDArray[np.bool_]:
+    """Whether levels (T,) are at most `LOUD_RANGE_DB` below the loudest half second, or near those that are."""
+    return _is_near(levels >= loudest_level(levels, step_s) - LOUD_RANGE_DB, round(NEAR_SPEECH_S / step_s))
+
+
+def _is_speech_softer(levels: NDArray[np.floating], is_loud: NDArray[np.bool_], least_range_db: float) -> bool:
+    """Whether most of what sounds is softer than the loud part, and has the range of speech."""
+    softer = levels[~is_loud]
+    if 2 * len(softer) <= len(levels):
+        return False
     low, high = np.quantile(softer, (NOISE_QUANTILE, SPEECH_QUANTILE))
-    return sounding if high - low >= SPEECH_RANGE_DB else near
+    return bool(high - low >= least_range_db)
+
+
+def _without_jingle(levels: NDArray[np.floating]) -> NDArray[np.floating]:
+    """The (N,) of smooth levels that are of speech with its pauses: all, or those behind a jingle or applause."""
+    near, sounding = _is_near_loud(levels, LEVEL_WINDOW_S), is_near_sound(levels, LEVEL_WINDOW_S)
+    return levels[~near] if _is_speech_softer(levels[sounding], near[sounding], SMOOTH_RANGE_DB) else levels
 
 
 def is_near_sound(levels: NDArray[np.floating], step_s: float) -> NDArray[np.bool_]:
@@ -87,8 +103,9 @@ def find_pauses(sound: Waveform) -> tuple[Span, ...]:
     levels = _window_levels(sound)
     if not len(levels):
         return ()
-    silence = loudest_level(levels, LEVEL_WINDOW_S) - SILENCE_DB
-    counted = levels[is_near_speech(levels, LEVEL_WINDOW_S) & (levels > silence)]
+    measured = _without_jingle(levels)
+    silence = loudest_level(measured, LEVEL_WINDOW_S) - SILENCE_DB
+    counted = measured[is_near_speech(measured, LEVEL_WINDOW_S) & (measured > silence)]
     if not len(counted):
         return ()
     noise_db, speech_db = np.quantile(counted, NOISE_QUANTILE), np.quantile(counted, SPEECH_QUANTILE)
