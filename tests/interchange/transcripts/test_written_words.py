@@ -29,6 +29,8 @@ SAID = "bin red by k seven now"
         WHISPER,
         WHISPER.replace("[00:", "[00:00:").replace("> 00:", "> 00:00:"),
         PANEL,
+        "Anna Smith  0:03\nbin red\n\nSpeaker 2  0:05\nby k\n\nAnna Smith  1:00:05\nseven now\n",
+        "Anna (00:03):\nbin red by\nk\n\nBen (00:05):\nseven\n\nAnna (00:05):\nnow\n",
         "(0:00) bin red by\n(0:01) k\n(0:02) seven now\n",
         "[ti:x]\n[00:00.50]bin red by k\n[00:02.00]seven now\n",
         "00:00:01:bin red|by k\n00:00:02:seven now\n",
@@ -61,6 +63,7 @@ def test_subtitles_of_any_name_are_subtitles(content, name, tmp_path):
         "Go left --> right at 10:00 and so on.\nAt 10:30 --> 11:00 we rest.\n",
         "9:00 Breakfast\n10:00 Walk\n11:00 Lunch\n",
         "0:00 is when it begins.\nThen we go.\nAnd go.\nAnd rest.\nAt 0:30 it ends.\n",
+        "Intro 0:00\nVerse 0:30\nChorus 1:00\n",
         "[1] The first note.\n[2] The second.\n",
         "{0}{1} are sets, and so is the rest.\nNothing else.\nNothing.\n",
         "tt and the other band",
@@ -92,6 +95,14 @@ def test_words_after_an_instant_last_to_the_next(tmp_path):
     first, second, last = read_subtitles(tmp_path / "v.txt").cues
     assert (first.begin_s, first.end_s, second.begin_s, last.begin_s) == (0, 2, 2, 3605)
     assert last.has_estimated_end
+
+
+def test_speakers_above_their_words_are_known(tmp_path):
+    (tmp_path / "v.txt").write_text("Anna (0:03):\nbin red\n\nBen (0:05):\nby k\n\nAnna (0:09):\nseven\n")
+    cues = read_subtitles(tmp_path / "v.txt").cues
+    assert [(cue.begin_s, cue.speaker, cue.text) for cue in cues] == [
+        (3, "Anna", "bin red"), (5, "Ben", "by k"), (9, "Anna", "seven"),
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ["v.tsv", "v.txt"])
