@@ -5,6 +5,7 @@ import time
 import wave
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
@@ -283,6 +284,17 @@ def test_cues_after_the_end_of_a_dubbing_track_are_left_out(plan_of: Planner, tm
     with pytest.raises(DataError, match="3 of 3 cues begin after the end of the film"):
         plan_of(audio=tmp_path / "dub", shift=100.0)
     assert [line.number for line in plan_of(audio=tmp_path / "dub", shift=-6.0).lines] == [1]
+
+
+def test_what_is_guessed_of_a_recording_of_all_cues_is_a_note(plan_of: Planner, tmp_path: Path) -> None:
+    (tmp_path / "dub").mkdir()
+    tone = 0.3 * np.sin(0.2 * np.arange(12 * 8000))
+    with wave.open(str(tmp_path / "dub" / "one.wav"), "wb") as track:
+        track.setparams((2, 2, 8000, 0, "NONE", ""))
+        track.writeframes((32767 * np.stack([tone, -tone], 1)).astype("<i2").tobytes())
+    (note,) = [note for note in plan_of(audio=tmp_path / "dub").notes if note.file.endswith(".wav")]
+    assert (note.file, note.line) == (str(tmp_path / "dub" / "one.wav"), 0)
+    assert note.message.startswith("the 2 channels of one.wav cancel each other")
 
 
 def test_frames_of_subtitles_have_the_rate_that_is_given(plan_of: Planner) -> None:
