@@ -49,7 +49,7 @@ def note_transcript_beside(recording: Path) -> None:
     from tts2face.interchange.transcripts.beside import find_transcript
 
     found = find_transcript(recording)
-    if found is not None:
+    if found is not None and found.is_file():
         given = shlex.quote(str(found))
         write_message(f"tts2face: note: {found} lies beside the recording: --transcript {given} uses its words")
 

@@ -22,7 +22,7 @@ def find_transcript(recording: Path) -> Path | None:
 def _may_be(path: Path) -> bool:
     """Whether a file can be a transcript: of endings of other files, too, the content decides."""
     if path.suffix.lower() not in OTHERS_TOO:
-        return path.is_file()
+        return True  # what is no file is refused by name where it is read
     try:
         return find_reader(path) is not None
     except DataError:
