@@ -84,10 +84,7 @@ def _decode(content: bytes, path: Path, encoding: str | None, language: str | No
             raise DataError(f"{path} is not text in {encoding}; choose another encoding") from broken
         raise DataError(f"{path} is not text in UTF-16 or UTF-32, as it begins; save it as UTF-8") from broken
     if found is None:
-        raise DataError(
-            f"{path} is not text in UTF-8, UTF-16, UTF-32 or another known encoding; save it as UTF-8 or name its "
-            "encoding"
-        )
+        raise DataError(f"{path} is not text in UTF-8, UTF-16, UTF-32 or another known encoding; save it as UTF-8")
     return found
 
 

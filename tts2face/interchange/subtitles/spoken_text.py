@@ -18,12 +18,12 @@ _NOISE = (
     r"yawn|shush|growl|hiss|wail|whimper|burp|hiccup|click|knock|beep)(?:e?s|e?d|ing)?|cries|crying|sings|singing|"
     r"(?:laugh|chuckl|giggl|sneez|sniffl|mumbl|exhal|inhal|breath|whistl|paus)ing|laughter|applause|music|silence|"
     r"inaudible|unintelligible|indistinct|crosstalk|static|lacht|seufzt|hustet|flüstert|rires?|soupirs?|risas?|"
-    r"suspira|ride|sospira"
+    r"suspira|ride|sospira|сме[её]тся|вздыхает|кашляет|плачет|кричит|шепчет|смех|пауза|музыка"
 )
 _GLUED = r"(?<=[A-Za-zÀ-ɏͰ-ӿ\d])"
 _GLUED_NOISE = rf"{_GLUED}[\[(](?:(?i:{_NOISE})|[^\W\d_]{{2,}}(?:[ ’'-][^\W\d_]{{2,}}){{1,5}})[\])]"
 _SQUARE = r"\[(?:[^\[\]\n]|\[[^\[\]\n]*\])*\]|\[[^\[\]]*\]|\[[^\[\]\n]*"
-_SAID_IN_ROUND = r"\d+\)|[^\W\d_]{1,3}\)[^\W\d_A-Z]|[^()\n]{0,60}\w ?[<>=]{1,2} ?\w"
+_SAID_IN_ROUND = r"\d+\)|[A-Za-zÀ-ɏ]{1,3}\)[a-zß-ɏ]|[^()\n]{0,60}\w ?[<>=]{1,2} ?\w"
 _FACE = r"(?:(?<=[:;=]\()|(?<=[:;=]-\())(?:\s|$)"  # :-(
 _ROUND = rf"\((?!{_FACE}|{_SAID_IN_ROUND})(?:(?:[^()]|\([^()]*\))*\)|(?=[^\W\d_])[^()\n]*(?=\n|\Z))"
 _ANNOTATION = re.compile(
