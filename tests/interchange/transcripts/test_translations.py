@@ -99,6 +99,9 @@ def test_notes_alone_are_no_speech(tmp_path):
         ("A_phrase-segnum-en", NameKind.OTHERS),
         ("A_Transcription-txt", NameKind.TEXTS),
         ("ORTMau", NameKind.WORDS),
+        ("DialogueActs", NameKind.OTHERS),
+        ("speech_act A", NameKind.OTHERS),
+        ("Act 1", NameKind.NOTHING),
         ("Anna", NameKind.NOTHING),
     ],
 )

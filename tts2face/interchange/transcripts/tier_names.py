@@ -28,12 +28,13 @@ _ABOUT_WORDS = re.compile(
     r"pos|lemma\w*|gloss\w*|gls|translat\w*|transl|trad|traduc\w*|traduz\w*|tradução|überset\w*|uebersetz\w*|vertaling\w*|"
     r"översätt\w*|oversett\w*|tłumacz\w*|překlad\w*|перевод\w*|çeviri|fordítás|ft|literal|lit|interlinear|igt|tags?|"
     r"types?|class(?:es)?|notes?|comments?|confidence|conf|scores?|prob\w*|tones?|tobi|breaks?|accents?|prosod\w*|stress|"
-    r"morph\w*|acts?|counts?|numbers?|nr|num|segnum|ids?|index|refs?|languages?|lang|durations?|dur|freq\w*"
+    r"morph\w*|counts?|numbers?|nr|num|segnum|ids?|index|refs?|languages?|lang|durations?|dur|freq\w*"
 )
 _OTHERS = re.compile(
     r"pitch|f0|momel|intsint|gestures?|gaze|hands?|head|activity\w*|noises?|events?|misc"
 )  # what else is seen and heard
 _WEAK = re.compile(r"seg\w*|mau|maus|labels?")  # phones, unless words are named, too: ORT-MAU
+_ACTS = re.compile(r"(?:dialog(?:ue)?|speech)[\W_]*acts?(?![a-z])", re.IGNORECASE)  # of a play, an act is speech
 _TOOLBOX = re.compile(r"(?:ref|id|mb|ge|gn|ps|nt|dt|cm)@")  # markers of SIL Toolbox before speakers; tx@ is the text
 
 
@@ -61,7 +62,7 @@ _IN_ORDER = (
 
 def kind_of_name(name: str) -> NameKind:
     """Kind of a tier by the parts of its name; phones and what is about words outweigh the rest."""
-    if _TOOLBOX.match(name):
+    if _TOOLBOX.match(name) or _ACTS.search(name):
         return NameKind.OTHERS
     parts = parts_of_name(name)
     found = (kind for pattern, kind in _IN_ORDER if any(map(pattern.fullmatch, parts)))
