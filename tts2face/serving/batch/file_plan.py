@@ -28,7 +28,6 @@ from tts2face.serving.batch.windows import Window, cue_lines, cue_windows, scene
 from tts2face.session.named_models import Models
 from tts2face.session.prepared import prepare
 from tts2face.types import SOUND_RATE, exact_rate, first_sample
-from tts2face.video.sound_survey import sound_notes
 
 MAX_IDLE_S = 20.0  # of one segment of silence
 MARGIN_S = 0.5  # around a cue, for speech of a dubbing track that begins early or ends late; half of shorter gaps
@@ -149,8 +148,7 @@ class FilePlan:
         for warning in read.warnings:
             self._warn(warning.line, warning.message)
         self.notes += [PlanWarning(str(self.path), note.line, note.message) for note in read.notes]
-        if (track := self.recordings.track) is not None:  # of which clips take excerpts, without a note of their own
-            self.notes += [PlanWarning(str(track), 0, note) for note in sound_notes([track])]
+        self.notes += [PlanWarning(str(self.recordings.track), 0, note) for note in self.recordings.notes()]
         cues = [self._divide(cue) for cue in read.cues if cue.text]
         self.n_cues, self._is_in_capitals = len(read.cues), is_in_capitals(cue.text for cue in cues)
         cues = sorted(map(self._moved, [*cues, *left_out_cues(read)]), key=lambda cue: cue.begin_s)

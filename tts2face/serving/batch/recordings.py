@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from lexicon.errors import InputError
+from tts2face.video.sound_survey import sound_notes
 
 SOUND_SUFFIXES = frozenset({".wav", ".flac", ".mp3", ".m4a", ".ogg", ".opus", ".aac", ".aif", ".aiff", ".mp4", ".mov",
                             ".mkv", ".webm", ".ts", ".mpg", ".mpeg", ".avi", ".m4v"})  # fmt: skip
@@ -18,6 +19,10 @@ class SubtitleRecordings:
 
     track: Path | None = None
     cues: Mapping[int, Path] = field(default_factory=dict)
+
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on what is guessed of `track`, of which clips take excerpts; those of `cues` have their own."""
+        return sound_notes([] if self.track is None else [self.track])
 
 
 def find_recordings(folder: Path, subtitles: Path, names: Sequence[str]) -> SubtitleRecordings:
