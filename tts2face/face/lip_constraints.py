@@ -33,6 +33,9 @@ CHANGE_COST = 0.5  # of changes of the weights in contacts, relative to the medi
 # without a cost the cheapest way to close smiling lips is to smile less (decision 118)
 SMILE_COST, SMILE_PREFIX = 5.0, "mouthSmile"
 GESTURE_COST = 1.0  # of changes of all weights by gestures
+# Of sideways shapes where nothing rolls the lips: left and right together lift a jaw a little, and were used for it.
+SIDEWAYS, SIDEWAYS_COST = ("jawLeft", "jawRight", "mouthLeft", "mouthRight"), 20.0
+ROLLED = "mouthRollLower"
 CLOSED_SMILE_COST = 0.3  # of the smile of a basis expression, whose lips are closed
 FULL_GROWTH_GAP_MM = 1.5  # gaps smaller than this are amplified by less than the gain
 GAP_TOLERANCE_MM = 0.01  # largest gap of closed lips
@@ -56,8 +59,8 @@ class LipConstraints:
         Widening of the mouth per weight, mm.
     limits : (k, 2)
         Least and greatest weight of the `moving` shapes.
-    is_smile : (k,)
-        Whether each of the `moving` shapes smiles.
+    is_smile, is_sideways : (k,)
+        Whether each of the `moving` shapes smiles, and whether it moves a mouth sideways whose lips nothing rolls.
     """
 
     moving: NDArray[np.int64]
@@ -66,6 +69,7 @@ class LipConstraints:
     width: FloatArray
     limits: FloatArray
     is_smile: NDArray[np.bool_]
+    is_sideways: NDArray[np.bool_]
 
     def with_change_cost(self) -> "LipConstraints":
         """The constraints with a cost of changes of the weights, so that opposite shapes do not act together."""
@@ -81,6 +85,7 @@ class LipConstraints:
 
     def _with_costs(self, costs: FloatArray) -> "LipConstraints":
         """The constraints with costs (k,) of changes of the weights, relative to the median curvature."""
+        costs = costs + SIDEWAYS_COST * self.is_sideways
         return replace(self, curvature=self.curvature + np.diag(costs * np.median(np.diag(self.curvature))))
 
     def combine(self, speech: FloatArray, added: FloatArray) -> FloatArray:
@@ -173,4 +178,5 @@ def build_lip_constraints(face: Face) -> LipConstraints:
         width=motion[MOUTH_CORNER_LEFT, 0] - motion[MOUTH_CORNER_RIGHT, 0],
         limits=face.limits[moving].astype(np.float64),
         is_smile=np.array([face.shape_names[i].startswith(SMILE_PREFIX) for i in moving]),
+        is_sideways=np.array([face.shape_names[i] in SIDEWAYS and ROLLED not in face.shape_names for i in moving]),
     )

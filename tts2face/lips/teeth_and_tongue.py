@@ -21,6 +21,8 @@ CONTACT_WEIGHT = 1e4  # of a coordinate of these landmarks, relative to a landma
 ROLLED = "mouthRollLower"
 KEPT_SHARES = {WIDE_OPEN: 0.4, "mouthClose": 0.4, ROLLED: 0.0}
 ROLL_COST = 1.0
+# Shapes that pull the lip back by its corners where nothing rolls it: a labiodental is no grin.
+GRIN, GRIN_COST = ("mouthSmile", "mouthDimple", "mouthStretch"), 20.0
 TEETH_NAMES = ("teeth", "tooth")  # in the names of parts
 INCISOR_SHARE = 0.08  # of the mouth's width: half the width of the middle incisors
 STILL_SHARE = 0.1  # of the largest motion of the jaw: upper teeth move less
@@ -117,6 +119,7 @@ def build_incisor_contact(
     lips = list(TOUCHING_LANDMARKS)
     target = np.array([edge[0] + COVER_SHARE * width, edge[1] + AHEAD_SHARE * width]) - places[lips, 1:]
     upper = list(FACING_LANDMARKS)
+    costs = {ROLLED: ROLL_COST} if ROLLED in names else {name: GRIN_COST for name in names if name.startswith(GRIN)}
     return IncisorContact(
         mouth=mouth,
         motion=motion[lips, 1:].reshape(2 * len(lips), -1),
@@ -124,7 +127,7 @@ def build_incisor_contact(
         upper_motion=motion[upper, 1],
         upper_target=edge[0] + (COVER_SHARE + SHOWN_SHARE) * width - places[upper, 1],
         kept=np.array([KEPT_SHARES.get(name, 1.0) for name in names]),
-        cost=np.array([ROLL_COST if name == ROLLED else 0.0 for name in names]) * np.median(np.diag(mouth.curvature)),
+        cost=np.array([costs.get(name, 0.0) for name in names]) * np.median(np.diag(mouth.curvature)),
     )
 
 
@@ -146,6 +149,9 @@ def incisor_edge(face: Face, places: FloatArray, width: float) -> tuple[float, f
         low = float(front[:, 1].min())
         ahead = float(front[front[:, 1] < low + EDGE_SHARE * width, 2].max())
         below, behind = (lip[1] - low) / width, (lip[2] - ahead) / width
+        if ROLLED not in face.shape_names:
+            # a lip that nothing rolls in does not reach teeth that lie deep in the mouth
+            ahead, behind = lip[2] - min(behind, EDGE_BEHIND_LIP) * width, min(behind, EDGE_BEHIND_LIP)
         # parts named "teeth" of strangers' characters may be a whole jaw, or lie elsewhere
         if PLAUSIBLE_BELOW[0] < below < PLAUSIBLE_BELOW[1] and PLAUSIBLE_BEHIND[0] < behind < PLAUSIBLE_BEHIND[1]:
             return low, ahead

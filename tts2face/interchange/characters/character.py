@@ -11,6 +11,7 @@ from tts2face.numeric.arrays import FloatArray, IntArray
 OPAQUE = "OPAQUE"
 MASK = "MASK"
 BLEND = "BLEND"
+STILL_SHARE = 1e-5  # of a piece's size: .003 mm of a head
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +76,11 @@ class MaterialPiece:
     bones: IntArray
     defaults: Mapping[MorphTarget, float] = field(default_factory=dict)
 
+    def is_moved_by(self, morph: NDArray[np.float32]) -> bool:
+        """Whether a displacement (N, 3) is more than the noise of a quantised file."""
+        size = float(np.ptp(self.vertices, axis=0).max(initial=0.0)) if len(self.vertices) else 0.0
+        return bool(np.abs(morph).max(initial=0.0) > STILL_SHARE * size)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Character:
@@ -96,6 +102,8 @@ class Character:
         Whether the character looks along -z (VRM 0), not +z.
     licence
         What the file says about its licence and author.
+    painted
+        Expressions that change textures or colours and no shape.
     notes
         What was not read, in sentences.
     """
@@ -109,7 +117,22 @@ class Character:
     parents: Mapping[int, int]
     faces_back: bool
     licence: str
+    painted: frozenset[str] = frozenset()
     notes: tuple[str, ...] = ()
+
+    @property
+    def moving_names(self) -> tuple[str, ...]:
+        """Names of morph targets and expressions that move a vertex; files hold empty ones for programs to find."""
+        moved = {target for piece in self.pieces for target, morph in piece.morphs.items() if piece.is_moved_by(morph)}
+        targets = [name for target, name in self.target_names.items() if target in moved]
+        bound = [name for name, binds in self.expressions.items() if moved & {t for t in binds if binds[t]}]
+        return tuple(dict.fromkeys([*targets, *bound]))
+
+    @property
+    def still_names(self) -> tuple[str, ...]:
+        """Names of morph targets and expressions that move nothing."""
+        moving = set(self.moving_names)
+        return tuple(n for n in dict.fromkeys([*self.target_names.values(), *self.expressions]) if n not in moving)
 
 
 def affine(points: FloatArray, matrix: FloatArray) -> FloatArray:

@@ -15,10 +15,11 @@ from tts2face.interchange.characters.head_mesh import HeadMesh
 from tts2face.interchange.characters.shape_names import ARKIT_SHAPES, VISEME_PREFIX
 from tts2face.interchange.characters.surface import Placement
 from tts2face.models.face import Face
-from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT
+from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT
 
 TRUE_EYE_DISTANCES_MM = (60.0, 140.0)  # outer corners; other sizes are scaled to the default head's
-MIN_GAP_MM = 3.0  # by which the lips must part at weight 1 of some shape
+# By which the lips must part at weight 1 of some shape, over the mouth's width: drawn characters have small mouths.
+MIN_GAP_SHARE = 0.04
 
 
 def place_face(face: Face, character: Character, head: HeadMesh, provisional: Placement) -> Face:
@@ -54,10 +55,12 @@ def drop_unsuited_shapes(face: Face) -> tuple[Face, list[str]]:
     """Face without blinks that do not close the eyes and wide eyes that do not open them, and notes about them."""
     mouth = build_lip_constraints(face)
     widest = float(mouth.gaps[:, mouth.moving].max(initial=0.0)) if len(mouth.moving) else 0.0
-    if widest < MIN_GAP_MM:
+    places = scatter_landmarks(face, landmark_positions(face))
+    width = float(np.linalg.norm(places[MOUTH_CORNER_LEFT] - places[MOUTH_CORNER_RIGHT]))
+    if widest < MIN_GAP_SHARE * width:
         raise DataError(
-            f"no shape parts the character's lips by more than {widest:.1f} mm; check the landmarks in a picture "
-            "(--preview) and the names of the shapes"
+            f"no shape parts the character's lips by more than {widest:.1f} mm, of a mouth {width:.0f} mm wide; check "
+            "the landmarks in a picture (--preview) and the names of the shapes"
         )
     complete = add_expression_shapes(face)
     motion = scatter_landmarks(complete, landmark_motion(complete, np.arange(len(complete.shape_names))))[:, 1]

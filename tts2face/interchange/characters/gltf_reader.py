@@ -12,6 +12,7 @@ from tts2face.interchange.gltf.nodes import find_bones, read_nodes
 from tts2face.interchange.gltf.reader import GltfFile, read_gltf
 
 MAX_LICENCE = 500  # characters
+PAINTING = ("textureTransformBinds", "materialColorBinds")  # of an expression of VRM 1
 Expressions = dict[str, Mapping[MorphTarget, float]]
 
 
@@ -29,7 +30,7 @@ def read_gltf_character(path: Path) -> Character:
         for number, mesh in enumerate(file.entries("meshes"))
         for target, name in enumerate(target_names(mesh))
     }
-    expressions, is_vrm0 = _expressions(file)
+    expressions, painted, is_vrm0 = _expressions(file)
     bones = find_bones(file.root, tree)
     return Character(
         pieces=pieces,
@@ -41,22 +42,24 @@ def read_gltf_character(path: Path) -> Character:
         parents=tree.parents,
         faces_back=is_vrm0,
         licence=_licence(file.root),
+        painted=painted,
         notes=tuple(dict.fromkeys(notes)),
     )
 
 
-def _expressions(file: GltfFile) -> tuple[Expressions, bool]:
-    """Expressions of a VRM file as weights of morph targets, and whether the file is VRM 0."""
+def _expressions(file: GltfFile) -> tuple[Expressions, frozenset[str], bool]:
+    """Expressions of a VRM file as weights of morph targets, those that are only painted, and whether it is VRM 0."""
     # VRM 1; VRM 0 has another extension, and weights in percent
     if (recent := file.root.extension("VRMC_vrm")) is not None:
-        return _vrm1_expressions(file, recent.child("expressions")), False
+        return *_vrm1_expressions(file, recent.child("expressions")), False
     if (earlier := file.root.extension("VRM")) is not None:
-        return _vrm0_expressions(file, earlier.child("blendShapeMaster")), True
-    return {}, False
+        return *_vrm0_expressions(file, earlier.child("blendShapeMaster")), True
+    return {}, frozenset(), False
 
 
-def _vrm1_expressions(file: GltfFile, fields: Fields) -> Expressions:
-    nodes, found = file.entries("nodes"), Expressions()
+def _vrm1_expressions(file: GltfFile, fields: Fields) -> tuple[Expressions, frozenset[str]]:
+    nodes = file.entries("nodes")
+    found, painted = Expressions(), set[str]()
     for group in ("preset", "custom"):
         named = fields.child(group)
         for name in named.content:
@@ -67,11 +70,13 @@ def _vrm1_expressions(file: GltfFile, fields: Fields) -> Expressions:
                 if mesh is not None:
                     binds[MorphTarget(mesh, bind.integer("index"))] = bind.number("weight", 1.0)
             found[str(name)] = binds
-    return found
+            if not binds and any(named.child(name).children(kind) for kind in PAINTING):
+                painted.add(str(name))
+    return found, frozenset(painted)
 
 
-def _vrm0_expressions(file: GltfFile, fields: Fields) -> Expressions:
-    found = Expressions()
+def _vrm0_expressions(file: GltfFile, fields: Fields) -> tuple[Expressions, frozenset[str]]:
+    found, painted = Expressions(), set[str]()
     for group in fields.children("blendShapeGroups"):
         binds: dict[MorphTarget, float] = {}
         for bind in group.children("binds"):
@@ -80,8 +85,11 @@ def _vrm0_expressions(file: GltfFile, fields: Fields) -> Expressions:
                 # VRM 0 states weights from 0 to 100
                 binds[MorphTarget(mesh, bind.integer("index"))] = bind.number("weight", 100.0) / 100.0
         preset = group.text("presetName")
-        found[preset if preset not in ("", "unknown") else group.text("name")] = binds
-    return found
+        name = preset if preset not in ("", "unknown") else group.text("name")
+        found[name] = binds
+        if not binds and group.children("materialValues"):
+            painted.add(name)
+    return found, frozenset(painted)
 
 
 def _licence(root: Fields) -> str:

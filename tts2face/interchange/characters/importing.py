@@ -31,7 +31,7 @@ from tts2face.interchange.characters.landmarks import (
     part_triangles,
 )
 from tts2face.interchange.characters.obj_reader import read_obj_folder
-from tts2face.interchange.characters.shape_names import guess_mapping
+from tts2face.interchange.characters.shape_names import combinations_of_shapes, guess_mapping
 from tts2face.interchange.characters.shapes import ShapeMapping, read_mapping
 from tts2face.interchange.characters.surface import Placement, add_gaze_shapes, build_face, is_plain, unwrap
 from tts2face.interchange.characters.surface_points import nearest_points
@@ -101,7 +101,7 @@ def read_character(path: Path) -> Character:
 
 def propose_mapping(character: Character) -> ShapeMapping:
     """Mapping guessed from the names of a character's morph targets and expressions."""
-    return guess_mapping([*character.target_names.values(), *character.expressions])
+    return guess_mapping(character.moving_names)
 
 
 def import_face(
@@ -171,7 +171,13 @@ def import_face(
         landmarks=places,
         score=None if table is not None else located.score,
         n_eyeballs=len(face.eyes),
-        notes=(*character.notes, *_pose_notes(character, chosen), *_colour_notes(character, head), *notes),
+        notes=(
+            *character.notes,
+            *_name_notes(character),
+            *_pose_notes(character, chosen),
+            *_colour_notes(character, head),
+            *notes,
+        ),
         licence=character.licence,
     )
     return ImportedFace(face, report)
@@ -193,12 +199,24 @@ def _complete_mapping(character: Character, given: str | Path | ShapeMapping | N
         if any(source_weights(character, source) for source in sources)
     }
     if not any(name.startswith(("jaw", "mouth")) for name in mapping):
-        names = sorted({*character.target_names.values(), *character.expressions})
-        raise DataError(
-            "the character has no shape of a known name that moves its mouth, so speech cannot move it; "
-            f"name its shapes in a file and give it as --mapping; it has: {_some(names)}"
-        )
+        raise DataError(_without_mouth(character))
     return mapping
+
+
+def _without_mouth(character: Character) -> str:
+    """Why speech cannot move a character's mouth, and what to do about it."""
+    names = sorted({*character.target_names.values(), *character.expressions})
+    vowels = [source.name for sources in guess_mapping(character.painted).values() for source in sources]
+    if vowels:
+        return (
+            f"the character's mouth is painted: {_some(sorted(set(vowels)))} exchange textures or colours and move no "
+            "vertex, so speech cannot move it; take a character whose mouth has shapes"
+        )
+    empty = f"; {_some(character.still_names)} move no vertex" if character.still_names else ""
+    return (
+        "the character has no shape of a known name that moves its mouth, so speech cannot move it; "
+        f"name its shapes in a file and give it as --mapping; it has: {_some(names)}{empty}"
+    )
 
 
 def _some(names: Sequence[str]) -> str:
@@ -260,6 +278,13 @@ def _unused_names(character: Character, mapping: ShapeMapping) -> tuple[str, ...
     used = {source.name for sources in mapping.values() for source in sources}
     names = dict.fromkeys([*character.target_names.values(), *character.expressions])
     return tuple(name for name in names if name not in used)
+
+
+def _name_notes(character: Character) -> list[str]:
+    """Notes about shapes that move nothing, and about combinations of shapes."""
+    empty, combined = character.still_names, combinations_of_shapes(character.moving_names)
+    notes = [f"shapes that move no vertex are as good as missing: {_some(empty)}"] if empty else []
+    return notes + ([f"shapes that combine others are left alone: {_some(combined)}"] if combined else [])
 
 
 def _pose_notes(character: Character, mapping: ShapeMapping) -> list[str]:

@@ -37,12 +37,17 @@ def with_sides(mapping: ShapeMapping) -> ShapeMapping:
             users.setdefault(source.name, set()).add(shape)
 
     def sided(shape: str, source: ShapeSource) -> ShapeSource:
-        for side, other in (SIDES, SIDES[::-1]):
-            if shape.endswith(side) and shape.removesuffix(side) + other in users[source.name]:
-                return replace(source, side=side)
-        return replace(source, side="")
+        side = next((side for side in SIDES if shape.endswith(side)), "")
+        both = side and users[source.name] & opposites(shape, side)
+        return replace(source, side=side if both else "")
 
     return {shape: tuple(sided(shape, source) for source in sources) for shape, sources in mapping.items()}
+
+
+def opposites(shape: str, side: str) -> set[str]:
+    """The shape of the other side; of one that looks in or out also the one that looks the same way there."""
+    other = shape.removesuffix(side) + SIDES[side == SIDES[0]]
+    return {other, other.replace("LookIn", "LookOut") if "LookIn" in other else other.replace("LookOut", "LookIn")}
 
 
 def read_mapping(path: Path) -> ShapeMapping:

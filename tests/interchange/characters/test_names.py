@@ -1,0 +1,149 @@
+"""Names of shapes of other programs: families recognised as a whole, exact names first, combinations left alone."""
+
+import csv
+from collections.abc import Iterable
+from importlib.resources import files
+
+import pytest
+
+from tts2face.interchange.characters.families import FOLDER, general_family, program_families, recognised_families
+from tts2face.interchange.characters.shape_names import ARKIT_SHAPES, combinations_of_shapes, guess_mapping
+from tts2face.interchange.characters.shapes import HEADER, ShapeSource
+
+VISEMES = tuple(f"mouthViseme_{at}" for at in ("aa", "ee", "ih", "oh", "ou", "pp", "ff", "th", "dd", "kk", "ch", "ss"))
+VISEMES += ("mouthViseme_nn", "mouthViseme_rr")
+FAMILIES = {  # names of a file, and how many of them are understood
+    "vrchat": ("vrc.v_sil vrc.v_pp vrc.v_ff vrc.v_th vrc.v_dd vrc.v_kk vrc.v_ch vrc.v_ss vrc.v_nn vrc.v_rr vrc.v_aa "
+               "vrc.v_e vrc.v_ih vrc.v_oh vrc.v_ou", 14),
+    "character_creator": ("V_Open V_Explosive V_Dental_Lip V_Tight_O V_Tight V_Wide V_Affricate V_Lip_Open", 8),
+    "mmd": ("あ い う え お まばたき 笑い 口角上げ 困る 怒り びっくり ぺろっ", 12),
+    "numbered": (" ".join(map(str, range(15))), 14),
+    "azure": (" ".join(f"viseme_{number}" for number in range(22)), 13),
+    "metahuman": ("CTRL_expressions_jawOpen CTRL_expressions_mouthFunnelUL CTRL_expressions_mouthFunnelDR "
+                  "CTRL_expressions_mouthCornerPullL CTRL_expressions_mouthLipsPurseUR CTRL_expressions_eyeBlinkL "
+                  "CTRL_expressions_browRaiseInL CTRL_expressions_eyeLookLeftR", 8),
+    "facs": ("AU12_L AU12_R AU1 AU02 AU_4 AU26 AU45_L AU45_R AU9 AU17 AU20_L", 11),
+    "daz": ("Genesis8Female__eCTRLMouthOpen Genesis8Female__eCTRLEyesClosedL Genesis8Female__eCTRLvF "
+            "Genesis8Female__eCTRLMouthSmileSimpleR Genesis8Female__eCTRLLipBottomUp-DownL", 5),
+    "genesis9": ("facs_jnt_JawOpen facs_bs_MouthFunnelUpperLeft facs_bs_MouthSmileLeft_div2 facs_ctrl_CheekPuff", 4),
+    "sranipal": ("Jaw_Open Mouth_Ape_Shape Mouth_Pout Mouth_Upper_Overturn Mouth_Lower_Inside Eye_Left_Squeeze "
+                 "Eye_Left_Right Mouth_Sad_Left Mouth_Upper_UpRight Tongue_LongStep2", 10),
+    "unified_expressions": ("JawOpen MouthClosed LipPuckerUpperLeft LipPuckerLowerRight LipSuckUpper EyeClosedLeft "
+                            "MouthCornerPullRight MouthRaiserLower BrowLowererLeft CheekPuffRight", 10),
+    "preston_blair": ("AI E O U MBP FV L WQ etc rest", 9),
+    "character_generator": ("h_expressions.MouthOpen_h h_teeth.t_MouthOpen_h OutMiddle_tg_h "
+                            "h_expressions.RsmileClose_h "
+                            "h_expressions.LLbrowUp_h h_expressions.FV_h t_JawFront_h h_expressions.ReyeClose_h", 8),
+    "faceshift": ("JawOpen LipsFunnel BrowsU_C BrowsD_L EyeIn_R MouthSmile_L Puff Sneer", 8),
+    "meta": ("Jaw_Drop Lip_Pucker_L Lips_Toward Eyes_Closed_R Lip_Suck_LT Chin_Raiser_B Lip_Corner_Puller_L", 7),
+    "vroid": ("Face.M_F00_Fcl_MTH_A Fcl_MTH_O Fcl_EYE_Close_L Fcl_BRW_Angry", 4),
+    "vrm": ("A I U E O Blink LookUp LookLeft LookRight", 9),
+    "oculus": ("viseme_sil viseme_PP viseme_aa viseme_E viseme_RR viseme_nn", 5),
+}  # fmt: skip
+
+
+def understood(names: Iterable[str]) -> list[str]:
+    given = list(names)
+    used = {source.name for sources in guess_mapping(given).values() for source in sources}
+    return [name for name in given if name in used]
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_names_of_a_family_are_understood(family: str) -> None:
+    text, count = FAMILIES[family]
+    names = text.split(" ")
+    assert len(understood(names)) == count, set(names) - set(understood(names))
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_family_is_recognised_in_any_case_and_under_a_prefix(family: str) -> None:
+    names = FAMILIES[family][0].split(" ")
+    for spelled in (names, [f"Armature|{name}" for name in names], [name.replace("vrc.", "vrc_") for name in names]):
+        assert recognised_families(spelled)[0][0].name == family
+
+
+def test_every_family_is_tried() -> None:
+    assert {family.name for family in program_families()} == {*FAMILIES}
+
+
+@pytest.mark.parametrize("table", [*FAMILIES, "general"])
+def test_tables_name_their_source_and_known_shapes(table: str) -> None:
+    lines = files(FOLDER).joinpath(f"{table}.tsv").read_text("utf-8").splitlines()
+    assert lines[0].startswith("# ")
+    assert lines[1].startswith("# Source: ")
+    rows = list(csv.DictReader(lines[2:], delimiter="\t"))
+    assert tuple(rows[0]) == HEADER
+    known = {*ARKIT_SHAPES, *VISEMES, "tongueUp"}
+    for row in rows:
+        shape = row["shape"]
+        assert known & {shape.replace("*", "Left"), shape}, row
+        assert ("*" in shape) <= (shape.replace("*", "Right") in known), row
+
+
+def test_the_general_table_takes_no_place_of_a_family() -> None:
+    mapping = guess_mapping(["mouthOpen", "h_expressions.MouthOpen_h", "h_expressions.Kiss_h", "h_expressions.S_h"])
+    assert mapping["jawOpen"] == (ShapeSource("h_expressions.MouthOpen_h", 1.5),)
+
+
+@pytest.mark.parametrize("names", [
+    [f"Key {number}" for number in range(1, 16)], ["Basis", "breath", "mood"], ["a", "b", "e"], ["L", "R", "E"],
+    ["1", "2", "3"], ["Smile_bone", "eyelashes", "left_hand_fist"],
+])  # fmt: skip
+def test_names_of_no_family_are_left_alone(names: list[str]) -> None:
+    assert not understood(names)
+
+
+@pytest.mark.parametrize(
+    ("name", "shape"),
+    [
+        ("JAWOPEN", "jawOpen"), ("EYEBLINKLEFT", "eyeBlinkLeft"), ("MOUTH_SMILE_R", "mouthSmileRight"),
+        ("eye closed.L", "eyeBlinkLeft"), ("jawOpen.001", "jawOpen"), ("ｊａｗＯｐｅｎ", "jawOpen"),
+        ("L_eyeBlink", "eyeBlinkLeft"), ("eyeLookLeft", "eyeLookOutLeft"), ("lookRight", "eyeLookInLeft"),
+    ],
+)  # fmt: skip
+def test_spellings(name: str, shape: str) -> None:
+    assert guess_mapping([name])[shape][0].name == name
+
+
+def test_a_look_of_both_eyes_is_divided() -> None:
+    mapping = guess_mapping(["lookLeft", "lookRight"])
+    assert mapping["eyeLookOutLeft"] == (ShapeSource("lookLeft", 1.0, "Left"),)
+    assert mapping["eyeLookInRight"] == (ShapeSource("lookLeft", 1.0, "Right"),)
+    assert mapping["eyeLookOutRight"] == (ShapeSource("lookRight", 1.0, "Right"),)
+
+
+@pytest.mark.parametrize(
+    ("combination", "others"),
+    [
+        ("jawOpen_mouthClose", ["mouthClose", "jawOpen"]),
+        ("jawOpen__mouthClose", ["mouthClose", "jawOpen"]),
+        ("jawOpen.mouthClose", ["mouthClose", "jawOpen"]),
+        ("JawOpenMouthClose", ["JawOpen", "MouthClose"]),
+        ("mouthSmile_L-browDown_L", ["mouthSmile_L", "browDown_L"]),
+        ("corrective_jawOpen", ["jawOpen"]),
+        ("MyShape_jawOpen", ["MyShape", "jawOpen"]),
+        ("AU12_L_AU26", ["AU12_L", "AU26"]),
+    ],
+)
+def test_combinations_are_none_of_their_parts(combination: str, others: list[str]) -> None:
+    names = [combination, *others]
+    assert combinations_of_shapes(names) == [combination]
+    assert combination not in understood(names)
+
+
+def test_a_prefix_is_no_part_of_a_combination() -> None:
+    assert not combinations_of_shapes(["Head_jawOpen", "Head_mouthSmileLeft", "blendShape1.mouthClose", "eyeBlink_L"])
+    assert understood(["Head_jawOpen", "blendShape1.mouthClose"]) == ["Head_jawOpen", "blendShape1.mouthClose"]
+
+
+def test_sums_and_alternatives() -> None:
+    assert general_family().sources({"blinkleft": "blink_L", "eyesclosed": "eyesClosed"})["eyeBlinkLeft"] == (
+        ShapeSource("blink_L"),
+    )
+    mapping = guess_mapping(["CTRL_expressions_jawOpen", *(f"CTRL_expressions_mouthFunnel{at}" for at in ("UL", "DR"))])
+    assert [source.name[-2:] for source in mapping["mouthFunnel"]] == ["UL", "DR"]
+
+
+def test_visemes_of_contacts_stand_beside_a_jaw() -> None:
+    mapping = guess_mapping(["jawOpen", "viseme_aa", "viseme_FF", "viseme_PP"])
+    assert [shape for shape in mapping if "Viseme" in shape] == ["mouthViseme_ff", "mouthViseme_pp"]
