@@ -58,6 +58,18 @@ def test_markers_and_their_stills_become_a_style(recorded: StyleSource, made: Ma
     assert np.corrcoef(moved[10:-10], raised[10:-10])[0, 1] > 0.6  # the rest is in the expressions
 
 
+def test_a_style_is_learnt_from_the_pieces_between_long_gaps(recorded: StyleSource, made: Made, tmp_path: Path) -> None:
+    points = made.points.copy()
+    points[200:240, made.names.index("LBRO2")] = np.nan
+    write_c3d(recorded.recordings, made.names, points)
+    out = tmp_path / "worn.palette"
+    built = build_style(
+        recorded, "worn", out, base=load_palette("starter"), run_options=RunOptions(tmp_path / "cache", 1)
+    )
+    assert read_palette(out).styles["worn"].lengths.tolist() == [50, 60]
+    assert any(note.startswith("take: the marker LBRO2 is hidden from 1.67 to 2.00 s") for note in built.notes)
+
+
 def test_epsilon_widens_the_limits_of_the_weights(recorded: StyleSource, tmp_path: Path) -> None:
     weights = {}
     for epsilon in (0.0, 0.5):
