@@ -17,6 +17,8 @@ SIDE_NAMES = {LEFT_EYE: "Left", RIGHT_EYE: "Right"}
 BONES = {LEFT_EYE: "leftEye", RIGHT_EYE: "rightEye"}
 MAX_ROUNDNESS_ERROR = 0.12  # standard deviation of the distance from the centre over the radius; a cornea has 0.05
 MIN_VERTICES = 20
+LEAST_DEPTH, LEAST_WIDTH = 0.5, 1.4  # radii along the shortest and the middle axis of half an eyeball or more
+LARGEST_RADIUS = 0.45  # of the distance of the lids: two eyeballs lie beside each other, hair lies round the head
 LID_REACH = 1.0  # radii between the centre of an eyeball and the middle of the vertices that its lid moves, in x and y
 MOVED_BY_SHAPES = 0.02  # of the radius: a gaze shape that moves an eyeball's vertices further turns it itself
 
@@ -97,16 +99,30 @@ def _by_spheres(head: HeadMesh) -> NDArray[np.int8]:
         return marked
     component = _components(head)
     sizes = np.bincount(component)
-    for eye, blink in BLINKS.items():
-        closing = np.linalg.norm(head.shapes[blink], axis=1)
-        lid = (head.vertices * closing[:, None]).sum(axis=0) / max(float(closing.sum()), 1e-12)
+    lids = {eye: _middle_of_motion(head, blink) for eye, blink in BLINKS.items()}
+    largest = LARGEST_RADIUS * float(np.linalg.norm(lids[LEFT_EYE] - lids[RIGHT_EYE]))
+    for eye, lid in lids.items():
         for number in np.flatnonzero(sizes >= MIN_VERTICES):
             rows = component == number
             centre, radius, error = fit_sphere(head.vertices[rows])
             near = float(np.hypot(*(centre - lid)[:2])) < LID_REACH * radius
+            near &= radius < largest and _is_ball(head.vertices[rows], radius)
             if near and error < MAX_ROUNDNESS_ERROR * radius and abs(centre[2] - lid[2]) < 3 * radius:
                 marked[rows] = eye
     return marked
+
+
+def _middle_of_motion(head: HeadMesh, shape: str) -> FloatArray:
+    """Mean place (3,) of the vertices that a shape moves, weighted by how far."""
+    moved = np.linalg.norm(head.shapes[shape], axis=1)
+    middle: FloatArray = (head.vertices * moved[:, None]).sum(axis=0) / max(float(moved.sum()), 1e-12)
+    return middle
+
+
+def _is_ball(points: FloatArray, radius: float) -> bool:
+    """Whether points (N, 3) on a sphere are half of one or more, not a strip as lashes are, which move with the lid."""
+    flat, middle, _ = np.sort(np.ptp(points, axis=0))
+    return bool(flat > LEAST_DEPTH * radius and middle > LEAST_WIDTH * radius)
 
 
 def _components(head: HeadMesh) -> NDArray[np.int32]:

@@ -20,8 +20,9 @@ FOLDER = "tts2face.interchange.characters.names"
 GENERAL = "general"
 # Names of which a family is recognised; of tables of distinctive names one is enough, of bare vowels and numbers not.
 LEAST_NAMES = 2
-LEAST = {"arkit": 1, "general": 1, "oculus": 1, "vroid": 1, "facs": 1, "vrm": 3}
+LEAST = {"arkit": 1, "general": 1, "oculus": 1, "vroid": 1, "facs": 1, "vrm": 1}
 LEAST |= {"preston_blair": 4, "azure": 5, "numbered": 5}
+LEAST_LETTERS = 3  # names of one letter, as A, I and U, that are meant as vowels
 NUMBERS = ("azure", "numbered")  # only one of them is meant
 COMMON_PREFIX = 3  # names after which a prefix may be followed by one word: Mouth_AI, Mouth_E, Mouth_O
 MARKERS = ("corrective", "correction", "corr", "cor", "combination", "combo", "comb", "fix")
@@ -63,6 +64,9 @@ class Family:
             for own, name in by_prefix[prefix].items():
                 if not prefix or many or is_firm(name, prefix):
                     kept.setdefault(own, name)
+        letters = [own for own in kept if len(own) == 1 and own.isascii() and own.isalpha()]
+        if len(letters) < LEAST_LETTERS:
+            kept = {own: name for own, name in kept.items() if own not in letters}
         return kept if len(kept) >= LEAST.get(self.name, LEAST_NAMES) else {}
 
     def sources(self, found: Mapping[str, str]) -> dict[str, tuple[ShapeSource, ...]]:

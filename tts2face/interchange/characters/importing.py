@@ -33,7 +33,14 @@ from tts2face.interchange.characters.landmarks import (
 from tts2face.interchange.characters.obj_reader import read_obj_folder
 from tts2face.interchange.characters.shape_names import combinations_of_shapes, guess_mapping
 from tts2face.interchange.characters.shapes import ShapeMapping, read_mapping
-from tts2face.interchange.characters.surface import Placement, add_gaze_shapes, build_face, is_plain, unwrap
+from tts2face.interchange.characters.surface import (
+    Placement,
+    add_gaze_shapes,
+    build_face,
+    is_plain,
+    shells_before_eyes,
+    unwrap,
+)
 from tts2face.interchange.characters.surface_points import nearest_points
 from tts2face.interchange.gltf.reader import SUFFIXES
 from tts2face.models.face import Face
@@ -301,13 +308,18 @@ def _pose_notes(character: Character, mapping: ShapeMapping) -> list[str]:
 
 
 def _colour_notes(character: Character, head: HeadMesh) -> list[str]:
-    """Notes about white materials, whose colour is replaced."""
-    used = [character.pieces[number] for number in np.unique(head.piece_of).tolist()]
+    """Notes about white materials, whose colour is replaced, and about shells that are left out."""
+    shells = set(shells_before_eyes(character)) & set(head.piece_of.tolist())
+    used = [character.pieces[number] for number in np.unique(head.piece_of).tolist() if number not in shells]
     plain = {
         piece.material for piece in used if piece.colours is None and is_plain(character.materials[piece.material])
     }
     names = sorted(character.materials[number].name for number in plain)
-    return [f"the material {name[:60]!r} is white without an image; plain colours replace it" for name in names]
+    notes = [f"the material {name[:60]!r} is white without an image; plain colours replace it" for name in names]
+    if shells:
+        left_out = sorted({character.materials[character.pieces[number].material].name for number in shells})
+        notes.append(f"shells before the eyes that are not transparent are left out: {_some(left_out)}")
+    return notes
 
 
 def _metadata(path: Path, character: Character, mapping: ShapeMapping, head: HeadMesh, face: Face) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Reading of a character from a folder of .obj files: ``neutral.obj`` and one file for each shape."""
+"""Reading of a character from a folder of .obj files: one at rest, such as ``neutral.obj``, and one for each shape."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -9,21 +9,22 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from tts2face.interchange.characters.character import Character, Material, MaterialPiece, MorphTarget
 from tts2face.interchange.characters.landmark_table import MAX_COORDINATE
+from tts2face.interchange.characters.name_words import all_words
 from tts2face.interchange.characters.obj_materials import read_libraries, read_lines
 from tts2face.numeric.arrays import FloatArray
 
-NEUTRAL = "neutral.obj"
+NEUTRAL, OTHER_NEUTRALS = "neutral", ("basis", "base", "rest", "default")
+SUFFIX = ".obj"
 MAX_OBJ_VERTICES = 500_000
 MAX_SHAPES = 500
 
 
 def read_obj_folder(folder: Path) -> Character:
-    """Character of a folder: faces, texture places and materials of ``neutral.obj``, and shapes of equal vertices."""
-    neutral = folder / NEUTRAL
-    if not neutral.is_file():
-        raise DataError(f"{folder} has no {NEUTRAL}; name the face at rest so")
+    """Character of a folder: faces, texture places and materials of the face at rest, and shapes of equal vertices."""
     # sorted: folders list their files in any order
-    shapes = sorted(path for path in folder.glob("*.obj") if path.name != NEUTRAL)
+    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() == SUFFIX and path.is_file())
+    neutral = _find_neutral(folder, paths)
+    shapes = [path for path in paths if path != neutral]
     if len(shapes) > MAX_SHAPES:
         raise DataError(f"{folder} has {len(shapes)} shapes; reduce them to at most {MAX_SHAPES}")
     mesh = _ObjFile(neutral)
@@ -33,7 +34,7 @@ def read_obj_folder(folder: Path) -> Character:
         places = read_vertices(path)
         if len(places) != len(mesh.vertices):
             raise DataError(
-                f"{path} has {len(places)} vertices, but {NEUTRAL} has {len(mesh.vertices)}; export it again"
+                f"{path} has {len(places)} vertices, but {neutral.name} has {len(mesh.vertices)}; export it again"
             )
         moved[target] = (places - mesh.vertices).astype(np.float32)
     known = read_libraries(folder, mesh.libraries)
@@ -43,6 +44,20 @@ def read_obj_folder(folder: Path) -> Character:
     if not pieces:
         raise DataError(f"{neutral} has no faces; export the mesh, not only its points")
     return Character(pieces, tuple(materials), names, {}, {}, {}, {}, faces_back=False, licence="")
+
+
+def _find_neutral(folder: Path, paths: list[Path]) -> Path:
+    """The face at rest: ``neutral.obj`` in any case, else the one file whose name has the word, else ``base.obj``."""
+    exact = [path for path in paths if path.stem.lower() == NEUTRAL]
+    worded = [path for path in paths if NEUTRAL in all_words(path.stem)]
+    others = [path for path in paths if path.stem.lower() in OTHER_NEUTRALS]
+    found = next((some for some in (exact, worded, others) if some), [])
+    if len(found) > 1:
+        names = ", ".join(path.name[:60] for path in found[:4])
+        raise DataError(f"{folder} has several faces at rest ({names}); leave one of them in it")
+    if not found:
+        raise DataError(f"{folder} has no {NEUTRAL}{SUFFIX}; name the face at rest so")
+    return found[0]
 
 
 def read_vertices(path: Path) -> FloatArray:

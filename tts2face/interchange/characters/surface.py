@@ -31,11 +31,17 @@ SHADING = {
 _KINDS = {
     "lashes": re.compile(r"lash", re.I),
     "brows": re.compile(r"brow", re.I),
-    "teeth": re.compile(r"teeth|tooth|gum|dent(?:al|ure)", re.I),
-    "tongue": re.compile(r"tongue", re.I),
+    "teeth": re.compile(r"teeth|tooth|dent(?:al|ure)", re.I),
+    "tongue": re.compile(r"tongue|gum", re.I),
     "hair": re.compile(r"hair|beard|mustache|moustache", re.I),
     "eyes": re.compile(r"eye(?!.?(?:lid|shadow|socket))|cornea|sclera|iris|pupil", re.I),  # unless speech moves it
 }
+# Transparent shells before the eye, by the names of Unreal, MetaHuman, Character Creator and DAZ; programs that lose
+# their transparency write them opaque, and they would cover the eye as skin.
+_SHELLS = re.compile(
+    r"lacrimal|tear.?(?:line|fluid|film)|(?<![a-z])tears?(?![a-z])|eye.?(?:occlusion|blend|shell|edge|moisture|wet)",
+    re.I,
+)
 # sRGB of white materials without an image: they would hide the features of the face.
 PLAIN = {
     "skin": (214, 164, 140),
@@ -100,6 +106,7 @@ def build_face(head: HeadMesh, character: Character, placement: Placement) -> Fa
     for number in np.unique(material_of).tolist():
         rows, material = material_of == number, character.materials[number]
         opacity[rows] = triangle_opacity(material, head.uv[head.triangles[rows]])
+    opacity[np.isin(head.piece_of, shells_before_eyes(character))] = 0.0
     if not (opacity > 0).any():
         raise DataError("no triangle of the character is visible; check the alpha of its materials")
     kind_of = np.array([kinds[n] for n in range(len(character.pieces))])[head.piece_of]
@@ -216,6 +223,16 @@ def add_gaze_shapes(head: HeadMesh) -> HeadMesh:
             for name in gaze_turns(eye):
                 shapes.setdefault(name, np.zeros(head.vertices.shape, np.float32))
     return replace(head, shapes=shapes)
+
+
+def shells_before_eyes(character: Character) -> list[int]:
+    """Pieces that lie before the eyes and whose transparency the file has lost."""
+    return [
+        number
+        for number, piece in enumerate(character.pieces)
+        if character.materials[piece.material].alpha_mode == OPAQUE
+        and _SHELLS.search(f"{piece.name} {character.materials[piece.material].name}")
+    ]
 
 
 def is_plain(material: Material) -> bool:
