@@ -265,6 +265,7 @@ def _report_text(report: "ImportReport") -> str:
     from tts2face.interchange.characters.shapes import mapping_table
 
     score = "read from the table" if report.score is None else f"tracked, score {report.score:.2f}"
+    score = score if report.landmarks else "none is found"
     lines = [mapping_table(report.mapping).rstrip()]
     lines += [f"missing {name}: {replacement}" for name, replacement in report.missing.items()]
     lines += [f"unused: {', '.join(report.unused)}"] if report.unused else []

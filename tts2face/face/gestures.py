@@ -18,6 +18,7 @@ from tts2face.face.eyelids import EyelidModel, build_eyelid_model
 from tts2face.face.landmarks import axis_scales, landmark_positions, procrustes_rotation, scatter_landmarks
 from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES, LipConstraints, build_lip_constraints
 from tts2face.face.shape_transfer import SCALE_LIMITS, append_shapes, spread_landmark_motion
+from tts2face.face.stand_in import stand_in, with_channels_of
 from tts2face.models.face import Face
 from tts2face.models.landmarks import LID_RINGS, LIP_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.models.palette import FEATURES, FIXED_CHANNELS, REGION_FEATURES, FaceRegion, Palette
@@ -179,13 +180,14 @@ def gesture_face(face: Face, palette: Palette) -> GestureFace:
     """Face prepared for the gestures of a palette.
 
     ARKit shapes that the face lacks are transferred from the default head by the landmarks; each mode of the palette's
-    regions becomes a shape such as ``brows0``.
+    regions becomes a shape such as ``brows0``. A face without landmarks of lips has a stand-in (`stand_in`).
 
     Raises
     ------
     DataError
         The face lacks landmarks of the eyes or lips, or has no shape that speech moves.
     """
+    own, face = face, stand_in(face)
     build_lip_constraints(face)  # raises for a face without lips before the transfer
     extended_face = add_expression_shapes(face)
     neutral = palette.neutral.astype(np.float64)
@@ -201,7 +203,7 @@ def gesture_face(face: Face, palette: Palette) -> GestureFace:
     extended_face = append_shapes(extended_face, names, np.concatenate(shapes), limits)
     mouth = build_lip_constraints(extended_face)
     return GestureFace(
-        face=extended_face,
+        face=extended_face if own is face else with_channels_of(own, extended_face),
         n_speech_shapes=len(face.shape_names),
         expressions=expression_weights(extended_face, mouth.with_smile_cost()),
         regions=regions,

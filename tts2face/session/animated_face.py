@@ -18,6 +18,7 @@ from tts2face.face.appearance_regression import AppearanceRegression, fit_appear
 from tts2face.face.gestures import SPEECH_GAINS, GestureFace, gesture_face
 from tts2face.face.landmarks import moved_landmarks
 from tts2face.face.own_face import OwnFaceGestures, build_own_face_gestures
+from tts2face.face.stand_in import stand_in
 from tts2face.lips.articulation import DEFAULT_ARTICULATION, Articulator, build_articulator
 from tts2face.lips.cloning import build_parameter_transfer, extend_talker
 from tts2face.lips.exemplar import (
@@ -148,10 +149,14 @@ class AnimatedFace(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class MeshFace:
-    """A mesh to whose shapes the talker's motion is retargeted; `gestures` is None without a palette."""
+    """A mesh to whose shapes the talker's motion is retargeted; `gestures` is None without a palette.
+
+    `model` is the face whose landmarks are moved: the mesh itself, or the stand-in of one without landmarks.
+    """
 
     default_styles: ClassVar[Mapping[str, str]] = MappingProxyType({})
     face: Face
+    model: Face
     exemplars: ExemplarModel
     retargeter: Retargeter
     articulator: Articulator
@@ -190,7 +195,7 @@ class MeshFace:
 
     def motion_of_take(self, take: "Take", *, gain: float = 1.0) -> Trajectory:
         """Shape weights (T, K) of a performer: lips, lids and brows from landmarks, gaze from scores."""
-        retargeter = build_performer_retargeter(take.landmarks, take.scores, self.face)
+        retargeter = build_performer_retargeter(take.landmarks, take.scores, self.model)
         return retargeter.weights(take.landmarks, take.scores, gain=gain)
 
     def motion_of_capture(self, capture: "FaceCapture", *, gain: float = 1.0) -> Trajectory:
@@ -230,7 +235,8 @@ class MeshFace:
 @shared
 def mesh_face(talker: Talker, exemplars: ExemplarModel, face: Face) -> MeshFace:
     """Prepare a mesh for a talker, without gestures."""
-    return MeshFace(face, exemplars, build_retargeter(talker, face), build_articulator(face), None)
+    model = stand_in(face)
+    return MeshFace(face, model, exemplars, build_retargeter(talker, model), build_articulator(model), None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from tts2face.face.landmarks import landmark_motion
 from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES
+from tts2face.face.stand_in import stand_in
 from tts2face.interchange.characters.binding import character_file, read_binding
 from tts2face.interchange.characters.bone_tracks import BoneTracks, Track
 from tts2face.interchange.characters.character import Character, MorphTarget
@@ -144,7 +145,7 @@ def _own_values(motion: Trajectory, face: Face, own: list[str]) -> FloatArray:
         if group and columns:
             shapes = np.array([channels.index(own[n]) for n in columns])
             missing = (np.array(group), values[:, group])
-            kept[:, columns] = _with_replacement(face, shapes, kept[:, columns], missing)
+            kept[:, columns] = _with_replacement(stand_in(face), shapes, kept[:, columns], missing)
     return kept
 
 

@@ -10,9 +10,10 @@ from tts2face.face.eyelids import BLINK_SHAPES, LID_LANDMARK_PAIRS, WIDE_SHAPES,
 from tts2face.face.landmarks import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.face.lip_constraints import build_lip_constraints
 from tts2face.face.shape_transfer import default_head, eye_distance
+from tts2face.face.stand_in import VISEME_PREFIX
 from tts2face.interchange.characters.character import Character
 from tts2face.interchange.characters.head_mesh import HeadMesh
-from tts2face.interchange.characters.shape_names import ARKIT_SHAPES, VISEME_PREFIX
+from tts2face.interchange.characters.shape_names import ARKIT_SHAPES
 from tts2face.interchange.characters.surface import Placement
 from tts2face.models.face import Face
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT
@@ -25,6 +26,8 @@ MIN_GAP_SHARE = 0.04
 def place_face(face: Face, character: Character, head: HeadMesh, provisional: Placement) -> Face:
     """Face in mm with its origin between the eyes and the pivot of its head."""
     model = default_head()
+    if not len(face.landmarks):
+        return _place_by_eyes(face, model)
     distance = eye_distance(face)
     # glTF counts in metres; other sizes of eyes are stylised or in other units
     metres = distance / provisional.scale * 1000.0
@@ -48,6 +51,24 @@ def place_face(face: Face, character: Character, head: HeadMesh, provisional: Pl
         shapes=face.shapes * factor,
         eyes=tuple(replace(eye, centre=((eye.centre - origin) * scale).astype(np.float32)) for eye in face.eyes),
         pivot=np.asarray(pivot, np.float32),
+    )
+
+
+def _place_by_eyes(face: Face, model: Face) -> Face:
+    """A face without landmarks in mm: its eyeballs where the default head has them, otherwise its moved part."""
+    if len(face.eyes) == 2:
+        near, far = ([eye.centre.astype(np.float64) for eye in one.eyes] for one in (face, model))
+        scale = float(np.linalg.norm(far[0] - far[1]) / np.linalg.norm(near[0] - near[1]))
+        origin = np.mean(near, axis=0)
+    else:
+        moved = face.vertices[np.abs(face.shapes).max(axis=(0, 2), initial=0.0) > 0]
+        scale, origin = 1.0, moved.mean(axis=0)
+    return replace(
+        face,
+        vertices=((face.vertices - origin) * scale).astype(np.float32),
+        shapes=face.shapes * np.float32(scale),
+        eyes=tuple(replace(eye, centre=((eye.centre - origin) * scale).astype(np.float32)) for eye in face.eyes),
+        pivot=model.pivot,
     )
 
 

@@ -41,7 +41,7 @@ from tts2face.interchange.characters.surface import (
     shells_before_eyes,
     unwrap,
 )
-from tts2face.interchange.characters.surface_points import nearest_points
+from tts2face.interchange.characters.surface_points import SurfacePoints, nearest_points
 from tts2face.interchange.gltf.reader import SUFFIXES
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
@@ -50,6 +50,11 @@ from tts2face.processes.threads import available_cores
 from tts2face.video.tracking import MIN_SCORE
 
 FRONTS = {"+z": 0.0, "-z": 180.0, "+x": -90.0, "-x": 90.0}  # axis that a character looks along -> turn, degrees
+NO_LANDMARKS = LocatedLandmarks(np.zeros(0, np.int64), SurfacePoints(np.zeros((0, 3), np.int64), np.zeros((0, 3))), 0.0)
+WITHOUT_LANDMARKS = (
+    "no face is recognised in its pictures, so speech and gestures give its shapes the weights of the default head, by "
+    "name; if it has a human face, give the axis that it looks along with --front, or its landmarks with --landmarks"
+)
 PROVISIONAL_HEIGHT_MM = 150.0  # of the moved part of a face, until the distance of its eyes is known
 
 
@@ -159,14 +164,14 @@ def import_face(
     candidates = _turned_heads(character, chosen, front)
     if table is None:
         head, provisional, views = _find_front(candidates, character, model)
-        drawn, located = views.face, locate_landmarks(views)
+        drawn, located = views.face, locate_landmarks(views) or NO_LANDMARKS
     else:
         head = next(candidates)
         provisional = _provisional_placement(head)
         drawn = build_face(head, character, provisional)
         located = _project_table(table, head, drawn)
     face = place_face(_with_landmarks(drawn, located), character, head, provisional)
-    face, notes = drop_unsuited_shapes(face)
+    face, notes = drop_unsuited_shapes(face) if located is not NO_LANDMARKS else (face, [WITHOUT_LANDMARKS])
     face = replace(face, metadata=_metadata(path, character, chosen, head, face))
     face = bake_occlusion(face, available_cores())
     positions = located.points.places(drawn.vertices) / provisional.scale + provisional.origin
@@ -176,7 +181,7 @@ def import_face(
         unused=_unused_names(character, chosen),
         missing=missing_shapes(face),
         landmarks=places,
-        score=None if table is not None else located.score,
+        score=None if table is not None or located is NO_LANDMARKS else located.score,
         n_eyeballs=len(face.eyes),
         notes=(
             *character.notes,

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import DataError
 from tts2face.interchange.characters.surface_points import SurfacePoints, points_under_pixels
 from tts2face.models.face import Face, keep_parts
 from tts2face.models.landmarks import (
@@ -79,8 +78,8 @@ class CharacterViews:
         return replace(self._shown, picture=picture, optics=optics, lights=lights)
 
 
-def locate_landmarks(views: CharacterViews) -> LocatedLandmarks:
-    """Landmarks of a face without landmarks.
+def locate_landmarks(views: CharacterViews) -> LocatedLandmarks | None:
+    """Landmarks of a face without landmarks; None where no face is recognised, as in the head of an animal.
 
     The skin is read at rest in all `VIEWS`, the inner lips with an open mouth. Each landmark is the reading nearest to
     the median of all.
@@ -90,10 +89,7 @@ def locate_landmarks(views: CharacterViews) -> LocatedLandmarks:
     rest = np.zeros(len(face.shape_names), np.float32)
     readings, scores = _readings(views, [rest], skin, np.arange(N_MESH_LANDMARKS))
     if len(readings) < len(VIEWS) // 2:
-        raise DataError(
-            "no face is recognised in the pictures of the character; give the axis that it looks along with --front, "
-            "or the positions of its landmarks with --landmarks"
-        )
+        return None
     numbers, points = np.arange(N_MESH_LANDMARKS), _medoids(readings, face.vertices)
     opened = _opened_weights(face)
     if opened:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 
+from tts2face.face.stand_in import VISEME_PREFIX
 from tts2face.interchange.characters.families import (
     arkit_family,
     combinations,
@@ -22,7 +23,6 @@ UNSIDED = (
     "mouthRollUpper", "mouthShrugLower", "mouthShrugUpper", "tongueOut",
 )  # fmt: skip
 ARKIT_SHAPES = tuple(sorted([*(stem + side for stem in SIDED for side in SIDES), *UNSIDED]))
-VISEME_PREFIX = "mouthViseme_"  # the prefix marks shapes that speech moves
 CONTACT_VISEMES = ("mouthViseme_ff", "mouthViseme_pp")  # lips that touch, beside ARKit's shapes, too
 
 

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES
+from tts2face.face.stand_in import VISEME_PREFIX
 from tts2face.interchange.characters.atlas import CUTOUT, Atlas, build_atlas, srgb, triangle_opacity
 from tts2face.interchange.characters.character import OPAQUE, Character, Material
 from tts2face.interchange.characters.eyeballs import eyeball_centres, fit_sphere, gaze_turns
 from tts2face.interchange.characters.head_mesh import LEFT_EYE, RIGHT_EYE, HeadMesh
-from tts2face.interchange.characters.shape_names import VISEME_PREFIX
 from tts2face.models.face import VERTEX_COLOURS, WIDE_OPEN, Eye, Face, FacePart, Texture
 from tts2face.numeric.arrays import FloatArray
 

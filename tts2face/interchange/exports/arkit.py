@@ -11,6 +11,7 @@ from tts2face.face.landmarks import landmark_motion, scatter_landmarks
 from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES
 from tts2face.face.mouth import mouth_curvature
 from tts2face.face.shape_transfer import add_missing_shapes
+from tts2face.face.stand_in import stand_in
 from tts2face.interchange.exports.parts import Target
 from tts2face.models.face import Face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, MOUTH_REGION
@@ -146,6 +147,9 @@ def _by_vertices(face: Face, columns: NDArray[np.int64], others: NDArray[np.int6
     if not len(helpers) or not len(others):
         return None
     own = face.shapes[columns[helpers]].reshape(len(helpers), -1).astype(np.float64)
+    # a face without landmarks has no shapes for gestures that it lacks
+    if not own.any():
+        return None
     # the sums of single precision differ with the number of threads
     curvature = own @ own.T
     curvature += RIDGE * float(np.trace(curvature)) / len(curvature) * np.eye(len(curvature))
@@ -158,7 +162,7 @@ def _by_mouth(face: Face, channels: tuple[str, ...], others: NDArray[np.int64]) 
     if not len(others):
         return None
     names = [name for name in ARKIT_SHAPES if name.startswith(SPEECH_SHAPE_PREFIXES) and name not in NO_VISEME]
-    complete = add_missing_shapes(face, names)
+    complete = add_missing_shapes(stand_in(face), names)
     rows = np.array([complete.shape_names.index(name) for name in (*names, *(channels[at] for at in others))])
     motion = scatter_landmarks(complete, landmark_motion(complete, rows))
     common = [landmark for landmark in MOUTH_REGION if np.isfinite(motion[landmark]).all()]
