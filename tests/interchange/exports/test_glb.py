@@ -13,6 +13,7 @@ from PIL import Image
 
 import tts2face
 from lexicon.errors import InputError
+from lexicon.sequence import PhoneSequence
 from tests.interchange.exports import programs
 from tests.interchange.exports.made import FACE, RATE, made_clip, made_stream, signed_clip, turned_clip, with_gesture
 from tests.packages import package
@@ -23,7 +24,7 @@ from tts2face.interchange.exports.surfaces import divide_surface
 from tts2face.interchange.gltf.container import GltfBuffer
 from tts2face.numeric.arrays import continuous_quaternions, quaternion_matrix
 from tts2face.storage.spool import Spool
-from tts2face.types import HEAD_CHANNELS, Clip, Trajectory
+from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
 pytestmark = pytest.mark.formats
 
@@ -49,6 +50,18 @@ document.body.append(answer);
 </script></body></html>"""
 
 
+ASSIMP = """
+const fs = require('fs');
+require('assimpjs')().then(assimp => {
+  const files = new assimp.FileList();
+  files.AddFile('a.glb', new Uint8Array(fs.readFileSync(process.argv[1])));
+  const read = assimp.ConvertFileList(files, 'assjson');
+  if (!read.IsSuccess()) throw new Error(read.GetErrorCode());
+  const scene = JSON.parse(new TextDecoder().decode(read.GetFile(0).GetContent())), clip = scene.animations[0];
+  console.log(JSON.stringify({meshes: scene.meshes.length, seconds: clip.duration / clip.tickspersecond})); });
+"""
+
+
 class GltfFile:
     """A file as pygltflib reads it, and its values at a frame by the rules of the glTF specification."""
 
@@ -66,7 +79,7 @@ class GltfFile:
         width, dtype = WIDTHS[accessor.type], DTYPES[accessor.componentType]
         values = np.zeros((accessor.count, width), dtype)
         if accessor.bufferView is not None:
-            values = self.view(accessor.bufferView, dtype, accessor.count * width).reshape(-1, width)
+            values = self.view(accessor.bufferView, dtype, accessor.count * width).reshape(-1, width).copy()
         if accessor.sparse is not None:
             sparse = accessor.sparse
             at = self.view(sparse.indices.bufferView, DTYPES[sparse.indices.componentType], sparse.count)
@@ -155,7 +168,7 @@ def test_ten_degrees_are_a_quaternion_of_five(channel, axis, tmp_path):
     expected = np.zeros(4)
     expected[[axis, 3]] = np.sin(np.radians(5.0)), np.cos(np.radians(5.0))
     assert np.allclose(turns, expected, rtol=0, atol=1e-7)
-    assert np.allclose(times, np.arange(4) / 30, rtol=0, atol=1e-7)
+    assert np.allclose(times[:-1], np.arange(4) / 30, rtol=0, atol=1e-7)
 
 
 def test_metres_seconds_and_gaze(tmp_path):
@@ -184,8 +197,52 @@ def test_a_gesture_of_both_directions_has_two_targets_with_weights_from_0_to_1(t
     file = GltfFile(tmp_path / "a.glb")
     assert file.content.meshes[0].extras["targetNames"] == [*FACE.shape_names, "brows0", "brows0Minus"]
     weights = file.animated("face", "weights")[1]
-    assert np.allclose(weights[:, 4:], [[0.5, 0], [0, 0], [0, 1]], rtol=0, atol=1e-7)
-    assert np.array_equal(weights[:, 0], motion[:, 0])
+    assert np.allclose(weights[:, 4:], [[0.5, 0], [0, 0], [0, 1], [0, 1]], rtol=0, atol=1e-7)
+    assert np.array_equal(weights[:-1, 0], motion[:, 0])
+
+
+@pytest.mark.parametrize(("n_frames", "fps", "export_fps", "cut"), [
+    (30, 30.0, None, 0), (30, 30.0, None, 300), (45, 25.0, 60.0, 0), (45, 25.0, 24.0, 90), (7, 29.97, None, 0),
+])  # fmt: skip
+def test_the_last_frame_holds_to_the_end_of_the_sound(n_frames, fps, export_fps, cut, tmp_path):
+    clip = made_clip(n_frames, fps)
+    sound = Waveform(clip.speech.waveform.samples[: len(clip.speech.waveform.samples) - cut], RATE)
+    phones = PhoneSequence(clip.speech.phones.phones, np.append(clip.speech.phones.edges[:-1], sound.duration))
+    clip = Clip(clip.motion, clip.head, Speech(sound, phones, clip.speech.words))
+    tts2face.export(clip, tmp_path / "a.glb", face=FACE, fps=export_fps)
+    file = GltfFile(tmp_path / "a.glb")
+    for node, path in (("face", "weights"), ("head", "rotation"), ("head", "translation")):
+        times, rows = file.animated(node, path)
+        assert times[-1] == pytest.approx(sound.duration, abs=1e-6)
+        assert (np.diff(times) > 0).all()
+        assert np.array_equal(rows[-1], rows[-2])
+
+
+def test_still_displacements_share_zeros_and_each_has_a_view(tmp_path):
+    face = tts2face.load_face("head")
+    tts2face.export(made_clip(2, channels=face.shape_names), tmp_path / "a.glb", face=face)
+    content = GltfFile(tmp_path / "a.glb").content
+    assert all(accessor.bufferView is not None for accessor in content.accessors)
+    moved = [accessor for accessor in content.accessors if accessor.sparse]
+    targets = [target["POSITION"] for primitive in content.meshes[0].primitives for target in primitive.targets]
+    assert len(targets) > 4 * len(moved)
+    assert len(set(targets)) <= len(moved) + len(content.meshes[0].primitives)
+
+
+def test_a_copy_by_pygltflib_is_valid(tmp_path):
+    packages, pygltflib = programs.node_package("gltf-validator"), package("pygltflib")
+    tts2face.export(made_clip(2), tmp_path / "a.glb", face=FACE)
+    pygltflib.GLTF2().load(str(tmp_path / "a.glb")).save(str(tmp_path / "b.glb"))
+    report = json.loads(programs.run_node(programs.VALIDATE, packages, str(tmp_path / "b.glb")))
+    assert (report["issues"]["numErrors"], report["issues"]["numWarnings"]) == (0, 0), report["issues"]["messages"]
+
+
+def test_assimp_reads_parts_that_do_not_move(tmp_path):
+    packages = programs.node_package("assimpjs")
+    tts2face.export(made_clip(4), tmp_path / "a.glb", face=FACE)
+    answer = json.loads(programs.run_node(ASSIMP, packages, str(tmp_path / "a.glb")))
+    assert answer["meshes"] == len(divide_surface(FACE))
+    assert answer["seconds"] == pytest.approx(4 / 30, abs=1e-3)
 
 
 def test_openfacefx_reads_names_and_weights(tmp_path):
@@ -194,7 +251,7 @@ def test_openfacefx_reads_names_and_weights(tmp_path):
     tts2face.export(clip, tmp_path / "a.glb", face=FACE)
     track, warnings = importers.read_gltf(str(tmp_path / "a.glb"), epsilon=0.0)
     assert not warnings
-    assert track.fps == 30.0
+    assert track.fps == pytest.approx(30.0, abs=2e-3)  # it divides the keys by the time up to the end of the sound
     for column, name in enumerate(FACE.shape_names):
         keys = next(channel for channel in track.channels if channel.name == name).keys
         times, values = np.array([(key.time, key.value) for key in keys]).T
@@ -260,7 +317,7 @@ def test_three_js_shows_the_vertices_of_the_renderer(tmp_path):
         document = programs.page_content(f"{address}/index.html", "</pre>")
     answer = json.loads(html.unescape(re.search("<pre>(.*)</pre>", document, re.DOTALL)[1]))
     assert "error" not in answer, answer
-    assert answer["duration"] == pytest.approx(29 / 30, abs=1e-6)
+    assert answer["duration"] == pytest.approx(1.0, abs=1e-6)
     expected = build_rig(face).pose(clip.motion.values[frame], clip.head.values[frame]) / 1000
     surfaces = {surface.part.name: surface for surface in divide_surface(face)}
     assert {mesh["material"] for mesh in answer["meshes"]} == set(surfaces)

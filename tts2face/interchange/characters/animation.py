@@ -17,6 +17,7 @@ from tts2face.interchange.characters.character import Character, MorphTarget
 from tts2face.interchange.characters.gltf_reader import read_gltf_character
 from tts2face.interchange.characters.head_mesh import mapped_targets, source_weights
 from tts2face.interchange.characters.shapes import ShapeMapping
+from tts2face.interchange.gltf.container import key_times
 from tts2face.interchange.gltf.nodes import NodeTree, read_nodes
 from tts2face.interchange.gltf.reader import GltfFile, read_gltf
 from tts2face.interchange.gltf.writer import GlbWriter
@@ -87,16 +88,22 @@ def write_character(
         raise InputError("the clip's motion is not in the shapes of this face; make the clip with a session of it")
     out = Path(out)
     refuse_overwriting({"the output": out}, {"the character": character_file(read_binding(face), character)})
-    animated = animate_character(clip.motion, clip.head, face, character=character)
+    end = clip.speech.waveform.duration
+    animated = animate_character(clip.motion, clip.head, face, character=character, end_s=end)
     write_atomically(out.with_suffix(".wav"), wave_bytes(clip.speech.waveform.samples, clip.speech.waveform.rate))
     write_atomically(out, animated.content)
     return WrittenCharacter(out, len(clip.motion), animated.n_targets, animated.bones)
 
 
 def animate_character(
-    motion: Trajectory, head: Trajectory, face: Face, *, character: str | Path | None = None
+    motion: Trajectory, head: Trajectory, face: Face, *, end_s: float = 0.0, character: str | Path | None = None
 ) -> AnimatedCharacter:
-    """Content of the character's file with an animation by motion (T, K) and head pose (T, 6); as `write_character`."""
+    """Content of the character's file with an animation by motion (T, K) and head pose (T, 6); as `write_character`.
+
+    The last frame holds up to `end_s`, where the sound ends.
+    """
+    times = key_times(len(motion), motion.fps, end_s)
+    motion, head = (_held(trajectory, len(times)) for trajectory in (motion, head))
     binding = read_binding(face)
     path = character_file(binding, character)
     file, source = read_gltf(path), read_gltf_character(path)
@@ -107,9 +114,15 @@ def animate_character(
     turned = [*bones.eye_tracks(motion), *bones.head_tracks(head, file)]
     driven = mapped_targets(source, binding.mapping)
     tracks = [*_weight_tracks(file, tree, (weights, driven), len(motion)), *turned]
-    writer.add_animation(ANIMATION, motion.times, tracks)
+    writer.add_animation(ANIMATION, times, tracks)
     names = dict.fromkeys(bones.name_of(node) for node, _, _ in turned)
     return AnimatedCharacter(writer.content(), len(weights), tuple(names))
+
+
+def _held(trajectory: Trajectory, n_keys: int) -> Trajectory:
+    """The trajectory, whose last frame is repeated up to `n_keys` rows."""
+    more = np.repeat(trajectory.values[-1:], n_keys - len(trajectory), axis=0)
+    return Trajectory(trajectory.channels, np.concatenate([trajectory.values, more]), trajectory.fps)
 
 
 def target_weights(

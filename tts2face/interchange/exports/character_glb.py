@@ -22,9 +22,11 @@ class CharacterGlbWriter:
         refuse_overwriting({"the export": target.path.with_name(target.name)}, {"the character": source})
         self._target, self._face = target, target.face
         self._motion, self._head = Spool(len(target.channels)), Spool(len(HEAD_CHANNELS))
+        self._end = 0.0
 
     def add(self, part: Part) -> None:
         """Append frames."""
+        self._end = max(self._end, part.end)
         self._motion.add(part.motion)
         self._head.add(part.head)
 
@@ -33,7 +35,7 @@ class CharacterGlbWriter:
         fps = float(self._target.fps)
         motion = Trajectory(self._target.channels, np.array(self._motion.rows(), np.float32), fps)
         head = Trajectory(HEAD_CHANNELS, np.array(self._head.rows(), np.float32), fps)
-        self._target.path.write_bytes(animate_character(motion, head, self._face).content)
+        self._target.path.write_bytes(animate_character(motion, head, self._face, end_s=self._end).content)
 
     def close(self) -> None:
         """Remove the temporary files."""

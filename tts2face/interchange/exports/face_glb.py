@@ -24,7 +24,7 @@ from tts2face.interchange.exports.surfaces import (
     texture_png,
     vertex_normals,
 )
-from tts2face.interchange.gltf.container import INDICES, VERTICES, GltfBuffer
+from tts2face.interchange.gltf.container import INDICES, VERTICES, GltfBuffer, key_times
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import continuous_quaternions
 from tts2face.storage.spool import Spool
@@ -46,9 +46,12 @@ class FaceGlbWriter:
         n_eyes = len(self._skeleton.names) - HEAD - 1
         self._turns = [Spool(4) for _ in range(1 + n_eyes)]  # of the head and the eyes
         self._last: list[NDArray[np.float64] | None] = [None] * len(self._turns)
+        self._held: Part | None = None  # the last frame
+        self._end = 0.0
 
     def add(self, part: Part) -> None:
         """Append frames."""
+        self._end = max(self._end, part.end)
         if not len(part.motion):
             return
         self._weights.add(self._targets.weights(part.motion))
@@ -59,16 +62,20 @@ class FaceGlbWriter:
             signed = continuous_quaternions(values, self._last[number])
             spool.add(signed)
             self._last[number] = signed[-1]
+        self._held = Part(part.motion[-1:], part.head[-1:])
 
     def finish(self) -> None:
         """Write the file."""
+        times = key_times(self._weights.n_rows, float(self._target.fps), self._end)
+        if self._held is not None and len(times) > self._weights.n_rows:
+            self.add(self._held)
         buffer = GltfBuffer()
         content = _asset(self._target, self._face)
         content |= _materials(self._face, buffer)
         surfaces = divide_surface(self._face)
         content["meshes"] = [_mesh(self._face, surfaces, self._targets, self._skeleton, buffer)]
         content |= _nodes(self._skeleton, buffer)
-        content["animations"] = [self._animation(buffer)]
+        content["animations"] = [self._animation(times, buffer)]
         buffer.write(self._target.path, content)
 
     def close(self) -> None:
@@ -76,9 +83,7 @@ class FaceGlbWriter:
         for spool in (self._weights, self._shift, *self._turns):
             spool.close()
 
-    def _animation(self, buffer: GltfBuffer) -> dict[str, Any]:
-        n_frames = self._weights.n_rows
-        times = (np.arange(n_frames) / float(self._target.fps)).astype("<f4")
+    def _animation(self, times: NDArray[np.float32], buffer: GltfBuffer) -> dict[str, Any]:
         clock = buffer.add_accessor(times, min=[float(times[0])], max=[float(times[-1])])
         channels: list[dict[str, Any]] = []
         samplers: list[dict[str, Any]] = []

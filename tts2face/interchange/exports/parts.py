@@ -50,6 +50,11 @@ class Part:
         """Start of the clip in seconds of the whole."""
         return 0.0 if self.clip is None else self.begin_sample / self.clip.speech.waveform.rate
 
+    @property
+    def end(self) -> float:
+        """End of the clip's sound in seconds of the whole; 0 without a clip."""
+        return 0.0 if self.clip is None else self.begin + self.clip.speech.waveform.duration
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Target:

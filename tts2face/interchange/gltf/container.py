@@ -19,12 +19,24 @@ from tts2face.storage.spool import Spool
 MAGIC, VERSION = b"glTF", 2
 JSON_CHUNK, BINARY_CHUNK = b"JSON", b"BIN\0"
 MAX_FILE_BYTES = 2**32 - 1  # the container states its size in 32 bits
+ZEROS_STRIDE = 12  # bytes of three floats
 ALIGNMENT = 4  # bytes, of chunks and of what accessors read
+LEAST_KEY_FRAMES = 0.01  # between the last frame and a key after it: times of an hour have steps of .0002 s
 VERTICES, INDICES = 34962, 34963  # targets of buffer views
 COMPONENTS: Mapping[str, int] = {
     "|i1": 5120, "|u1": 5121, "<i2": 5122, "<u2": 5123, "<u4": 5125, "<f4": 5126,
 }  # fmt: skip
 TYPES: Mapping[int, str] = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
+
+
+def key_times(n_frames: int, fps: float, end_s: float) -> NDArray[np.float32]:
+    """Times (n,) of the keys of frames: their instants, and the end of the sound, up to which the last frame holds.
+
+    A loop of the animation then takes as long as the sound; with keys of frames alone it would be a frame ahead.
+    """
+    times = (np.arange(n_frames) / fps).astype("<f4")
+    is_later = end_s > (n_frames - 1 + LEAST_KEY_FRAMES) / fps
+    return np.append(times, np.float32(end_s)).astype("<f4") if is_later else times
 
 
 class GltfBuffer:
@@ -37,6 +49,9 @@ class GltfBuffer:
         self.accessors = [] if accessors is None else accessors
         self._chunks: list[bytes | Spool] = []
         self._n_bytes = 0
+        self._still: dict[tuple[str, int], int] = {}  # accessors of displacements that are all 0, by type and count
+        self._zeros: dict[str, Any] = {}
+        self._zeros_at = 0
 
     def add_content(self, content: bytes | Spool) -> int:
         """Append content to the binary part; its place in bytes."""
@@ -70,27 +85,40 @@ class GltfBuffer:
         return len(self.accessors) - 1
 
     def add_sparse_accessor(self, values: NDArray[Any], **more: Any) -> int:
-        """Index of a sparse accessor for displacements (n, 3), most of which are 0."""
+        """Index of a sparse accessor for displacements (n, 3), most of which are 0; where all are, of a shared one."""
         moved = np.flatnonzero(values.any(axis=1))
+        key = (values.dtype.str, len(values))
+        if not len(moved) and key in self._still:
+            return self._still[key]
         bounds = {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
         accessor = self._accessor(values.dtype, 3, len(values)) | bounds | more
+        # Accessors without a view are zeros, too, but Assimp refuses a file for them, and pygltflib writes them with
+        # an offset that they must not have (decision 247). Narrower elements would need a padded view.
+        if values.dtype.itemsize * 3 == ZEROS_STRIDE:
+            accessor["bufferView"] = self._zeros_view(len(values))
         if len(moved):
             kind = "<u2" if len(values) <= 0xFFFF else "<u4"
-            accessor["sparse"] = {
-                "count": len(moved),
-                "indices": {
-                    "bufferView": self.add_view(moved.astype(kind).tobytes()),
-                    "componentType": COMPONENTS[kind],
-                },
-                "values": {"bufferView": self.add_view(values[moved].tobytes())},
-            }
+            indices = {"bufferView": self.add_view(moved.astype(kind).tobytes()), "componentType": COMPONENTS[kind]}
+            part = {"bufferView": self.add_view(values[moved].tobytes())}
+            accessor["sparse"] = {"count": len(moved), "indices": indices, "values": part}
         self.accessors.append(accessor)
+        if not len(moved):
+            self._still[key] = len(self.accessors) - 1
         return len(self.accessors) - 1
+
+    def _zeros_view(self, count: int) -> int:
+        """Index of the view of zeros that all displacements share, at least `count` elements; its bytes come last."""
+        if not self._zeros:
+            self._zeros = {"buffer": 0, "byteLength": 0, "byteStride": ZEROS_STRIDE, "target": VERTICES}
+            self.views.append(self._zeros)
+            self._zeros_at = len(self.views) - 1
+        self._zeros["byteLength"] = max(self._zeros["byteLength"], ZEROS_STRIDE * count)
+        return self._zeros_at
 
     def content(self, root: Mapping[str, Any], name: str) -> bytes:
         """Bytes of a file whose parts are all in memory; as `write`."""
-        chunks = (chunk for chunk in self._chunks if isinstance(chunk, bytes))
-        return b"".join([self._header(root, name), *chunks])
+        header = self._header(root, name)
+        return b"".join([header, *(chunk for chunk in self._chunks if isinstance(chunk, bytes))])
 
     def write(self, path: Path, root: Mapping[str, Any]) -> None:
         """Write the file; `root`, its JSON, receives buffer, views and accessors.
@@ -110,7 +138,9 @@ class GltfBuffer:
                     file.write(chunk)
 
     def _header(self, root: Mapping[str, Any], name: str) -> bytes:
-        """Bytes of the file `name` before its binary part."""
+        """Bytes of the file `name` before its binary part, at whose end are the zeros that displacements share."""
+        if self._zeros:
+            self._zeros["byteOffset"] = self.add_content(bytes(self._zeros["byteLength"]))
         buffers = [{"byteLength": self._n_bytes}, *root.get("buffers", [])[1:]]
         whole = {**root, "buffers": buffers, "bufferViews": self.views, "accessors": self.accessors}
         text = json.dumps(whole, ensure_ascii=False, separators=(",", ":")).encode()

@@ -4,6 +4,7 @@ import copy
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tts2face.interchange.gltf.container import COMPONENTS, TYPES, GltfBuffer
 from tts2face.interchange.gltf.nodes import local_matrix
@@ -27,7 +28,7 @@ class GlbWriter:
         self._join_buffers()
         self._embed_images()
 
-    def add_accessor(self, values: FloatArray) -> int:
+    def add_accessor(self, values: NDArray[np.floating]) -> int:
         """Add an accessor of float32 rows (N, width), with the limits that times need; its index."""
         rows = np.ascontiguousarray(values, "<f4")
         view = self._buffer.add_view(rows.tobytes())
@@ -39,7 +40,9 @@ class GlbWriter:
             accessor |= {"min": [float(rows.min())], "max": [float(rows.max())]}
         return self._append("accessors", accessor)
 
-    def add_animation(self, name: str, seconds: FloatArray, tracks: list[tuple[int, str, FloatArray]]) -> None:
+    def add_animation(
+        self, name: str, seconds: NDArray[np.floating], tracks: list[tuple[int, str, FloatArray]]
+    ) -> None:
         """Add an animation as the first one: node, path (``weights``, ``rotation``, ``translation``) and rows."""
         times = self.add_accessor(seconds[:, None])
         samplers = [

@@ -109,7 +109,7 @@ def test_weights_of_the_own_targets_are_those_of_the_clip(folder: Path) -> None:
         "BS.jawOpen", "BS.mouthSmileLeft", "BS.eyeBlinkRight",
     }  # fmt: skip
     times = played.rows(played.animation.samplers[0].input)[:, 0]
-    np.testing.assert_allclose(times, np.arange(N_FRAMES) / FPS, atol=1e-6)
+    np.testing.assert_allclose(times, np.arange(N_FRAMES + 1) / FPS, atol=1e-6)  # the last key: the end of the sound
     assert written.n_frames == N_FRAMES
     with wave.open(str(folder / "renamed_out.wav")) as sound:
         assert sound.getnframes() == round(N_FRAMES / FPS * 8000)
