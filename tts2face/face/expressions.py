@@ -22,6 +22,8 @@ from tts2face.models.palette import EXPRESSIONS
 from tts2face.numeric.arrays import FloatArray
 
 EXPRESSION_TABLE = "expressions.tsv"
+# Shapes with which a character shows one of `EXPRESSIONS` itself, as those of VRM do.
+OWN_EXPRESSIONS = {name: f"expression{name.capitalize()}" for name in EXPRESSIONS}
 BOTH_SIDES = "*"  # suffix of a name: both the left and the right shape
 GAZE_SHAPES = tuple(
     f"eyeLook{direction}{side}" for direction in ("Up", "Down", "In", "Out") for side in ("Left", "Right")
@@ -64,10 +66,16 @@ def add_expression_shapes(face: Face) -> Face:
 
 
 def expression_weights(face: Face, mouth: LipConstraints) -> FloatArray:
-    """Shape weights (5, K) of `EXPRESSIONS` on a face of `add_expression_shapes`; closed lips stay closed."""
+    """Shape weights (5, K) of `EXPRESSIONS` on a face of `add_expression_shapes`; closed lips stay closed.
+
+    A character's own shape of an expression (`OWN_EXPRESSIONS`) takes the place of those of the table.
+    """
     table = expression_table()
     none = (0.0,) * len(EXPRESSIONS)
     designed = np.array([table.get(name, none) for name in face.shape_names]).T
+    for row, own in enumerate(OWN_EXPRESSIONS.values()):
+        if own in face.shape_names:
+            designed[row] = np.array(face.shape_names) == own
     weights = mouth.combine(np.zeros_like(designed), designed)
     return build_eyelid_model(face).close(weights, np.zeros((len(weights), 2)))
 

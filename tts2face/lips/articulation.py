@@ -37,6 +37,10 @@ MIN_GAP_SHARE = 0.6  # of a gap that rounding leaves open
 FOLLOW_GAPS_MM = (0.2, 2.5)  # gap of the lips up to which they keep it, and from which they follow in full
 LARGEST_ADDED_WEIGHT = 1.2
 LARGEST_REST_GAP_SHARE = 0.02  # of the mouth's width: a gap at rest that contacts close; landmarks may be further apart
+# Shapes of contacts that the character's maker has drawn, for a mouth that lacks those that roll or press the lips: as
+# sums of others, /f/ was a grin and /b/ a frown. Share that they have of the mouth in contact, and their weight.
+OWN_CONTACTS = {"incisor_contact": "mouthViseme_ff", "lip_contact": "mouthViseme_pp"}
+OWN_CONTACT_SHARE, OWN_CONTACT_WEIGHT = 0.85, 0.8
 N_CLOSURE_ROUNDS = 3  # of limiting the speed and closing the lips, which disturb each other a little
 LEAST_MOTION_MM = 0.5  # per weight of a shape: shapes that move less, as on a face without them, are not used
 ROUND_SHAPES = {"mouthPucker": 1.0}
@@ -69,6 +73,8 @@ class Articulator:
         Shapes of the tongue.
     incisors
         Contact of the lower lip with the upper incisors.
+    own_contacts
+        By track of contact, the number of the character's own shape of it: its viseme of /f v/ or of /p b m/.
     """
 
     mouth: LipConstraints
@@ -79,6 +85,7 @@ class Articulator:
     directions: Mapping[str, FloatArray]
     tongue: Tongue
     incisors: IncisorContact
+    own_contacts: Mapping[str, int]
 
     def articulate(self, weights: Trajectory, phones: PhoneSequence, factor: float) -> Trajectory:
         """Shape weights (T, K) with the visible articulation of phones.
@@ -97,7 +104,10 @@ class Articulator:
             values = self._add_by_class(values, tracks, (factor - NATURAL) / (CLEAR - NATURAL))
         elif factor < NATURAL:
             values = self._reduce_by_class(values, tracks, 1.0 - factor)
-        values = self.incisors.enforce(values, tracks["incisor_contact"] * (1.0 - tracks["lip_contact"] ** 2))
+        for track, shape in self.own_contacts.items():
+            values = self._towards(values, shape, OWN_CONTACT_SHARE * tracks[track])
+        if "incisor_contact" not in self.own_contacts:
+            values = self.incisors.enforce(values, tracks["incisor_contact"] * (1.0 - tracks["lip_contact"] ** 2))
         bounds = largest_gaps(seconds_from_closure(phones, times), self.rest_width / HEAD_MOUTH_MM)
         pauses = pause_closure(phones, times)
         for _ in range(N_CLOSURE_ROUNDS):
@@ -115,6 +125,14 @@ class Articulator:
         dental = tracks["tongue_out"] * (1.0 - tracks["lip_contact"])
         added += min(strength, 1.0) * self._parting(speech, dental)
         return self._combine(speech, added, tracks["opening"] * OPENING_GAIN * strength, dental)
+
+    def _towards(self, speech: FloatArray, shape: int, share: FloatArray) -> FloatArray:
+        """Speech (T, K) whose mouth is by shares (T,) that of one shape at `OWN_CONTACT_WEIGHT`."""
+        pose = np.zeros(speech.shape[1])
+        pose[shape] = OWN_CONTACT_WEIGHT
+        lips, values = self.mouth.moving, speech.copy()
+        values[:, lips] += share[:, None] * (pose[lips] - speech[:, lips])
+        return values
 
     def _rounding(self, speech: FloatArray, tracks: Mapping[str, FloatArray]) -> FloatArray:
         """Weights (T, K) that narrow and protrude the lips by what speech lacks to a round mouth."""
@@ -195,6 +213,7 @@ def build_articulator(face: Face) -> Articulator:
     rest_width = float(np.linalg.norm(places[MOUTH_CORNER_LEFT] - places[MOUTH_CORNER_RIGHT]))
     edge = incisor_edge(face, places, rest_width)
     tables = {"round": ROUND_SHAPES, "flared": FLARED_SHAPES, "spread": SPREAD_SHAPES, "lowered": LOWERED_SHAPES}
+    own = {track: face.shape_names.index(name) for track, name in OWN_CONTACTS.items() if name in face.shape_names}
     tables["open"] = {face.opened_by: 1.0}
     if not {*ROUND_SHAPES, *FLARED_SHAPES} <= {*face.shape_names}:
         tables["flared"] = ROUND_SHAPES
@@ -207,6 +226,7 @@ def build_articulator(face: Face) -> Articulator:
         directions={
             kind: np.array([table.get(name, 0.0) for name in face.shape_names]) for kind, table in tables.items()
         },
+        own_contacts=own,
         tongue=build_tongue(face, edge, rest_width),
         incisors=build_incisor_contact(face.shape_names, contact, edge, places=places, motion=motion, width=rest_width),
     )

@@ -6,6 +6,7 @@ from importlib.resources import files
 
 import pytest
 
+from tts2face.face.expressions import OWN_EXPRESSIONS
 from tts2face.interchange.characters.families import FOLDER, general_family, program_families, recognised_families
 from tts2face.interchange.characters.shape_names import ARKIT_SHAPES, combinations_of_shapes, guess_mapping
 from tts2face.interchange.characters.shapes import HEADER, ShapeSource
@@ -36,8 +37,8 @@ FAMILIES = {  # names of a file, and how many of them are understood
                             "h_expressions.LLbrowUp_h h_expressions.FV_h t_JawFront_h h_expressions.ReyeClose_h", 8),
     "faceshift": ("JawOpen LipsFunnel BrowsU_C BrowsD_L EyeIn_R MouthSmile_L Puff Sneer", 8),
     "meta": ("Jaw_Drop Lip_Pucker_L Lips_Toward Eyes_Closed_R Lip_Suck_LT Chin_Raiser_B Lip_Corner_Puller_L", 7),
-    "vroid": ("Face.M_F00_Fcl_MTH_A Fcl_MTH_O Fcl_EYE_Close_L Fcl_BRW_Angry", 4),
-    "vrm": ("A I U E O Blink LookUp LookLeft LookRight", 9),
+    "vroid": ("Face.M_F00_Fcl_MTH_A Fcl_MTH_O Fcl_EYE_Close_L Fcl_BRW_Angry Fcl_ALL_Joy", 5),
+    "vrm": ("A I U E O Blink LookUp LookLeft LookRight Joy Angry Sorrow Fun Surprised", 13),
     "oculus": ("viseme_sil viseme_PP viseme_aa viseme_E viseme_RR viseme_nn", 5),
 }  # fmt: skip
 
@@ -73,7 +74,7 @@ def test_tables_name_their_source_and_known_shapes(table: str) -> None:
     assert lines[1].startswith("# Source: ")
     rows = list(csv.DictReader(lines[2:], delimiter="\t"))
     assert tuple(rows[0]) == HEADER
-    known = {*ARKIT_SHAPES, *VISEMES, "tongueUp"}
+    known = {*ARKIT_SHAPES, *VISEMES, *OWN_EXPRESSIONS.values(), "tongueUp"}
     for row in rows:
         shape = row["shape"]
         assert known & {shape.replace("*", "Left"), shape}, row

@@ -304,3 +304,42 @@ def test_a_face_without_these_shapes_shows_what_it_can(talker: Talker, exemplars
     np.testing.assert_allclose(edge, own, atol=5.0)  # in proportion to the mouth, as on the default head
     for span in spoken.within("m"):
         assert spoken.gaps(spoken.clear)[span].min() <= 0.15
+
+
+ROLLS = ("mouthRollLower", "mouthRollUpper", "mouthPressLeft", "mouthPressRight", "mouthClose")
+
+
+def bare_face(visemes: dict[str, str]) -> Face:
+    """The shipped head without shapes that roll or press the lips, and with visemes made of those."""
+    head = named_face(None)
+    kept = [at for at, name in enumerate(head.shape_names) if name not in ROLLS]
+    added = [head.shapes[head.shape_names.index(name)] for name in visemes.values()]
+    return replace(
+        head,
+        shape_names=(*(head.shape_names[at] for at in kept), *visemes),
+        shapes=np.concatenate([head.shapes[kept], *(shape[None] for shape in added)]),
+        limits=np.tile(np.array([0.0, 1.0], np.float32), (len(kept) + len(added), 1)),
+        scores=None,
+    )
+
+
+@pytest.mark.parametrize("has_visemes", [True, False])
+def test_labiodentals_without_shapes_that_roll_are_no_grin(has_visemes: bool) -> None:
+    visemes = {"mouthViseme_ff": "mouthRollLower", "mouthViseme_pp": "mouthRollUpper"} if has_visemes else {}
+    face = bare_face(visemes)
+    phones, n_frames = sequence("ɑ f ɑ b ɑ"), int((2 * LONG_PAUSE_S + 0.5) * FPS)
+    speech = np.zeros((n_frames, len(face.shape_names)), np.float32)
+    speech[24:-24, face.shape_names.index("jawOpen")] = 0.2
+    articulator = build_articulator(face)
+    spoken = articulator.articulate(Trajectory(face.shape_names, speech, FPS), phones, 1.0)
+    at = {label: round((LONG_PAUSE_S + when) * FPS) for label, when in {"f": 0.15, "b": 0.35}.items()}
+    gaps = spoken.values @ articulator.mouth.gaps[MIDDLE_PAIR]
+    assert gaps[at["b"]] < 0.5
+    smile, jaw = (spoken.columns([f"{stem}Left", f"{stem}Right"]) for stem in ("mouthSmile", "jaw"))
+    for frame in at.values():
+        assert smile[frame].max() < 0.3
+        assert jaw[frame].min() < 0.1
+    if has_visemes:
+        assert spoken.columns(["mouthViseme_ff"])[at["f"], 0] > 0.5
+        assert spoken.columns(["mouthViseme_pp"])[at["b"], 0] > 0.4
+        assert spoken.columns(["mouthViseme_ff"])[at["b"], 0] < 0.3

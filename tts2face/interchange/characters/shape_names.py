@@ -23,7 +23,8 @@ UNSIDED = (
     "mouthRollUpper", "mouthShrugLower", "mouthShrugUpper", "tongueOut",
 )  # fmt: skip
 ARKIT_SHAPES = tuple(sorted([*(stem + side for stem in SIDED for side in SIDES), *UNSIDED]))
-CONTACT_VISEMES = ("mouthViseme_ff", "mouthViseme_pp")  # lips that touch, beside ARKit's shapes, too
+# Visemes of lips that touch serve beside ARKit's jaw where the shapes are missing that roll or press the lips.
+CONTACT_VISEMES = {"mouthViseme_ff": ("mouthRollLower",), "mouthViseme_pp": ("mouthPressLeft", "mouthRollUpper")}
 
 
 def guess_mapping(names: Iterable[str]) -> ShapeMapping:
@@ -31,7 +32,7 @@ def guess_mapping(names: Iterable[str]) -> ShapeMapping:
 
     Exact names of ARKit win over the whole list, then those of a program whose family the names are, the one with most
     of them first, then ARKit's after a prefix, then names of no one program. Combinations of shapes are none of them.
-    Visemes are used only where no name opens the jaw, but for those of /f v/ and /p b m/.
+    Visemes are used only where no name opens the jaw, but for those of `CONTACT_VISEMES`.
     """
     given = list(dict.fromkeys(names))
     left_alone = set(combinations_of_shapes(given))
@@ -50,7 +51,7 @@ def guess_mapping(names: Iterable[str]) -> ShapeMapping:
         found = {
             shape: sources
             for shape, sources in found.items()
-            if not shape.startswith(VISEME_PREFIX) or shape in CONTACT_VISEMES
+            if not shape.startswith(VISEME_PREFIX) or found.keys().isdisjoint(CONTACT_VISEMES.get(shape, found))
         }
     return with_sides(dict(sorted(found.items())))
 
