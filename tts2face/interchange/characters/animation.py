@@ -5,33 +5,27 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.face.landmarks import landmark_motion
-from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES
-from tts2face.face.stand_in import stand_in
 from tts2face.interchange.characters.binding import character_file, read_binding
 from tts2face.interchange.characters.bone_tracks import BoneTracks, Track
 from tts2face.interchange.characters.character import Character, MorphTarget
 from tts2face.interchange.characters.gltf_reader import read_gltf_character
 from tts2face.interchange.characters.head_mesh import mapped_targets, source_weights
-from tts2face.interchange.characters.shapes import ShapeMapping
+from tts2face.interchange.characters.own_weights import own_weights
+from tts2face.interchange.characters.shapes import ShapeMapping, ShapeSource
 from tts2face.interchange.gltf.container import key_times
 from tts2face.interchange.gltf.nodes import NodeTree, read_nodes
 from tts2face.interchange.gltf.reader import GltfFile, read_gltf
 from tts2face.interchange.gltf.writer import GlbWriter
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import FloatArray
-from tts2face.numeric.least_squares import bounded_least_squares
 from tts2face.storage.files import write_atomically
 from tts2face.storage.output_paths import refuse_overwriting
 from tts2face.storage.wave_files import wave_bytes
 from tts2face.types import Clip, Trajectory
 
 ANIMATION = "tts2face"
-BOTH_SIDES_SHARE = 0.5  # of each of two shapes that one morph target for both sides gets
-RIDGE = 0.02  # of the mean curvature: keeps replaced shapes from adding large opposite weights
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,54 +123,11 @@ def target_weights(
     motion: Trajectory, face: Face, character: Character, mapping: ShapeMapping
 ) -> dict[MorphTarget, FloatArray]:
     """Weights (T,) of each morph target that a motion moves."""
-    channels = motion.channels
-    own = [name for name in channels if name in mapping]
-    values = dict(zip(own, _own_values(motion, face, own).T, strict=True))
     found: dict[MorphTarget, FloatArray] = {}
-    for name, track in values.items():
-        for source in mapping[name]:
-            share = BOTH_SIDES_SHARE if source.side else 1.0
-            for target, weight in source_weights(character, source).items():
-                found[target] = found.get(target, np.zeros(len(track))) + share * weight * track
+    for name, track in own_weights(motion, face, mapping).items():
+        for target, weight in source_weights(character, ShapeSource(name)).items():
+            found[target] = found.get(target, np.zeros(len(track))) + weight * track
     return found
-
-
-def _own_values(motion: Trajectory, face: Face, own: list[str]) -> FloatArray:
-    """Weights (T, k) of the shapes `own`, which also carry the motion of the shapes that the character lacks."""
-    channels = motion.channels
-    values = motion.values.astype(np.float64)
-    kept = motion.columns(own).astype(np.float64)
-    turned = {name for eye in face.eyes for name in eye.turns}
-    others = [k for k, name in enumerate(channels) if name not in own and name not in turned and values[:, k].any()]
-    for is_mouth in (True, False):
-        group = [k for k in others if channels[k].startswith(SPEECH_SHAPE_PREFIXES) == is_mouth]
-        columns = [
-            n
-            for n, name in enumerate(own)
-            if name.startswith(SPEECH_SHAPE_PREFIXES) == is_mouth and "eyeLook" not in name
-        ]
-        if group and columns:
-            shapes = np.array([channels.index(own[n]) for n in columns])
-            missing = (np.array(group), values[:, group])
-            kept[:, columns] = _with_replacement(stand_in(face), shapes, kept[:, columns], missing)
-    return kept
-
-
-def _with_replacement(
-    face: Face, shapes: NDArray[np.int64], weights: FloatArray, missing: tuple[NDArray[np.int64], FloatArray]
-) -> FloatArray:
-    """Weights (T, k) of `shapes` (k,) that move the landmarks most like their `weights` and missing shapes do.
-
-    `missing` holds the indices (m,) of the missing shapes and their weights (T, m). The result is within the limits.
-    """
-    here = landmark_motion(face, shapes).reshape(-1, len(shapes))
-    there = landmark_motion(face, missing[0]).reshape(-1, len(missing[0]))
-    curvature = here.T @ here
-    curvature += (RIDGE * float(np.trace(curvature)) / len(shapes) + 1e-9) * np.eye(len(shapes))
-    limits = face.limits[shapes].astype(np.float64)
-    solved = bounded_least_squares(curvature, weights @ curvature + missing[1] @ (there.T @ here), limits)
-    is_moved = np.asarray(missing[1].any(axis=1))
-    return np.where(is_moved.reshape(-1, 1), solved, weights)
 
 
 def _weight_tracks(

@@ -1,7 +1,8 @@
 """Link from a face to the character that it was imported from, to write animation back onto its file."""
 
 import math
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -65,6 +66,35 @@ def read_binding(face: Face) -> CharacterBinding:
     # faces of .obj folders have no file to write to
     if not found.get("sha256"):
         raise InputError("the face was imported from .obj files, which hold no animation; import a .glb file instead")
+    return _parse(found)
+
+
+def shape_mapping(face: Face) -> ShapeMapping | None:
+    """The names that the shapes of an imported face have in its character; None for any other face.
+
+    Raises
+    ------
+    DataError
+        Its metadata are damaged.
+    """
+    found = face.metadata.get(KEY)
+    return None if found is None else _parse(found).mapping
+
+
+def without_file(metadata: Mapping[str, Any]) -> dict[str, Any]:
+    """Metadata of a face whose binding names no file of this machine, but keeps the names of the shapes if it is whole.
+
+    The file that a sent face names would be read by exports.
+    """
+    kept = {key: value for key, value in metadata.items() if key != KEY}
+    try:
+        binding = _parse(metadata.get(KEY))
+    except DataError:
+        return kept
+    return kept | {KEY: replace(binding, file="", sha256="").as_metadata()}
+
+
+def _parse(found: Any) -> CharacterBinding:
     try:
         x, y, z = (float(value) for value in found["origin"])
         binding = CharacterBinding(
@@ -80,7 +110,8 @@ def read_binding(face: Face) -> CharacterBinding:
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise _damaged() from error
-    numbers = (binding.yaw_deg, binding.scale, x, y, z)
+    gains = [source.gain for sources in binding.mapping.values() for source in sources]
+    numbers = (binding.yaw_deg, binding.scale, x, y, z, *gains)
     if not all(math.isfinite(value) for value in numbers) or binding.scale <= 0:
         raise _damaged()
     return binding

@@ -1,4 +1,6 @@
-"""Curves of live streams: ARKit weights and head poses of frames, without jumps between their sources, as JSON texts.
+"""Curves of live streams: weights and head poses of frames, without jumps between their sources, as JSON texts.
+
+Weights are ARKit's, or those of the character's own shapes where the face was imported from one.
 
 Idle motion is made once for all streams of equal options (decision 203).
 """
@@ -13,6 +15,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.interchange.characters.binding import shape_mapping
+from tts2face.interchange.characters.own_weights import own_names, own_weights
+from tts2face.interchange.characters.shapes import ShapeMapping
 from tts2face.interchange.exports.arkit import ARKIT_SHAPES, arkit_projection
 from tts2face.serving.service.messages import Line
 from tts2face.types import Clip, Trajectory
@@ -21,27 +26,49 @@ if TYPE_CHECKING:
     from tts2face.session.session import Session
 
 MAX_FRAMES = 200  # of an event, whose writing is one step of the server's event loop, of some 5 ms
-N_WEIGHTS = len(ARKIT_SHAPES)
+GAZE = tuple(name for name in ARKIT_SHAPES if name.startswith("eyeLook"))  # for a client that turns eyes by bones
 JOIN_S = 0.5  # in which a difference between two sources is gone: heads turn by 10 degrees in less
 LEAST_STEP = 1e-4  # of weights and radians: what the JSON shows
 IDLE_LOOP_S = 60.0  # after which idle motion repeats
 IDLE_PART_S = 5.0  # of it that is made at a time: a second takes 15 ms, a fifth of what it takes in parts of 0.2 s
 MAX_IDLE = 8  # kinds of idle motion of a session, of 1.5 MB each
-Frames = NDArray[np.float32]  # (T, 52) weights, or (T, 52 + H) with the head
+Frames = NDArray[np.float32]  # (T, W) weights, or (T, W + H) with the head
 
 
 class Projection:
-    """Frames of the motion of a session's face."""
+    """Frames of the motion of a session's face.
+
+    Attributes
+    ----------
+    names : (W,)
+        Of the weights: those of the character's own shapes, then those of gaze that it lacks; otherwise ARKit's.
+    """
 
     def __init__(self, session: "Session") -> None:
         self._mesh, self._known = session.mesh, dict[tuple[str, ...], Any]()
+        self._mapping = shape_mapping(self._mesh)
+        self.names: tuple[str, ...] = ARKIT_SHAPES
+        if self._mapping is not None:
+            gaze = [name for name in GAZE if name in self._mesh.shape_names and name not in self._mapping]
+            self.names = tuple(dict.fromkeys([*own_names(self._mapping), *gaze]))
 
     def frames(self, motion: Trajectory, head: Trajectory | None = None) -> Frames:
         """Weights of all frames, and the head pose if there is one."""
+        weights = self._arkit(motion) if self._mapping is None else self._own(motion, self._mapping)
+        return weights if head is None else np.hstack([weights, head.values.astype(np.float32)])
+
+    def _own(self, motion: Trajectory, mapping: ShapeMapping) -> Frames:
+        found = own_weights(motion, self._mesh, mapping)
+        rest = np.zeros(len(motion), np.float32)
+        for name in set(motion.channels) & set(GAZE) - set(mapping):
+            found[name] = motion.columns([name])[:, 0].astype(np.float64)
+        return np.column_stack([found.get(name, rest) for name in self.names]).astype(np.float32)
+
+    def _arkit(self, motion: Trajectory) -> Frames:
         if motion.channels not in self._known:
             self._known[motion.channels] = arkit_projection(motion.channels, self._mesh, "the stream")
-        weights = self._known[motion.channels].weights(motion.values)
-        return weights if head is None else np.hstack([weights, head.values.astype(np.float32)])
+        weights: Frames = self._known[motion.channels].weights(motion.values)
+        return weights
 
 
 class Curves:
@@ -53,7 +80,8 @@ class Curves:
     def __init__(self, session: "Session") -> None:
         self._projection = Projection(session)
         self._head_names: tuple[str, ...] | None = None
-        self._last: Frames | None = None  # frame (52 + H)
+        self._n_weights = len(self._projection.names)
+        self._last: Frames | None = None  # frame (W + H)
         self._difference: Frames | None = None  # likewise, to the source at its first frame
         self._n_joined = 0
         self._is_new = True
@@ -67,19 +95,19 @@ class Curves:
         names = clip.head.channels
         frames = self._joined(self._projection.frames(clip.motion, clip.head), clip.motion.fps)
         for at in range(0, len(frames), MAX_FRAMES):
-            texts = _texts(frames[at : at + MAX_FRAMES])
+            texts = _texts(frames[at : at + MAX_FRAMES], self._n_weights)
             yield Line(self._text(begin + at / clip.motion.fps, clip.motion.fps, *texts, names))
 
     def of_motion(self, motion: Trajectory, begin: float) -> Line:
         """All frames of lip motion alone."""
-        texts = _texts(self._projection.frames(motion))
+        texts = _texts(self._projection.frames(motion), self._n_weights)
         return Line(self._text(begin, motion.fps, *texts, ()), motion.duration)
 
     def of_idle(self, idle: "IdleMotion", part: slice, begin: float) -> Line:
         """Frames of idle motion."""
         made = idle.frames[part]
         frames = self._joined(made, idle.fps)
-        texts = (idle.weights[part], idle.heads[part]) if frames is made else _texts(frames)
+        texts = (idle.weights[part], idle.heads[part]) if frames is made else _texts(frames, self._n_weights)
         return Line(self._text(begin, idle.fps, *texts, idle.head_names))
 
     def _joined(self, frames: Frames, fps: float) -> Frames:
@@ -93,8 +121,9 @@ class Curves:
             # a jump between two sources fades within `JOIN_S`
             left = (1.0 - at * at * (3.0 - 2.0 * at)).astype(np.float32)
             frames = frames + left[:, None] * self._difference
-            # ARKit's weights lie from 0 to 1
-            frames[:, :N_WEIGHTS] = frames[:, :N_WEIGHTS].clip(0.0, 1.0)
+            # ARKit's weights lie from 0 to 1, those of a character with a gain up to it
+            high = np.maximum(1.0, frames[:, : self._n_weights] - left[:, None] * self._difference[: self._n_weights])
+            frames[:, : self._n_weights] = frames[:, : self._n_weights].clip(0.0, high)
             self._n_joined += len(frames)
             self._difference = self._difference if self._n_joined < JOIN_S * fps else None
         self._last = frames[-1]
@@ -104,7 +133,7 @@ class Curves:
         parts = [f'{{"type":"curves","begin":{round(begin, 4)},"fps":{fps}']
         if self._head_names is None:
             self._head_names = names
-            shown = {"names": ARKIT_SHAPES} | ({"head_names": names} if heads else {})
+            shown = {"names": self._projection.names} | ({"head_names": names} if heads else {})
             parts.append(json.dumps(shown)[1:-1])
         parts.append(f'"weights":[{",".join(weights)}]')
         if heads:
@@ -118,7 +147,7 @@ class IdleMotion:
 
     Attributes
     ----------
-    frames : (T, 52 + H)
+    frames : (T, W + H)
         Weights and head poses, and as `weights` and `heads` their rows as JSON.
     """
 
@@ -126,7 +155,7 @@ class IdleMotion:
     _projection: Projection
     fps: float = 0.0
     head_names: tuple[str, ...] = ()
-    frames: Frames = field(default_factory=lambda: np.zeros((0, N_WEIGHTS), np.float32))
+    frames: Frames = field(default_factory=lambda: np.zeros((0, 0), np.float32))
     weights: list[str] = field(default_factory=list)
     heads: list[str] = field(default_factory=list)
     _is_growing: bool = False
@@ -145,7 +174,7 @@ class IdleMotion:
             for piece in self._speech.idle(IDLE_PART_S):
                 self.fps, self.head_names = piece.clip.motion.fps, piece.clip.head.channels
                 made = self._projection.frames(piece.clip.motion, piece.clip.head)
-                weights, heads = _texts(made)
+                weights, heads = _texts(made, len(self._projection.names))
                 self.frames = np.vstack([self.frames, made]) if len(self.frames) else made
                 self.weights, self.heads = self.weights + weights, self.heads + heads
         finally:
@@ -167,10 +196,10 @@ def idle_motion(session: "Session", options: Mapping[str, Any]) -> IdleMotion:
     return known[key]
 
 
-def _texts(frames: Frames) -> tuple[list[str], list[str]]:
+def _texts(frames: Frames, n_weights: int) -> tuple[list[str], list[str]]:
     """Rows of weights and of head poses as JSON."""
     rows = [[round(value, 4) for value in row] for row in frames.tolist()]
-    return [_text(row[:N_WEIGHTS]) for row in rows], [_text(row[N_WEIGHTS:]) for row in rows if len(row) > N_WEIGHTS]
+    return [_text(row[:n_weights]) for row in rows], [_text(row[n_weights:]) for row in rows if len(row) > n_weights]
 
 
 def _text(row: list[float]) -> str:

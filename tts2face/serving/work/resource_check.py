@@ -282,14 +282,14 @@ def _check_dictionary(source: Path, out: Path) -> dict[str, Any]:
 
 def _rewrite(source: Path, out: Path, kind: str, version: int) -> None:
     """Write arrays and metadata again, without links to files of the machine that made them."""
-    from tts2face.interchange.characters.binding import KEY
+    from tts2face.interchange.characters.binding import without_file
     from tts2face.models.face_schema import check_face
     from tts2face.storage.tensors import read_tensors, write_tensors
 
     arrays, metadata = read_tensors(source, kind, version)
     if kind == FACE:
         check_face(source, arrays, metadata)
-        metadata = metadata | {"metadata": {k: v for k, v in metadata["metadata"].items() if k != KEY}}
+        metadata = metadata | {"metadata": without_file(metadata["metadata"])}
     write_tensors(out, kind, version, arrays, metadata, is_packed=kind == FACE)
 
 

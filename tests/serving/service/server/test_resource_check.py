@@ -111,7 +111,7 @@ def test_a_character_becomes_a_face(tmp_path: Path) -> None:
     assert message == ""
     about = json.loads((checked / "description.json").read_text())
     assert (about["summary"], about["licence"]) == ("mesh with 51 shapes", "made by a test")  # it has no tongue
-    assert "character" not in read_face(checked / "content").metadata
+    assert read_face(checked / "content").metadata["character"]["file"] == ""
 
 
 @pytest.mark.usefixtures("face_model")
