@@ -75,6 +75,13 @@ def test_an_empty_jaw_is_as_good_as_missing(still: float) -> None:
     assert {*propose_mapping(character)} == {"mouthViseme_aa", "mouthViseme_oh"}
 
 
+@pytest.mark.parametrize(("jaw", "speaks_by_visemes"), [(0.005, True), (0.05, False)])
+def test_a_jaw_that_hardly_moves_beside_visemes_is_none(jaw: float, speaks_by_visemes: bool) -> None:
+    mapping = propose_mapping(made_character({"jawOpen": jaw, "viseme_aa": 0.1, "viseme_O": 0.02}))
+    assert ("jawOpen" in mapping) == (not speaks_by_visemes)
+    assert ("mouthViseme_aa" in mapping) == speaks_by_visemes
+
+
 def test_an_expression_counts_where_it_moves_something() -> None:
     binds = {"aa": {MorphTarget(0, 0): 1.0}, "ih": {MorphTarget(0, 1): 1.0}, "ou": {MorphTarget(0, 0): 0.0}, "ee": {}}
     character = made_character({"Key 1": 0.1, "Key 2": 0.0}, expressions=binds)

@@ -128,6 +128,18 @@ class Character:
         bound = [name for name, binds in self.expressions.items() if moved & {t for t in binds if binds[t]}]
         return tuple(dict.fromkeys([*targets, *bound]))
 
+    def reach(self, name: str) -> float:
+        """Largest displacement of a vertex by the morph targets of a name, or by an expression, in the file's units."""
+        targets = {target: 1.0 for target, own in self.target_names.items() if own == name}
+        weights = targets or self.expressions.get(name, {})
+        moved = (
+            abs(weight) * float(np.linalg.norm(piece.morphs[target], axis=1).max(initial=0.0))
+            for piece in self.pieces
+            for target, weight in weights.items()
+            if target in piece.morphs
+        )
+        return max(moved, default=0.0)
+
     @property
     def still_names(self) -> tuple[str, ...]:
         """Names of morph targets and expressions that move nothing."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
+from tts2face.face.stand_in import VISEME_PREFIX
 from tts2face.interchange.characters.binding import KEY, CharacterBinding
 from tts2face.interchange.characters.character import Character
 from tts2face.interchange.characters.eyeballs import mark_eyeballs
@@ -43,12 +44,13 @@ from tts2face.interchange.characters.surface import (
 )
 from tts2face.interchange.characters.surface_points import SurfacePoints, nearest_points
 from tts2face.interchange.gltf.reader import SUFFIXES
-from tts2face.models.face import Face
+from tts2face.models.face import WIDE_OPEN, Face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.picture.occlusion import bake_occlusion
 from tts2face.processes.threads import available_cores
 from tts2face.video.tracking import MIN_SCORE
 
+WEAK_JAW_SHARE = 0.1  # of the largest motion by a viseme
 FRONTS = {"+z": 0.0, "-z": 180.0, "+x": -90.0, "-x": 90.0}  # axis that a character looks along -> turn, degrees
 NO_LANDMARKS = LocatedLandmarks(np.zeros(0, np.int64), SurfacePoints(np.zeros((0, 3), np.int64), np.zeros((0, 3))), 0.0)
 WITHOUT_LANDMARKS = (
@@ -112,8 +114,17 @@ def read_character(path: Path) -> Character:
 
 
 def propose_mapping(character: Character) -> ShapeMapping:
-    """Mapping guessed from the names of a character's morph targets and expressions."""
-    return guess_mapping(character.moving_names)
+    """Mapping guessed from the names of a character's morph targets and expressions that move it.
+
+    A jaw that moves next to nothing beside the visemes is none: the character speaks by these.
+    """
+    names = character.moving_names
+    mapping = guess_mapping(names)
+    jaw = {source.name for source in mapping.get(WIDE_OPEN, ())}
+    by_visemes = guess_mapping([name for name in names if name not in jaw]) if jaw else mapping
+    visemes = {s.name for shape, sources in by_visemes.items() if shape.startswith(VISEME_PREFIX) for s in sources}
+    reach = max(map(character.reach, jaw), default=0.0)
+    return by_visemes if reach < WEAK_JAW_SHARE * max(map(character.reach, visemes), default=0.0) else mapping
 
 
 def import_face(
