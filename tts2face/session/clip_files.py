@@ -96,7 +96,7 @@ def export(
                 writer.add(piece)
             else:
                 writer.add(piece.clip, piece.text)
-    return tuple(file.path for file in files)
+    return writer.paths
 
 
 def load_clip(path: str | Path) -> Clip:
@@ -163,7 +163,7 @@ def convert(  # noqa: PLR0913 - one parameter a model
     with ExportWriter(files, face=mesh, fps=fps) as writer:
         for piece in chain([first], pieces):
             writer.add(piece.clip, piece.text)
-    return tuple(file.path for file in files)
+    return writer.paths
 
 
 def _mesh_with_channels(channels: tuple[str, ...], mesh: Face, names: tuple[str, str]) -> Face:

@@ -52,11 +52,6 @@ class OutputFiles:
         """First file of the clip."""
         return self.exports[0].path if self.out is None else self.out
 
-    @property
-    def export_paths(self) -> tuple[Path, ...]:
-        """Paths of the exports."""
-        return tuple(file.path for file in self.exports)
-
     def check_face(self, face: "AnimatedFace") -> None:
         """Reject exports that a face cannot fill.
 
@@ -234,7 +229,7 @@ def write_pieces(
             progress.report_frames(n_frames, n_frames)
     progress.finish()
     return WrittenClip(
-        outputs.path, seconds, n_frames, tuple(marks), mismatches=tuple(mismatches), exports=outputs.export_paths
+        outputs.path, seconds, n_frames, tuple(marks), mismatches=tuple(mismatches), exports=files.exports.paths
     )
 
 

@@ -206,5 +206,5 @@ def write_take(
             files.add(clip)
     is_silent = not len(take.sound.samples)
     return WrittenClip(
-        outputs.path, take.seconds, n_frames, is_silent=is_silent, exports=outputs.export_paths, notes=take.notes
+        outputs.path, take.seconds, n_frames, is_silent=is_silent, exports=files.exports.paths, notes=take.notes
     )

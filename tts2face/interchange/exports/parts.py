@@ -10,6 +10,7 @@ How the next format is made:
 4. Say in docs/exports.md what the file holds, and read it back in a test.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -76,6 +77,8 @@ class Target:
         Mesh whose first shapes are these channels; None if not given.
     lines
         Receives the text of formats that consist of lines, in place of `path`.
+    beside
+        Path to write another file to, which appears beside this one under the given name; asked for before any frame.
     """
 
     path: Path
@@ -86,6 +89,7 @@ class Target:
     channels: tuple[str, ...]
     face: "Face | None"
     lines: TextIO | None = None
+    beside: Callable[[str], Path] = Path
 
     def open_lines(self) -> TextIO:
         """Text file to write lines to: `path`, or `lines` of an export that is sent while it is made."""

@@ -134,9 +134,9 @@ def texture_jpeg(texture: NDArray[np.uint8]) -> bytes:
     return _encoded(texture, "JPEG", quality=95, subsampling=0)
 
 
-def texture_png(texture: NDArray[np.uint8], alpha: NDArray[np.uint8]) -> bytes:
-    """A texture (H, W, 3) with its coverage (H, W) as PNG."""
-    return _encoded(np.dstack([texture, alpha]), "PNG", compress_level=3)
+def texture_png(texture: NDArray[np.uint8], alpha: NDArray[np.uint8] | None = None) -> bytes:
+    """A texture (H, W, 3), with its coverage (H, W) if it has one, as PNG."""
+    return _encoded(texture if alpha is None else np.dstack([texture, alpha]), "PNG", compress_level=3)
 
 
 def _encoded(pixels: NDArray[np.uint8], kind: str, **options: Any) -> bytes:

@@ -100,7 +100,7 @@ FORMATS = (
                ("audio2face", "Audio2FaceWriter"), has_frames=True, uses_shapes=True),
     FormatInfo("glb", (".glb",), "mesh, morph targets, skeleton and animation (glTF 2.0)",
                ("character_glb", "make_glb_writer"), has_frames=True, needs_mesh=True, has_sound_beside=True),
-    FormatInfo("usd", (".usda", ".usdc", ".usd"), "mesh, blend shapes, skeleton and animation (UsdSkel)",
+    FormatInfo("usd", (".usda", ".usdc", ".usd", ".usdz"), "mesh, shapes, materials, skeleton and animation (UsdSkel)",
                ("usd", "UsdWriter"), has_frames=True, needs_mesh=True, has_sound_beside=True, package="pxr"),
     FormatInfo("bvh", (".bvh",), "head motion", ("bvh", "BvhWriter"), has_frames=True),
     FormatInfo("npz", (".npz",), "all arrays for NumPy", ("npz", "NpzWriter"), has_frames=True),

@@ -1,11 +1,15 @@
 """Head mesh with blend shapes, skeleton and animation as USD (UsdSkel), by usd-core (extra ``[usd]``).
 
-Millimetres (``metersPerUnit`` 0.001), y up, the face looks along +z. Time code i is frame i.
+Millimetres (``metersPerUnit`` 0.001), y up, the face looks along +z. Time code i is frame i. Textures lie beside the
+file; a .usdz file holds them.
 """
 
 import errno
 import importlib
 import re
+import tempfile
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +25,7 @@ from tts2face.interchange.exports.surfaces import (
     morph_targets,
     vertex_normals,
 )
+from tts2face.interchange.exports.usd_materials import TextureFiles, define_material
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import decode_srgb
 from tts2face.storage.spool import Spool
@@ -28,6 +33,8 @@ from tts2face.storage.spool import Spool
 # millimetres, as faces have them
 METRES_PER_UNIT = 0.001
 ROOT_PATH = "/Face"
+SINGLE_FILE = ".usdz"
+STAGE_IN_IT = "face.usdc"  # its name there: the first file is the one that is opened
 
 
 class UsdWriter:
@@ -45,6 +52,12 @@ class UsdWriter:
         self._targets = morph_targets(target.face, target.channels)
         self._weights, self._places = Spool(len(self._targets.names)), Spool(3)
         self._turns = [Spool(4) for _ in self._skeleton.names[HEAD:]]
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        if target.name.lower().endswith(SINGLE_FILE):
+            self._folder = tempfile.TemporaryDirectory(prefix="tts2face-")
+            target = replace(target, name="face", beside=Path(self._folder.name).joinpath)
+        self._surfaces = divide_surface(self._face)
+        self._textures = TextureFiles(target, self._face, self._surfaces)
 
     def add(self, part: Part) -> None:
         """Append frames."""
@@ -55,9 +68,8 @@ class UsdWriter:
             spool.add(self._skeleton.eye_rotations(part.motion, eye))
 
     def finish(self) -> None:
-        """Write the file, as text or crate by the suffix of its name."""
+        """Write the file, as text, crate or package by the suffix of its name."""
         usd, target = self._usd, self._target
-        is_text = target.name.lower().endswith(".usda")
         stage = usd.Usd.Stage.CreateInMemory()
         stage.SetMetadata("metersPerUnit", METRES_PER_UNIT)
         stage.SetMetadata("upAxis", "Y")
@@ -72,20 +84,34 @@ class UsdWriter:
         names = _identifiers(self._targets.names)
         _define_skeleton(usd, stage, self._skeleton)
         self._define_animation(stage, names)
-        for number, surface in enumerate(divide_surface(self._face)):
-            self._define_surface(stage, surface, f"{surface.part.name}_{number}", names)
-        written = target.path.with_name(f"{target.path.name}{'.usda' if is_text else '.usdc'}")  # USD goes by suffix
+        for number, surface in enumerate(self._surfaces):
+            self._define_surface(stage, surface, number, names)
+        textures = self._textures.write()
+        suffix = target.name.lower().rpartition(".")[2].replace("usdz", "usdc")
+        written = target.path.with_name(f"{target.path.name}.{suffix}")  # USD goes by suffix
         try:
             if not stage.GetRootLayer().Export(str(written)):
                 raise OSError(errno.EIO, "USD could not write the file", str(target.path))
-            written.replace(target.path)
+            if self._folder is None:
+                written.replace(target.path)
+            else:
+                self._pack({STAGE_IN_IT: written, **textures})
         finally:
             written.unlink(missing_ok=True)
+
+    def _pack(self, files: dict[str, Path]) -> None:
+        """Write the files, by their names in it, to one of USD's packages."""
+        path = self._target.path
+        with self._usd.Sdf.ZipFileWriter.CreateNew(str(path)) as package:
+            if not all(package.AddFile(str(file), name) for name, file in files.items()):
+                raise OSError(errno.EIO, "USD could not write the file", str(path))
 
     def close(self) -> None:
         """Remove the temporary files."""
         for spool in (self._weights, self._places, *self._turns):
             spool.close()
+        if self._folder is not None:
+            self._folder.cleanup()
 
     def _define_animation(self, stage: Any, names: list[str]) -> None:
         usd = self._usd
@@ -106,12 +132,12 @@ class UsdWriter:
             moved = np.vstack([places[frame : frame + 1], still]).astype(np.float32)
             translations.Set(usd.Vt.Vec3fArray.FromNumpy(moved), frame)
 
-    def _define_surface(self, stage: Any, surface: ExportSurface, name: str, shape_names: list[str]) -> None:
+    def _define_surface(self, stage: Any, surface: ExportSurface, number: int, shape_names: list[str]) -> None:
         usd = self._usd
         face = self._face
         skeleton = self._skeleton
         own = surface.vertices
-        path = f"{ROOT_PATH}/{re.sub(r'[^A-Za-z0-9_]', '_', name)}"
+        path = f"{ROOT_PATH}/{re.sub(r'[^A-Za-z0-9_]', '_', f'{surface.part.name}_{number}')}"
         mesh = usd.UsdGeom.Mesh.Define(stage, path)
         mesh.CreatePointsAttr(_vectors(usd, face.vertices[own]))
         mesh.CreateFaceVertexCountsAttr(usd.Vt.IntArray.FromNumpy(np.full(len(surface.triangles), 3, np.int32)))
@@ -120,7 +146,10 @@ class UsdWriter:
         mesh.SetNormalsInterpolation(usd.UsdGeom.Tokens.vertex)
         mesh.CreateSubdivisionSchemeAttr(usd.UsdGeom.Tokens.none)
         mesh.CreateDoubleSidedAttr(True)
+        mesh.CreateExtentAttr(usd.UsdGeom.PointBased.ComputeExtent(mesh.GetPointsAttr().Get()))
         mesh.CreateDisplayColorPrimvar(usd.UsdGeom.Tokens.vertex).Set(_vectors(usd, _display_colours(face, surface)))
+        material = f"{ROOT_PATH}/Materials/{mesh.GetPrim().GetName()}"
+        define_material(usd, stage, mesh, surface, material, self._textures.of(number, surface))
         binding = usd.UsdSkel.BindingAPI.Apply(mesh.GetPrim())
         binding.CreateSkeletonRel().SetTargets([usd.Sdf.Path(f"{ROOT_PATH}/Skeleton")])
         joints = skeleton.joints[own].astype(np.int32).ravel()
@@ -136,8 +165,9 @@ class UsdWriter:
                 target.CreatePointIndicesAttr(usd.Vt.IntArray.FromNumpy(moved.astype(np.int32)))
                 used.append(shape_name)
                 targets.append(target.GetPath())
-        binding.CreateBlendShapesAttr(used)
-        binding.CreateBlendShapeTargetsRel().SetTargets(targets)
+        if used:  # TinyUSDZ 0.9.4 refuses a file with an empty list
+            binding.CreateBlendShapesAttr(used)
+            binding.CreateBlendShapeTargetsRel().SetTargets(targets)
 
 
 class _UsdModules:
@@ -145,7 +175,7 @@ class _UsdModules:
 
     def __init__(self) -> None:
         with import_of_extra("USD files need usd-core; install it with: pip install 'tts2face[usd]'"):
-            for name in ("Gf", "Sdf", "Usd", "UsdGeom", "UsdSkel", "Vt"):
+            for name in ("Gf", "Sdf", "Usd", "UsdGeom", "UsdShade", "UsdSkel", "Vt"):
                 setattr(self, name, importlib.import_module(f"pxr.{name}"))
 
     def __getattr__(self, name: str) -> Any:

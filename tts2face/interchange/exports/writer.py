@@ -1,7 +1,7 @@
 """Writing of consecutive clips to one or several export files, which appear when all of them are complete."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Protocol, TextIO
@@ -162,6 +162,11 @@ class ExportWriter:
         finally:
             self._clear()
 
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """Paths of all files, those beside them included, such as textures; known when a clip was added."""
+        return tuple(path for file in self._files for path in (file.path, *file.beside))
+
     def add(self, clip: Clip, text: str = "") -> None:
         """Append a clip, and its written text for captions; errors as the class."""
         self._n_clips += 1
@@ -193,6 +198,7 @@ class _OpenFile:
         self._grid: FrameGrid | None = None
         self._writer: FormatWriter | None = None
         self._temporary: Temporary | None = None
+        self.beside: dict[Path, Temporary] = {}
 
     def open(self) -> None:
         with translate_disk_errors(self.path):
@@ -218,6 +224,8 @@ class _OpenFile:
     def replace(self) -> None:
         if self._temporary is not None:
             with translate_disk_errors(self.path):
+                for path, temporary in self.beside.items():
+                    temporary.replace(path)
                 self._temporary.replace(self.path)
             self._temporary = None
 
@@ -228,9 +236,18 @@ class _OpenFile:
         if self._temporary is not None:
             self._temporary.remove()
             self._temporary = None
+            for temporary in self.beside.values():
+                temporary.remove()
 
     def _target(self, grid: FrameGrid, clip: Clip, temporary: Temporary) -> Target:
-        return make_target(ExportFile(self.path, self._format), grid, clip, self._face, temporary.path)
+        target = make_target(ExportFile(self.path, self._format), grid, clip, self._face, temporary.path)
+        return replace(target, beside=self._file_beside)
+
+    def _file_beside(self, name: str) -> Path:
+        path = self.path.with_name(name)
+        _check_path(path)
+        self.beside[path] = Temporary(path)
+        return self.beside[path].path
 
 
 def make_target(

@@ -70,7 +70,7 @@ class Exporter:
             lengths = [track.slot_frames if track.fills_slot else None for track in output.tracks]
             for clip in joined_clips(tracks, output.fps, output.sounds, lengths):
                 writer.add(clip)
-        return [file.path for file in files]
+        return list(writer.paths)
 
     def _session_of(self, output: Output) -> "Session":
         models = output.segments[0].models
