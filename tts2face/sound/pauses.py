@@ -32,7 +32,7 @@ LOUD_S, LOUD_RANGE_DB = 0.5, 30.0  # what is at most so far below the loudest ha
 NEAR_SPEECH_S = 1.0  # of speech: the pauses between sentences belong to it
 NEAR_SOUND_S = 0.3  # of silence before and after sound
 SPEECH_RANGE_DB = 15.0  # least range of speech with its pauses; noise has half of it in windows of 10 ms
-SMOOTH_RANGE_DB = 12.0  # the same of levels over 30 ms, in which noise has less
+SMOOTH_RANGE_DB = 12.0  # the same of levels over 30 ms, in which noise has at most half of it, too
 SILENCE_DB = 60.0  # below the loudest half second: digital silence and noise of a converter, no room
 Span = tuple[float, float]
 
