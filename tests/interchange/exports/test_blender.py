@@ -7,11 +7,14 @@ import sys
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import tts2face
-from tests.interchange.exports.made import signed_clip, with_gesture
+from tests.interchange.exports.made import signed_clip, silent_clip, with_gesture
 from tts2face.face.deformation import build_rig
 from tts2face.interchange.exports.surfaces import divide_surface
+from tts2face.models.face_loading import load_face
+from tts2face.numeric.arrays import decode_srgb
 
 pytestmark = pytest.mark.formats
 
@@ -55,3 +58,45 @@ def test_blender_shows_the_vertices_of_the_renderer(tmp_path):
     expected = np.concatenate([posed[surface.vertices] for surface in surfaces])
     x, y, z = expected.T
     assert np.allclose(answer["places"], np.column_stack([x, -z, y]), rtol=0, atol=2e-5)  # z is up in Blender
+
+
+LOCK_SCRIPT = """
+import json, math, sys
+import bpy
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.ops.import_scene.gltf(filepath=sys.argv[1])
+scene = bpy.context.scene
+scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 16, False
+scene.render.resolution_x = scene.render.resolution_y = 96
+scene.view_settings.view_transform = "Standard"
+scene.world = bpy.data.worlds.new("white")
+scene.world.use_nodes = True
+scene.world.node_tree.nodes["Background"].inputs[0].default_value = (1, 1, 1, 1)
+camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+scene.collection.objects.link(camera)
+scene.camera = camera
+camera.location, camera.rotation_euler, camera.data.angle = (0, -1.4, 0), (math.pi / 2, 0, 0), 2 * math.atan(0.1)
+scene.render.filepath = sys.argv[2]
+bpy.ops.render.render(write_still=True)
+"""
+LOCK, LOCK_LAB = (slice(24, 52), slice(20, 28)), (34.6, 20.7, 20.3)  # rows and columns; CIELAB in the video
+
+
+def _lab(rgb):
+    """CIELAB (3,) of an sRGB colour, 0 to 255."""
+    linear = decode_srgb(np.asarray(rgb) / 255)
+    x, y, z = (np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]) @ linear
+               / [0.9505, 1, 1.089]) ** (1 / 3)  # fmt: skip
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
+
+
+def test_blender_shows_the_hair_of_the_default_face_as_the_video_does(tmp_path):
+    if importlib.util.find_spec("bpy") is None:
+        pytest.skip("Blender's package bpy is not installed")
+    face = load_face("ada")
+    tts2face.export(silent_clip(1, channels=face.shape_names), tmp_path / "a.glb", face=face)
+    command = [sys.executable, "-c", LOCK_SCRIPT, str(tmp_path / "a.glb"), str(tmp_path / "a.png")]
+    subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
+    with Image.open(tmp_path / "a.png") as picture:
+        pixels = np.asarray(picture.convert("RGB"), np.float64)
+    assert np.linalg.norm(_lab(pixels[LOCK].mean(axis=(0, 1))) - LOCK_LAB) < 8

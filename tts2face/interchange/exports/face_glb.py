@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from tts2face.interchange.exports.parts import Part, Target
+from tts2face.interchange.exports.plain_face import plain_face
 from tts2face.interchange.exports.skeleton import HEAD, Skeleton, build_skeleton
 from tts2face.interchange.exports.surfaces import (
     MM_PER_M,
@@ -19,6 +20,7 @@ from tts2face.interchange.exports.surfaces import (
     divide_surface,
     linear_colours,
     morph_targets,
+    reflection,
     roughness,
     texture_jpeg,
     texture_png,
@@ -31,6 +33,7 @@ from tts2face.storage.spool import Spool
 
 MESH_NODE, FIRST_JOINT = 0, 1
 GENERATOR = "tts2face"
+SPECULAR = "KHR_materials_specular"
 
 
 class FaceGlbWriter:
@@ -39,7 +42,7 @@ class FaceGlbWriter:
     def __init__(self, target: Target) -> None:
         if target.face is None:
             raise InputError(f"{target.name} holds the mesh of the face; give the face, as in face=session.face")
-        self._target, self._face = target, target.face
+        self._target, self._face = target, plain_face(target.face)
         self._skeleton = build_skeleton(target.face, len(target.channels))
         self._targets = morph_targets(target.face, target.channels)
         self._weights, self._shift = Spool(len(self._targets.names)), Spool(3)
@@ -129,6 +132,9 @@ def _materials(face: Face, buffer: GltfBuffer) -> dict[str, Any]:
         if part.is_textured:
             shading["baseColorTexture"] = {"index": part.texture}
         material: dict[str, Any] = {"name": part.name, "doubleSided": True, "pbrMetallicRoughness": shading}
+        if reflection(part) < 1:
+            material["extensions"] = {SPECULAR: {"specularFactor": reflection(part)}}
+            content["extensionsUsed"] = [SPECULAR]
         if part.opacity < 1:
             material["alphaMode"] = "BLEND"
         elif part.cutout:

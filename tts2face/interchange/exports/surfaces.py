@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.models.face import Face, FacePart
+from tts2face.models.hair import HAIR_PART
 from tts2face.numeric.arrays import decode_srgb
 
 # glTF counts in metres
 MM_PER_M = 1000.0
+HAIR_REFLECTION = 0.25  # cards or locks as smooth as glass turn grey in light from all sides; fibres do not
 OPPOSITE = "Minus"  # ending of the name of a target for negative weights
 
 
@@ -127,6 +129,11 @@ def linear_colours(face: Face) -> NDArray[np.float64]:
 def roughness(part: FacePart) -> float:
     """Roughness in [0, 1] of a Blinn-Phong exponent: the fourth root of 2 / (n + 2) (Karis 2013)."""
     return float((2.0 / (part.shininess + 2.0)) ** 0.25)
+
+
+def reflection(part: FacePart) -> float:
+    """Share of the white light that a smooth surface of glass reflects."""
+    return HAIR_REFLECTION if part.name == HAIR_PART else 1.0
 
 
 def texture_jpeg(texture: NDArray[np.uint8]) -> bytes:

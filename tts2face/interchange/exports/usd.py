@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError, import_of_extra
 from tts2face.interchange.exports.parts import Part, Target
+from tts2face.interchange.exports.plain_face import plain_face
 from tts2face.interchange.exports.skeleton import HEAD, Skeleton, build_skeleton
 from tts2face.interchange.exports.surfaces import (
     ExportSurface,
@@ -47,7 +48,7 @@ class UsdWriter:
         if target.face is None:
             raise InputError(f"{target.name} holds the mesh of the face; give the face, as in face=session.face")
         self._usd = _UsdModules()
-        self._target, self._face = target, target.face
+        self._target, self._face = target, plain_face(target.face)
         self._skeleton = build_skeleton(target.face, len(target.channels))
         self._targets = morph_targets(target.face, target.channels)
         self._weights, self._places = Spool(len(self._targets.names)), Spool(3)

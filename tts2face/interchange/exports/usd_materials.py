@@ -15,6 +15,7 @@ from tts2face.interchange.exports.parts import Target
 from tts2face.interchange.exports.surfaces import (
     ExportSurface,
     linear_colours,
+    reflection,
     roughness,
     texture_jpeg,
     texture_png,
@@ -94,6 +95,7 @@ def define_material(
     shader.CreateIdAttr("UsdPreviewSurface")
     shader.CreateInput("roughness", types.Float).Set(round(roughness(part), 4))
     shader.CreateInput("metallic", types.Float).Set(0.0)
+    shader.CreateInput("ior", types.Float).Set(round(_refraction(0.04 * reflection(part)), 4))
     opacity = shader.CreateInput("opacity", types.Float)
     opacity.Set(part.opacity)
     if part.cutout and part.is_textured:
@@ -102,6 +104,12 @@ def define_material(
     shader.CreateInput("diffuseColor", types.Color3f).ConnectToSource(picture.CreateOutput("rgb", types.Float3))
     material.CreateSurfaceOutput().ConnectToSource(shader.CreateOutput("surface", types.Token))
     shade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+
+
+def _refraction(reflected: float) -> float:
+    """Index of refraction of a surface that reflects a share of the light that falls straight on it (Fresnel)."""
+    root = float(np.sqrt(reflected))
+    return (1 + root) / (1 - root)
 
 
 def _is_textured(surface: ExportSurface, face: Face) -> bool:
