@@ -36,6 +36,26 @@ keys = {key.name: key.value for key in mesh.data.shape_keys.key_blocks}
 names = [material.name for material in mesh.data.materials]
 print("ANSWER" + json.dumps({"keys": keys, "places": places.tolist(), "materials": names}))
 """
+LOCK_SCRIPT = """
+import json, math, sys
+import bpy
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.ops.import_scene.gltf(filepath=sys.argv[1])
+scene = bpy.context.scene
+scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 16, False
+scene.render.resolution_x = scene.render.resolution_y = 96
+scene.view_settings.view_transform = "Standard"
+scene.world = bpy.data.worlds.new("white")
+scene.world.use_nodes = True
+scene.world.node_tree.nodes["Background"].inputs[0].default_value = (1, 1, 1, 1)
+camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+scene.collection.objects.link(camera)
+scene.camera = camera
+camera.location, camera.rotation_euler, camera.data.angle = (0, -1.4, 0), (math.pi / 2, 0, 0), 2 * math.atan(0.1)
+scene.render.filepath = sys.argv[2]
+bpy.ops.render.render(write_still=True)
+"""
+LOCK, LOCK_LAB = (slice(24, 52), slice(20, 28)), (34.6, 20.7, 20.3)  # rows and columns; CIELAB in the video
 
 
 def test_blender_shows_the_vertices_of_the_renderer(tmp_path):
@@ -58,28 +78,6 @@ def test_blender_shows_the_vertices_of_the_renderer(tmp_path):
     expected = np.concatenate([posed[surface.vertices] for surface in surfaces])
     x, y, z = expected.T
     assert np.allclose(answer["places"], np.column_stack([x, -z, y]), rtol=0, atol=2e-5)  # z is up in Blender
-
-
-LOCK_SCRIPT = """
-import json, math, sys
-import bpy
-bpy.ops.wm.read_factory_settings(use_empty=True)
-bpy.ops.import_scene.gltf(filepath=sys.argv[1])
-scene = bpy.context.scene
-scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 16, False
-scene.render.resolution_x = scene.render.resolution_y = 96
-scene.view_settings.view_transform = "Standard"
-scene.world = bpy.data.worlds.new("white")
-scene.world.use_nodes = True
-scene.world.node_tree.nodes["Background"].inputs[0].default_value = (1, 1, 1, 1)
-camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
-scene.collection.objects.link(camera)
-scene.camera = camera
-camera.location, camera.rotation_euler, camera.data.angle = (0, -1.4, 0), (math.pi / 2, 0, 0), 2 * math.atan(0.1)
-scene.render.filepath = sys.argv[2]
-bpy.ops.render.render(write_still=True)
-"""
-LOCK, LOCK_LAB = (slice(24, 52), slice(20, 28)), (34.6, 20.7, 20.3)  # rows and columns; CIELAB in the video
 
 
 def _lab(rgb):

@@ -65,8 +65,8 @@ def dressed(heights):
     points = np.stack([np.tile(100 * np.cos(turn), (rings, 1)), -100 + share * (ends + 100),
                        np.tile(100 * np.sin(turn), (rings, 1))], axis=-1).reshape(-1, 3)  # fmt: skip
     k, column = np.arange(rings - 1)[:, None] * (n + 1), np.arange(n)
-    a, b, c, d = (k + column, k + column + 1, k + column + n + 2, k + column + n + 1)
-    triangles = np.concatenate([np.stack(corners, -1).reshape(-1, 3) for corners in ((a, b, c), (a, c, d))])
+    halves = ((0, 1, n + 2), (0, n + 2, n + 1))
+    triangles = np.concatenate([np.stack([k + column + to for to in half], -1).reshape(-1, 3) for half in halves])
     v, shapes = len(face.vertices), np.zeros((len(face.shapes), len(points), 3), np.float32)
     shapes[0] = points / 100
     return replace(
