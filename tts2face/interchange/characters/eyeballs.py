@@ -39,7 +39,7 @@ def mark_eyeballs(head: HeadMesh, character: Character) -> HeadMesh:
 
 
 def eyeball_centres(head: HeadMesh, character: Character) -> dict[int, FloatArray]:
-    """Centre (3,) of each marked eyeball: of its sphere, or its bone where it is not a sphere."""
+    """Centre (3,) of each marked eyeball: of its sphere, else its bone, if that lies in it, or its middle."""
     places = [head.turn @ place for bone, place in character.bone_places.items() if bone in BONES.values()]
     centres = {}
     for eye in BONES:
@@ -47,8 +47,10 @@ def eyeball_centres(head: HeadMesh, character: Character) -> dict[int, FloatArra
         if len(rows):
             centre, radius, error = fit_sphere(rows)
             is_round = error < MAX_ROUNDNESS_ERROR * radius
-            nearest = min(places, key=lambda place: abs(place[0] - rows[:, 0].mean()), default=centre)
-            centres[eye] = centre if is_round else nearest
+            low, high = rows.min(axis=0), rows.max(axis=0)
+            # nodes named as eyes may lie at the origin, and hold the mesh of the eye
+            inside = (place for place in places if ((place > low) & (place < high)).all())
+            centres[eye] = centre if is_round else next(inside, (low + high) / 2)
     return centres
 
 
