@@ -46,6 +46,13 @@ LEAST_MOTION_MM = 0.5  # per weight of a shape: shapes that move less, as on a f
 ROUND_SHAPES = {"mouthPucker": 1.0}
 FLARED_SHAPES = {"mouthPucker": 0.85, "mouthFunnel": 0.3}
 SPREAD_SHAPES = {"mouthStretchLeft": 0.5, "mouthStretchRight": 0.5, "mouthSmileLeft": 0.5, "mouthSmileRight": 0.5}
+# Visemes of a face that lacks these shapes, the first that it has.
+INSTEAD = {
+    "mouthPucker": ("mouthViseme_ou", "mouthViseme_oh"),
+    "mouthFunnel": ("mouthViseme_ch", "mouthViseme_oh"),
+    "mouthStretchLeft": ("mouthViseme_ih", "mouthViseme_ee"),
+    "mouthStretchRight": ("mouthViseme_ih", "mouthViseme_ee"),
+}
 LOWERED_SHAPES = {"mouthLowerDownLeft": 1.0, "mouthLowerDownRight": 1.0}
 # Drop of the jaw and gap of the lips at which the tip of the tongue is seen between the teeth; largest weight for it.
 DENTAL_DROP_MM = 5.5
@@ -223,10 +230,18 @@ def build_articulator(face: Face) -> Articulator:
         protrusion=(motion[OUTER_UPPER_MID, 2] + motion[OUTER_LOWER_MID, 2]) / 2,
         rest_width=rest_width,
         rest_gaps=np.clip(inner_lip_gaps(places), 0.0, LARGEST_REST_GAP_SHARE * rest_width),
-        directions={
-            kind: np.array([table.get(name, 0.0) for name in face.shape_names]) for kind, table in tables.items()
-        },
+        directions={kind: _direction(table, face.shape_names) for kind, table in tables.items()},
         own_contacts=own,
         tongue=build_tongue(face, edge, rest_width),
         incisors=build_incisor_contact(face.shape_names, contact, edge, places=places, motion=motion, width=rest_width),
     )
+
+
+def _direction(table: Mapping[str, float], names: tuple[str, ...]) -> FloatArray:
+    """Weights (K,) of shapes, or of the visemes that stand for those that the face lacks."""
+    direction = np.zeros(len(names))
+    for shape, weight in table.items():
+        found = next((name for name in (shape, *INSTEAD.get(shape, ())) if name in names), None)
+        if found is not None:
+            direction[names.index(found)] += weight
+    return direction

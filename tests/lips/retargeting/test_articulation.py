@@ -343,3 +343,20 @@ def test_labiodentals_without_shapes_that_roll_are_no_grin(has_visemes: bool) ->
         assert spoken.columns(["mouthViseme_ff"])[at["f"], 0] > 0.5
         assert spoken.columns(["mouthViseme_pp"])[at["b"], 0] > 0.4
         assert spoken.columns(["mouthViseme_ff"])[at["b"], 0] < 0.3
+
+
+def test_a_face_of_visemes_rounds_by_one_of_them() -> None:
+    head = named_face(None)
+    own = {"jawOpen": "mouthViseme_aa", "mouthPucker": "mouthViseme_ou", "mouthStretchLeft": "mouthViseme_ih"}
+    rows = [head.shape_names.index(name) for name in own]
+    face = replace(
+        head, shape_names=tuple(own.values()), shapes=head.shapes[rows], limits=head.limits[rows], scores=None,
+        occlusion=None, eyes=(), opened_by="mouthViseme_aa",
+    )  # fmt: skip
+    phones, n_frames = sequence("ɑ w ɑ"), int((2 * LONG_PAUSE_S + 0.3) * FPS)
+    speech = np.zeros((n_frames, 3), np.float32)
+    speech[24:-24, 0] = 0.2
+    spoken = build_articulator(face).articulate(Trajectory(face.shape_names, speech, FPS), phones, 1.5)
+    rounded = spoken.columns(["mouthViseme_ou"])[:, 0]
+    assert rounded[round((LONG_PAUSE_S + 0.15) * FPS)] > 0.4
+    assert rounded[[0, -1]].max() < 0.05

@@ -63,7 +63,8 @@ def test_it_speaks_in_its_own_file(imported: ImportedFace, tmp_path: Path) -> No
     played = Played(written.path)
     names = played.root["meshes"][2]["extras"]["targetNames"]
     tracks = [
-        played.rows(played.animation.samplers[channel.sampler].output).reshape(len(clip.motion), -1)
+        # the last key holds the last frame until the sound ends
+        played.rows(played.animation.samplers[channel.sampler].output).reshape(len(clip.motion) + 1, -1)[:-1]
         for channel in played.animation.channels
         if channel.target.path == "weights"
     ]
