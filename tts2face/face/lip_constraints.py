@@ -36,6 +36,7 @@ GESTURE_COST = 1.0  # of changes of all weights by gestures
 # Of sideways shapes where nothing rolls the lips: left and right together lift a jaw a little, and were used for it.
 SIDEWAYS, SIDEWAYS_COST = ("jawLeft", "jawRight", "mouthLeft", "mouthRight"), 20.0
 ROLLED = "mouthRollLower"
+USUAL_EXPRESSION = 0.3  # weight of a basis expression in speech, at which closed lips shall be so within the tolerance
 CLOSED_SMILE_COST = 0.3  # of the smile of a basis expression, whose lips are closed
 FULL_GROWTH_GAP_MM = 1.5  # gaps smaller than this are amplified by less than the gain
 GAP_TOLERANCE_MM = 0.01  # largest gap of closed lips
@@ -61,6 +62,8 @@ class LipConstraints:
         Least and greatest weight of the `moving` shapes.
     is_smile, is_sideways : (k,)
         Whether each of the `moving` shapes smiles, and whether it moves a mouth sideways whose lips nothing rolls.
+    tolerance
+        By which gestures may widen or narrow the gap of lips that touch, mm.
     """
 
     moving: NDArray[np.int64]
@@ -70,6 +73,7 @@ class LipConstraints:
     limits: FloatArray
     is_smile: NDArray[np.bool_]
     is_sideways: NDArray[np.bool_]
+    tolerance: float = 0.0
 
     def with_change_cost(self) -> "LipConstraints":
         """The constraints with a cost of changes of the weights, so that opposite shapes do not act together."""
@@ -80,8 +84,9 @@ class LipConstraints:
         return self._with_costs(np.where(self.is_smile, GESTURE_COST + SMILE_COST, GESTURE_COST))
 
     def with_smile_cost(self) -> "LipConstraints":
-        """The constraints with a cost of changes of a smile, for basis expressions."""
-        return self._with_costs(np.where(self.is_smile, CLOSED_SMILE_COST, 0.0))
+        """The constraints with a cost of changes of a smile, for basis expressions at weight 1."""
+        costly = self._with_costs(np.where(self.is_smile, CLOSED_SMILE_COST, 0.0))
+        return replace(costly, tolerance=self.tolerance / USUAL_EXPRESSION)
 
     def _with_costs(self, costs: FloatArray) -> "LipConstraints":
         """The constraints with costs (k,) of changes of the weights, relative to the median curvature."""
@@ -95,8 +100,13 @@ class LipConstraints:
         of it always remains. Frames without a gesture are unchanged.
         """
         gaps, widened = ordered_product(speech, self.gaps.T), ordered_product(added, self.gaps.T)
-        target_gaps = gaps + smoothstep(gaps / FULL_EXPRESSION_GAP_MM) * widened
-        return self.solve(speech, added, np.maximum(target_gaps, np.where(gaps > 0, MIN_GAP_SHARE * gaps, gaps)))
+        follow = smoothstep(gaps / FULL_EXPRESSION_GAP_MM)
+        target_gaps, least = gaps + follow * widened, np.where(gaps > 0, MIN_GAP_SHARE * gaps, gaps)
+        # on faces whose shapes were not modelled to keep lips shut, ten shapes would act against each other for .1 mm
+        if self.tolerance:
+            target_gaps += (1.0 - follow) * np.clip(widened, -self.tolerance, self.tolerance)
+            least -= self.tolerance
+        return self.solve(speech, added, np.maximum(target_gaps, least))
 
     def solve(
         self, speech: FloatArray, added: FloatArray, target_gaps: FloatArray, changed: NDArray[np.bool_] | None = None
@@ -179,4 +189,5 @@ def build_lip_constraints(face: Face) -> LipConstraints:
         limits=face.limits[moving].astype(np.float64),
         is_smile=np.array([face.shape_names[i].startswith(SMILE_PREFIX) for i in moving]),
         is_sideways=np.array([face.shape_names[i] in SIDEWAYS and ROLLED not in face.shape_names for i in moving]),
+        tolerance=face.lip_tolerance_mm,
     )

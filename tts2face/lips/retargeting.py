@@ -25,7 +25,7 @@ from tts2face.face.mouth import (
     mouth_curvature,
     require_lips,
 )
-from tts2face.lips.score_matching import ScoreMatching, build_score_matching
+from tts2face.lips.score_matching import FROWN, SIDEWAYS, ScoreMatching, build_score_matching
 from tts2face.models.face import Face
 from tts2face.models.landmarks import (
     INNER_LIP_LOWER,
@@ -205,7 +205,13 @@ def build_retargeter(
         scores=scores,
         matching=None
         if response is None or rest_scores is None
-        else build_score_matching(response, curvature, limits, opened, rest_scores),
+        else build_score_matching(
+            response,
+            (curvature, limits, opened),
+            rest_scores,
+            # with the prior of shipped faces imported ones frown in every frame, .09 in the mean (decision 242)
+            (*SIDEWAYS, *FROWN) if face.lip_tolerance_mm else SIDEWAYS,
+        ),
     )
 
 

@@ -30,6 +30,7 @@ OTHER_SHARE = 0.1  # pull of all other shapes to 0, as a share of the median cur
 # Pull of the shapes that move the mouth sideways: two opposite ones would act together otherwise.
 SIDEWAYS = ("jawLeft", "jawRight", "mouthLeft", "mouthRight")
 SIDEWAYS_SHARE = 1.0
+FROWN = ("mouthFrownLeft", "mouthFrownRight")  # no score is of them; on faces of unknown shapes they are held as well
 JAW = tuple(SCORE_SHAPES).index("jawOpen")
 # Of a lip gap where the lips touch, in addition to that of `curvature`; it falls to 0 at `FREE_GAP_MM`.
 CLOSED_GAP_WEIGHT, FREE_GAP_MM = 3e6, 3.0
@@ -149,9 +150,21 @@ class ScoreMatching:
 
 
 def build_score_matching(
-    response: ScoreMap, curvature: FloatArray, limits: FloatArray, opened: FloatArray, rest_scores: FloatArray
+    response: ScoreMap,
+    matrices: tuple[FloatArray, FloatArray, FloatArray],
+    rest_scores: FloatArray,
+    held: tuple[str, ...] = SIDEWAYS,
 ) -> ScoreMatching:
-    """Score matching of a face for a person whose scores at rest are `rest_scores` (S,); arrays as in the class."""
+    """Score matching of a face for a person whose scores at rest are `rest_scores` (S,).
+
+    Parameters
+    ----------
+    matrices
+        `curvature`, `limits` and `opened` of the class.
+    held
+        Shapes that are pulled to 0 by `SIDEWAYS_SHARE`.
+    """
+    curvature, limits, opened = matrices
     owner = np.full(len(response.inputs), -1, np.int64)
     own_scores = []
     for score, names in enumerate(SCORE_SHAPES.values()):
@@ -159,7 +172,7 @@ def build_score_matching(
         owner[shapes] = score
         own_scores.append(np.clip(response.scores(GRID[:, None] * shapes)[:, score], *SCORE_LIMITS))
     along = np.diag(curvature)
-    shares = np.where(np.isin(response.inputs, SIDEWAYS), SIDEWAYS_SHARE, OTHER_SHARE)
+    shares = np.where(np.isin(response.inputs, held), SIDEWAYS_SHARE, OTHER_SHARE)
     prior = np.where(owner < 0, shares * np.median(along), PRIOR_SHARES[owner] * along)
     return ScoreMatching(response, curvature, limits, opened, owner, np.array(own_scores), prior, rest_scores)
 

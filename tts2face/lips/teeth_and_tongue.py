@@ -21,8 +21,8 @@ CONTACT_WEIGHT = 1e4  # of a coordinate of these landmarks, relative to a landma
 ROLLED = "mouthRollLower"
 KEPT_SHARES = {WIDE_OPEN: 0.4, "mouthClose": 0.4, ROLLED: 0.0}
 ROLL_COST = 1.0
-# Shapes that pull the lip back by its corners where nothing rolls it: a labiodental is no grin.
-GRIN, GRIN_COST = ("mouthSmile", "mouthDimple", "mouthStretch"), 20.0
+# Shapes that pull the lip by its corners where nothing rolls it: a labiodental is no grin, and no frown.
+GRIN, GRIN_COST = ("mouthSmile", "mouthDimple", "mouthStretch", "mouthFrown"), 20.0
 TEETH_NAMES = ("teeth", "tooth")  # in the names of parts
 INCISOR_SHARE = 0.08  # of the mouth's width: half the width of the middle incisors
 STILL_SHARE = 0.1  # of the largest motion of the jaw: upper teeth move less

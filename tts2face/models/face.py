@@ -140,6 +140,8 @@ class Face(StoredModel):
         What the face tracker reads in the mouth for weights of the shapes that speech moves; None if unknown.
     opened_by
         Shape that opens the mouth wide, by which its light changes; a name that is none of the shapes where none does.
+    lip_tolerance_mm
+        By which gestures may change the gap of lips that touch; 0 where all shapes were modelled to keep them shut.
     light
         Lamps, unless the face has light of its own: that which a path tracer has baked, or that of a photograph.
     """
@@ -164,6 +166,7 @@ class Face(StoredModel):
     occlusion: NDArray[np.uint8] | None = None
     scores: ScoreMap | None = None
     opened_by: str = WIDE_OPEN
+    lip_tolerance_mm: float = 0.0
     light: Light = field(default_factory=Lamps)
 
     @property

@@ -16,6 +16,7 @@ from tts2face.models.face import VERTEX_COLOURS, WIDE_OPEN, Eye, Face, FacePart,
 from tts2face.models.face_schema import (
     FOLLOW,
     LIGHT,
+    LIP_TOLERANCE,
     LIT_POSES,
     MAX_TEXTURES,
     OPENED_BY,
@@ -106,7 +107,7 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
         "occlusion_bytes": 0 if face.occlusion is None else face.occlusion.shape[2],
         "metadata": dict(face.metadata),
     }
-    header |= _pose_fields(face)
+    header |= _pose_fields(face) | ({LIP_TOLERANCE: face.lip_tolerance_mm} if face.lip_tolerance_mm else {})
     if face.scores is not None:
         arrays |= stored_arrays(face.scores, SCORES)
         header[SCORE_INPUTS] = list(face.scores.inputs)
@@ -269,6 +270,7 @@ def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, A
         metadata=header["metadata"],
         scores=score_map_of(contents, tuple(header.get(SCORE_INPUTS, ()))),
         opened_by=header.get(OPENED_BY, WIDE_OPEN),
+        lip_tolerance_mm=float(header.get(LIP_TOLERANCE, 0.0)),
         light=_read_light(arrays, header, path),
     )
 

@@ -32,6 +32,8 @@ MIN_EXTENT_MM = 1.0  # least width and height of a face
 MOST_AREA = 10.0
 MEASURED = 4000  # triangles, spread over all, of which the area is measured: all of a head would take 10 ms
 OPENED_BY, LIT_POSES = "opened_by", "occlusion_poses"  # keys: the shape that opens the mouth; rest, and rest and open
+LIP_TOLERANCE = "lip_tolerance_mm"  # key: by which gestures may change the gap of lips that touch
+MAX_LIP_TOLERANCE_MM = 10.0
 
 _INDEX, _POINT = whole(0, 2**31 - 1), list_of(number(-MAX_MM, MAX_MM), 3)
 _PART = record(
@@ -87,6 +89,7 @@ def check_face(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[s
     contents.metadata(METADATA)
     table(row(text, text))(header.get("hairdos", {}), ModelPlace(f"{path}: metadata: hairdos"))
     whole(0, MAX_OCCLUSION_BYTES)(header.get("occlusion_bytes", 0), ModelPlace(f"{path}: metadata: occlusion_bytes"))
+    number(0.0, MAX_LIP_TOLERANCE_MM)(header.get(LIP_TOLERANCE, 0.0), ModelPlace(f"{path}: metadata: {LIP_TOLERANCE}"))
     contents.tensors(TENSORS)
     _check_poses(contents)
     presets = range(len(header["identities"]))

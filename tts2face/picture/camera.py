@@ -42,6 +42,12 @@ class CameraMatrices:
         ahead = self.view[2]
         return math.degrees(math.atan2(-ahead[0], -ahead[2]))
 
+    def pixels(self, places: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Where places (N, 3) of the world lie in the picture: (N, 2) in samples."""
+        there = places @ self.view[:, :3].T + self.view[:, 3]
+        flat: NDArray[np.float64] = there[:, :2] / np.maximum(there[:, 2:], 1e-6) * self.lens[0] + self.lens[1:3]
+        return flat
+
     def scaled(self, share: float) -> "CameraMatrices":
         """The same camera for a picture of `share` times as many samples on each side."""
         return CameraMatrices(self.view, self.lens * [share, share, share, 1.0])

@@ -181,7 +181,7 @@ def test_scores_at_rest_become_those_of_the_face() -> None:
     own = logistic(response.bias.astype(np.float64))
     rest = np.clip(own + np.array([0.05, -0.05, 0.3, 0, 0, 0, 0]), 0.01, 0.97)
     arrays = np.eye(len(names)), np.tile([0.0, 1.0], (len(names), 1)), np.zeros((11, len(names)))
-    matching = build_score_matching(response, *arrays, rest)
+    matching = build_score_matching(response, arrays, rest)
     still, speaking = matching.face_scores(np.stack([rest, rest]), np.array([0.0, 9.0]))
     assert still == pytest.approx(own, abs=1e-6)
     assert speaking[:2] == pytest.approx(rest[:2])

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
+from tts2face.face.mesh_calibration import calibrate_on_mesh
 from tts2face.face.stand_in import VISEME_PREFIX
 from tts2face.interchange.characters.binding import KEY, CharacterBinding
 from tts2face.interchange.characters.character import Character
@@ -182,7 +183,10 @@ def import_face(
         drawn = build_face(head, character, provisional)
         located = _project_table(table, head, drawn)
     face = place_face(_with_landmarks(drawn, located), character, head, provisional)
-    face, notes = drop_unsuited_shapes(face) if located is not NO_LANDMARKS else (face, [WITHOUT_LANDMARKS])
+    notes = [WITHOUT_LANDMARKS]
+    if located is not NO_LANDMARKS:
+        face, notes = drop_unsuited_shapes(face)
+        face = calibrate_on_mesh(face)
     face = replace(face, metadata=_metadata(path, character, chosen, head, face))
     face = bake_occlusion(face, available_cores())
     positions = located.points.places(drawn.vertices) / provisional.scale + provisional.origin

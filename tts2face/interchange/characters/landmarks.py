@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.interchange.characters.lip_line import find_lip_line
 from tts2face.interchange.characters.surface_points import SurfacePoints, points_under_pixels
 from tts2face.models.face import Face, keep_parts
 from tts2face.models.landmarks import (
@@ -99,6 +100,7 @@ def locate_landmarks(views: CharacterViews) -> LocatedLandmarks | None:
         if lips:
             better = _medoids(lips, face.vertices)
             points.vertices[inner], points.weights[inner] = better.vertices, better.weights
+            points = find_lip_line(points, face.vertices, skin, face.shapes[face.opening])
     if len(eyes):
         irises = np.arange(N_MESH_LANDMARKS, N_LANDMARKS)
         found, _ = _readings(views, [rest], eyes, irises)

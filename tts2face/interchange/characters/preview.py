@@ -102,8 +102,7 @@ def _draw_landmarks(face: Face, weights: NDArray[np.float32], camera: str) -> Pi
         "lk,lkd->ld", face.landmark_weights.astype(np.float64), build_rig(face).pose(weights)[face.landmark_vertices]
     )
     optics = camera_matrices(picture.view, face, (PREVIEW_PX, PREVIEW_PX))
-    there = posed @ optics.view[:, :3].T + optics.view[:, 3]
-    places = scatter_landmarks(face, there[:, :2] / there[:, 2:] * optics.lens[0] + optics.lens[1:3])
+    places = scatter_landmarks(face, optics.pixels(posed))
     for x, y in places[np.isfinite(places[:, 0])]:
         pen.ellipse((x - 1.5, y - 1.5, x + 1.5, y + 1.5), fill=(255, 255, 255))
     for line, colour in LINES:

@@ -89,14 +89,15 @@ def test_shapes_and_landmarks_come_back(name: str, shared: Callable[[str], Impor
 
 @pytest.mark.smoke
 def test_speech_moves_an_imported_face_as_the_face_it_was_made_of(tmp_path: Path) -> None:
-    """Without a score map, which a character gets by `face calibrate` only."""
-    talker, head = load_talker("grid_s1"), replace(head_without_mouth(), scores=None)
+    """By the score map that it gets on its mesh, which is that of the face itself."""
+    talker, head = load_talker("grid_s1"), head_without_mouth()
     plain = import_face(
         write_character_file(tmp_path / "plain.glb", face=head), landmarks=write_landmarks(tmp_path / "plain.tsv")
     )
     parameters = talker.utterances[0].shape[:, : talker.model.n_speech]
     speech = Trajectory(tuple(f"shape{n}" for n in range(talker.model.n_speech)), parameters, talker.fps)
-    weights = [build_retargeter(talker, face).retarget(speech) for face in (plain.face, head)]
+    original = replace(head, lip_tolerance_mm=plain.face.lip_tolerance_mm)
+    weights = [build_retargeter(talker, face).retarget(speech) for face in (plain.face, original)]
     assert set(weights[1].channels) - set(weights[0].channels) == {"tongueUp", "tongueOut"}  # which move no skin
     shared = [weights[1].channels.index(name) for name in weights[0].channels]
     np.testing.assert_allclose(weights[0].values, weights[1].values[:, shared], atol=2e-3)  # share of a shape
