@@ -43,6 +43,7 @@ def media_types() -> Mapping[str, str]:
         **{name: kind.media_type for name, kind in SOUND_KINDS.items()},
         **{name: info.media_type for name, info in line_formats().items()},
         "glb": "model/gltf-binary",
+        "vrma": "model/gltf-binary",
     })  # fmt: skip
 
 

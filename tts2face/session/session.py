@@ -204,8 +204,8 @@ class Session:
             As for `write`.
         format
             A movie (mp4 in fragments, webm), sound (wav, mp3, opus, weba: Opus in WebM, aac, flac, pcm), or lines
-            (curves, oculus, azure, words, livelink), or glb, whose bytes come when it is complete. Sound alone needs
-            neither lips nor phones, and starts sooner.
+            (curves, oculus, azure, words, livelink), or glb or vrma, whose bytes come when it is complete. Sound alone
+            needs neither lips nor phones, and starts sooner.
         threads
             Number of frames drawn in advance; None for one on each core.
         pace

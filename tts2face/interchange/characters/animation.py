@@ -14,9 +14,11 @@ from tts2face.interchange.characters.gltf_reader import read_gltf_character
 from tts2face.interchange.characters.head_mesh import mapped_targets, source_weights
 from tts2face.interchange.characters.own_weights import own_weights
 from tts2face.interchange.characters.shapes import ShapeMapping, ShapeSource
+from tts2face.interchange.characters.vrm_motion import gaze_turns, vrm_motion
 from tts2face.interchange.gltf.container import key_times
 from tts2face.interchange.gltf.nodes import NodeTree, read_nodes
 from tts2face.interchange.gltf.reader import GltfFile, read_gltf
+from tts2face.interchange.gltf.vrm_animation import VrmMotion, add_vrm_animation
 from tts2face.interchange.gltf.writer import GlbWriter
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import FloatArray
@@ -97,7 +99,7 @@ def animate_character(
     The last frame holds up to `end_s`, where the sound ends.
     """
     times = key_times(len(motion), motion.fps, end_s)
-    motion, head = (_held(trajectory, len(times)) for trajectory in (motion, head))
+    motion, head = (held(trajectory, len(times)) for trajectory in (motion, head))
     binding = read_binding(face)
     path = character_file(binding, character)
     file, source = read_gltf(path), read_gltf_character(path)
@@ -107,13 +109,38 @@ def animate_character(
     bones = BoneTracks(face, binding, source, tree, writer)
     turned = [*bones.eye_tracks(motion), *bones.head_tracks(head, file)]
     driven = mapped_targets(source, binding.mapping)
-    tracks = [*_weight_tracks(file, tree, (weights, driven), len(motion)), *turned]
+    tracks = [*turned, *_weight_tracks(file, tree, (weights, driven), len(motion))]
+    # its runtime sets bones and bound morph targets anew in each frame, and plays only this
+    if source.expressions:
+        named = own_weights(motion, face, binding.mapping)
+        own = vrm_motion(weights, named, source, head=head, gaze=gaze_turns(motion, face))
+        scene = file.root.index("scene", file.count("scenes"), "scenes") or 0
+        tracks = [*add_vrm_animation(writer.root, own, scene), *tracks]
     writer.add_animation(ANIMATION, times, tracks)
     names = dict.fromkeys(bones.name_of(node) for node, _, _ in turned)
     return AnimatedCharacter(writer.content(), len(weights), tuple(names))
 
 
-def _held(trajectory: Trajectory, n_keys: int) -> Trajectory:
+def expression_motion(
+    motion: Trajectory, head: Trajectory, face: Face, *, character: str | Path | None = None
+) -> VrmMotion | None:
+    """Motion of the expressions, the head and the gaze of the VRM that a face was imported from; None of other files.
+
+    Raises
+    ------
+    InputError, DataError
+        As `write_character`.
+    """
+    binding = read_binding(face)
+    source = read_gltf_character(character_file(binding, character))
+    if not source.expressions:
+        return None
+    weights = target_weights(motion, face, source, binding.mapping)
+    named = own_weights(motion, face, binding.mapping)
+    return vrm_motion(weights, named, source, head=head, gaze=gaze_turns(motion, face))
+
+
+def held(trajectory: Trajectory, n_keys: int) -> Trajectory:
     """The trajectory, whose last frame is repeated up to `n_keys` rows."""
     more = np.repeat(trajectory.values[-1:], n_keys - len(trajectory), axis=0)
     return Trajectory(trajectory.channels, np.concatenate([trajectory.values, more]), trajectory.fps)

@@ -83,7 +83,7 @@ class BoneTracks:
         shift = head.values[:, 3:].astype(np.float64) / scale
         moved = (pivot - np.einsum("tij,j->ti", rotations, pivot) + shift) @ self._turn
         turned = np.einsum("ji,tjk,kl->til", self._turn, rotations, self._turn)
-        return [(node, "rotation", _quaternions(turned)), (node, "translation", moved)]
+        return [(node, "rotation", quaternions(turned)), (node, "translation", moved)]
 
     def _has_neck(self) -> bool:
         """Whether the neck's bone is above the head's."""
@@ -116,7 +116,7 @@ class BoneTracks:
         parent = self._character.parents.get(node)
         above = np.eye(3) if parent is None else _orthonormal(self._tree.world[parent])
         turned = np.einsum("ji,tjk,kl->til", self._turn, rotations, self._turn)
-        return node, "rotation", _quaternions(np.einsum("ji,tjk,kl->til", above, turned, world))
+        return node, "rotation", quaternions(np.einsum("ji,tjk,kl->til", above, turned, world))
 
 
 def share_of_rotation(rotation: FloatArray, share: float) -> FloatArray:
@@ -128,7 +128,7 @@ def share_of_rotation(rotation: FloatArray, share: float) -> FloatArray:
     return rotation_matrix(vector * (share * angle / sine) if sine > 0 else vector)
 
 
-def _quaternions(rotations: FloatArray) -> FloatArray:
+def quaternions(rotations: FloatArray) -> FloatArray:
     """Quaternions (T, 4) of rotation matrices (T, 3, 3), each with the sign nearest to the one before."""
     return continuous_quaternions(np.stack([matrix_quaternion(rotation) for rotation in rotations]), None)
 

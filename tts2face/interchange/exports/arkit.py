@@ -157,6 +157,14 @@ def _by_vertices(face: Face, columns: NDArray[np.int64], others: NDArray[np.int6
     return Expressed(others, helpers, curvature, cross)
 
 
+def mouth_products(face: Face, shapes: NDArray[np.int64]) -> FloatArray:
+    """Inner products (n, n) of the visible motion of the mouth by some shapes (n,) of a face."""
+    motion = scatter_landmarks(face, landmark_motion(face, shapes))
+    common = [landmark for landmark in MOUTH_REGION if np.isfinite(motion[landmark]).all()]
+    opened = motion[list(INNER_LIP_UPPER), 1] - motion[list(INNER_LIP_LOWER), 1]
+    return mouth_curvature(motion[common], common) + LIP_GAP_WEIGHT * ordered_product(opened.T, opened)
+
+
 def _by_mouth(face: Face, channels: tuple[str, ...], others: NDArray[np.int64]) -> Expressed | None:
     """Visemes by the visible motion of the mouth; jaw and lips that the face lacks move as on the default head."""
     if not len(others):
@@ -164,10 +172,7 @@ def _by_mouth(face: Face, channels: tuple[str, ...], others: NDArray[np.int64]) 
     names = [name for name in ARKIT_SHAPES if name.startswith(SPEECH_SHAPE_PREFIXES) and name not in NO_VISEME]
     complete = add_missing_shapes(stand_in(face), names)
     rows = np.array([complete.shape_names.index(name) for name in (*names, *(channels[at] for at in others))])
-    motion = scatter_landmarks(complete, landmark_motion(complete, rows))
-    common = [landmark for landmark in MOUTH_REGION if np.isfinite(motion[landmark]).all()]
-    opened = motion[list(INNER_LIP_UPPER), 1] - motion[list(INNER_LIP_LOWER), 1]
-    products = mouth_curvature(motion[common], common) + LIP_GAP_WEIGHT * ordered_product(opened.T, opened)
+    products = mouth_products(complete, rows)
     helpers, curvature = np.array([ARKIT_SHAPES.index(name) for name in names]), products[: len(names), : len(names)]
     curvature += SPREAD * float(np.median(np.diag(curvature))) * np.eye(len(names))
     return Expressed(others, helpers, curvature, products[: len(names), len(names) :])

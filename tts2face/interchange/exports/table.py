@@ -100,6 +100,8 @@ FORMATS = (
                ("audio2face", "Audio2FaceWriter"), has_frames=True, uses_shapes=True),
     FormatInfo("glb", (".glb",), "mesh, morph targets, skeleton and animation (glTF 2.0)",
                ("character_glb", "make_glb_writer"), has_frames=True, needs_mesh=True, has_sound_beside=True),
+    FormatInfo("vrma", (".vrma",), "expressions, head and gaze for VRM avatars (VRM Animation 1.0)",
+               ("vrma", "VrmaWriter"), has_frames=True, uses_shapes=True, has_sound_beside=True),
     FormatInfo("usd", (".usda", ".usdc", ".usd", ".usdz"), "mesh, shapes, materials, skeleton and animation (UsdSkel)",
                ("usd", "UsdWriter"), has_frames=True, needs_mesh=True, has_sound_beside=True, package="pxr"),
     FormatInfo("bvh", (".bvh",), "head motion", ("bvh", "BvhWriter"), has_frames=True),

@@ -224,6 +224,7 @@ def test_everything_else_of_the_file_is_kept(folder: Path) -> None:
     write_character(made_clip(face, {"jawOpen": 0.5}), face, folder / "kept_out.glb")
     before, binary = split_glb((folder / "kept.glb").read_bytes())
     after, longer = split_glb((folder / "kept_out.glb").read_bytes())
+    assert "VRMC_vrm_animation" not in json.dumps(after)  # of a file that is no VRM
     for key in ("meshes", "materials", "images", "textures", "extensionsRequired"):
         assert after[key] == before[key]
     assert longer[: before["buffers"][0]["byteLength"]] == binary[: before["buffers"][0]["byteLength"]]
