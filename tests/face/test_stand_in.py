@@ -9,8 +9,8 @@ from tests.made_face import made_face
 from tests.made_models import made_palette, made_talker
 from tts2face.face.gestures import gesture_face
 from tts2face.face.shape_transfer import default_head
-from tts2face.face.stand_in import stand_in, viseme_table
-from tts2face.interchange.characters.animation import _own_values
+from tts2face.face.stand_in import consonants_beside_vowels, stand_in, viseme_table
+from tts2face.interchange.characters.own_weights import _own_values
 from tts2face.interchange.exports.arkit import ARKIT_SHAPES, arkit_projection
 from tts2face.lips.articulation import build_articulator
 from tts2face.lips.retargeting import build_retargeter
@@ -82,3 +82,21 @@ def test_arkits_names_and_the_characters_own_get_what_it_says() -> None:
     # what gestures add in ARKit's names is carried to the character's own shapes
     smile = Trajectory((*VISEMES, "jawOpen"), np.array([[0.0, 0.0, 0.0, 0.0, 0.3]], np.float32), 30.0)
     assert _own_values(smile, replace(without_landmarks(*smile.channels)), list(VISEMES))[0, 0] > 0.2
+
+
+@pytest.mark.parametrize(
+    ("names", "left_out"),
+    [
+        (("jawOpen", "mouthViseme_ff", "mouthViseme_ou"), {"mouthViseme_ff"}),
+        (("mouthViseme_aa", "mouthViseme_ou", "mouthViseme_oh", "mouthViseme_ss"), {"mouthViseme_ss"}),
+        (("mouthViseme_aa", "mouthViseme_ss", "mouthViseme_pp"), set()),
+        (("jawOpen", "mouthPucker", "browInnerUp"), set()),
+    ],
+)
+def test_consonants_are_no_terms_of_a_sum_beside_vowels(names: tuple[str, ...], left_out: set[str]) -> None:
+    assert consonants_beside_vowels(names) == left_out
+    face, talker = stand_in(without_landmarks(*names)), made_talker()
+    spoken = build_retargeter(talker, face).retarget(talker.speech_trajectory(talker.utterances[0]))
+    for name in left_out:
+        assert not spoken.columns([name]).any()
+    assert spoken.values.any()

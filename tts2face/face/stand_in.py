@@ -5,7 +5,7 @@ sums of ARKit's that `visemes.tsv` states. A head of an animal or a robot speaks
 """
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
@@ -18,6 +18,8 @@ from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, OUTER_LI
 from tts2face.numeric.arrays import Float32Array
 
 VISEME_TABLE, VISEME_PREFIX = "visemes.tsv", "mouthViseme_"
+VOWELS = tuple(VISEME_PREFIX + vowel for vowel in ("aa", "ih", "ou", "ee", "oh"))
+ENOUGH_VOWELS = 3  # of which speech is made without the visemes of consonants
 BOTH_SIDES = "*"
 LIPS = frozenset({*INNER_LIP_UPPER, *INNER_LIP_LOWER, *OUTER_LIP_UPPER, *OUTER_LIP_LOWER})
 
@@ -44,6 +46,17 @@ def stand_in(face: Face) -> Face:
         scores=None,
         opened_by=face.opened_by,
     )
+
+
+def consonants_beside_vowels(names: Sequence[str]) -> frozenset[str]:
+    """Visemes of consonants among the names of shapes, if jaw or vowels open the mouth without them.
+
+    As further terms of a sum, a tenth of each would make up for what no vowel does; articulation uses them for what
+    they are.
+    """
+    if "jawOpen" not in names and len({*VOWELS} & {*names}) < ENOUGH_VOWELS:
+        return frozenset()
+    return frozenset(name for name in names if name.startswith(VISEME_PREFIX) and name not in VOWELS)
 
 
 def with_channels_of(face: Face, model: Face) -> Face:

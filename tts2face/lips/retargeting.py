@@ -25,6 +25,7 @@ from tts2face.face.mouth import (
     mouth_curvature,
     require_lips,
 )
+from tts2face.face.stand_in import consonants_beside_vowels
 from tts2face.lips.score_matching import FROWN, SIDEWAYS, ScoreMatching, build_score_matching
 from tts2face.models.face import Face
 from tts2face.models.landmarks import (
@@ -190,6 +191,8 @@ def build_retargeter(
     curvature = mouth_curvature(shape_motion, common, mouth) + gap_weight * ordered_product(opened.T, opened)
     curvature += depth_weight * ordered_product(apart.T, apart)
     limits = face.limits[moving].astype(np.float64)
+    left_out = consonants_beside_vowels(face.shape_names)
+    limits[[face.shape_names[at] in left_out for at in moving]] = 0.0
     return Retargeter(
         shape_names=face.shape_names,
         moving=moving,

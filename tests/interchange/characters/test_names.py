@@ -146,5 +146,13 @@ def test_sums_and_alternatives() -> None:
 
 
 def test_visemes_of_contacts_stand_beside_a_jaw() -> None:
-    mapping = guess_mapping(["jawOpen", "viseme_aa", "viseme_FF", "viseme_PP"])
+    own = ["jawOpen", "mouthFunnel", "mouthPucker", "mouthSmile"]
+    mapping = guess_mapping([*own, "viseme_aa", "viseme_FF", "viseme_PP"])
     assert [shape for shape in mapping if "Viseme" in shape] == ["mouthViseme_ff", "mouthViseme_pp"]
+
+
+def test_many_visemes_speak_beside_a_mouth_that_opens_and_smiles() -> None:
+    visemes = ["PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "I", "O", "U"]
+    names = ["mouthOpen", "mouthSmile", "eyesClosed", *(f"viseme_{viseme}" for viseme in visemes)]
+    assert understood(names) == names
+    assert not [shape for shape in guess_mapping([*names, *ARKIT_SHAPES]) if "Viseme" in shape]

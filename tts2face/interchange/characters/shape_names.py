@@ -1,7 +1,8 @@
 """Shapes of a face that the names of a character stand for: ARKit's, of another program's family, and visemes."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
+from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES
 from tts2face.face.stand_in import VISEME_PREFIX
 from tts2face.interchange.characters.families import (
     arkit_family,
@@ -32,7 +33,8 @@ def guess_mapping(names: Iterable[str]) -> ShapeMapping:
 
     Exact names of ARKit win over the whole list, then those of a program whose family the names are, the one with most
     of them first, then ARKit's after a prefix, then names of no one program. Combinations of shapes are none of them.
-    Visemes are used only where no name opens the jaw, but for those of `CONTACT_VISEMES`.
+    Visemes are used where no name opens the jaw or where they are more than the other shapes of the mouth; of the
+    others those of `CONTACT_VISEMES`.
     """
     given = list(dict.fromkeys(names))
     left_alone = set(combinations_of_shapes(given))
@@ -47,13 +49,20 @@ def guess_mapping(names: Iterable[str]) -> ShapeMapping:
     for family in (arkit, general_family()):
         found = family.sources(family.matches(plain)) | found
     # a character without ARKit's jaw speaks by visemes (VRM: A, I, U, E, O)
-    if "jawOpen" in found:
+    if _speaks_by_jaw(found):
         found = {
             shape: sources
             for shape, sources in found.items()
             if not shape.startswith(VISEME_PREFIX) or found.keys().isdisjoint(CONTACT_VISEMES.get(shape, found))
         }
     return with_sides(dict(sorted(found.items())))
+
+
+def _speaks_by_jaw(found: Mapping[str, object]) -> bool:
+    """Whether jaw and lips are enough for speech: a mouth that opens and smiles beside fifteen visemes is not."""
+    visemes = [shape for shape in found if shape.startswith(VISEME_PREFIX)]
+    spoken = [shape for shape in found if shape.startswith(SPEECH_SHAPE_PREFIXES)]
+    return "jawOpen" in found and len(visemes) <= len(spoken) - len(visemes)
 
 
 def combinations_of_shapes(names: Iterable[str]) -> list[str]:

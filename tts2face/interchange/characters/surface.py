@@ -16,7 +16,7 @@ from tts2face.interchange.characters.head_mesh import LEFT_EYE, RIGHT_EYE, HeadM
 from tts2face.models.face import VERTEX_COLOURS, WIDE_OPEN, Eye, Face, FacePart, Texture
 from tts2face.numeric.arrays import FloatArray
 
-OPENING_SHAPES = (WIDE_OPEN, *(VISEME_PREFIX + vowel for vowel in ("aa", "oh", "ee", "ih", "ou")))
+OPENING_SHAPES = (WIDE_OPEN, *(f"{VISEME_PREFIX}{vowel}" for vowel in ("aa", "oh", "ee", "ih", "ou")))  # widest first
 # Highlights and softness of materials by kind, as on the default head: specular, shininess, wrap.
 SHADING = {
     "eyes": (0.55, 140.0, 0.0),
