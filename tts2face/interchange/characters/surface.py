@@ -17,6 +17,7 @@ from tts2face.models.face import VERTEX_COLOURS, WIDE_OPEN, Eye, Face, FacePart,
 from tts2face.numeric.arrays import FloatArray
 
 OPENING_SHAPES = (WIDE_OPEN, *(f"{VISEME_PREFIX}{vowel}" for vowel in ("aa", "oh", "ee", "ih", "ou")))  # widest first
+DULL_TEETH = 0.12  # highlight of teeth in one image with the body: they hold the mouth, too, whose black would shine
 # Highlights and softness of materials by kind, as on the default head: specular, shininess, wrap.
 SHADING = {
     "eyes": (0.55, 140.0, 0.0),
@@ -145,6 +146,8 @@ def _parts(keys: list[tuple[str, int, float]], character: Character, atlas: Atla
         kind, material, opacity = keys[first]
         end = next((at for at in range(first, len(keys)) if keys[at] != keys[first]), len(keys))
         specular, shininess, wrap = SHADING[kind]
+        if kind == "teeth" and any(other == material and of != kind for of, other, _ in keys):
+            specular = DULL_TEETH
         name = f"{kind}:{character.materials[material].name}"[:80]
         texture = 0 if material in atlas.places else VERTEX_COLOURS
         is_cut = opacity == CUTOUT
