@@ -1,6 +1,7 @@
-"""Decoder of EXT_meshopt_compression: attributes, triangles and indices of compressed glTF files.
+"""Decoder of EXT_meshopt_compression and KHR_meshopt_compression: attributes, triangles, indices, and two filters.
 
-Source: Khronos glTF extension EXT_meshopt_compression, bitstream of version 0 (attributes) and 1 (indices).
+Source: the Khronos glTF extensions of these names, bitstreams of versions 0 and 1. Their filters OCTAHEDRAL and
+QUATERNION are of normals and rotations over time, which are not read.
 """
 
 from typing import Any
@@ -14,11 +15,11 @@ from tts2face.numeric.kernels import kernel
 ATTRIBUTES = "ATTRIBUTES"
 TRIANGLES = "TRIANGLES"
 INDICES = "INDICES"
-NO_FILTER, EXPONENTIAL = "NONE", "EXPONENTIAL"
+NO_FILTER, EXPONENTIAL, COLOR = "NONE", "EXPONENTIAL", "COLOR"
 GROUP = 16  # elements whose deltas share one width
 # bytes and elements of a block (EXT_meshopt_compression, appendix A)
 MAX_BLOCK_BYTES, MAX_BLOCK = 8192, 256
-TAIL_BYTES = 32  # least size of the attributes' tail
+TAIL_BYTES = {0: 32, 1: 24}  # least size of the attributes' tail in each version
 # first byte of a bitstream: its kind, and its version in the low four bits
 ATTRIBUTES_HEADER = 0xA0
 TRIANGLES_HEADER = 0xE1
@@ -47,64 +48,153 @@ def apply_exponential_filter(content: Bytes) -> Bytes:
     return np.frombuffer(values.tobytes(), np.uint8)
 
 
+def apply_color_filter(content: Bytes, stride: int) -> Bytes:
+    """Bytes of red, green, blue and alpha, of 8 or 16 bits, that luma and two differences of colours stand for.
+
+    The highest bit of the fourth value says how many bits all have, and the others are alpha without its lowest bit.
+    """
+    unsigned, signed = (np.uint8, np.int8) if stride == 4 else (np.uint16, np.int16)
+    packed = np.frombuffer(content.tobytes(), unsigned).reshape(-1, 4)
+    orange, green = np.frombuffer(content.tobytes(), signed).reshape(-1, 4)[:, 1:3].astype(np.float64).T
+    luma, stated = packed[:, 0].astype(np.float64), packed[:, 3].astype(np.int64)
+    n_bits = np.frexp(np.maximum(stated, 1).astype(np.float64))[1]
+    full = (1 << n_bits.astype(np.int64)) - 1
+    alpha = stated & (full >> 1)
+    alpha = (alpha << 1) | (alpha & 1)
+    colours = np.column_stack([luma + orange - green, luma + green, luma - orange - green, alpha])
+    scaled = np.rint(colours * (np.iinfo(unsigned).max / full)[:, None])
+    return np.frombuffer(np.clip(scaled, 0, np.iinfo(unsigned).max).astype(unsigned).tobytes(), np.uint8)
+
+
 def _damaged() -> DataError:
     return DataError("a meshopt stream is damaged; export the character again")
 
 
 def _decode_attributes(content: Bytes, count: int, stride: int) -> Bytes:
-    tail = max(stride, TAIL_BYTES)
-    if len(content) < 1 + tail or content[0] != ATTRIBUTES_HEADER:
+    version = int(content[0]) - ATTRIBUTES_HEADER if len(content) else -1
+    if version not in TAIL_BYTES:
+        raise _damaged()
+    # version 1 states how each four bytes of an element are coded
+    kinds = stride // 4 if version else 0
+    tail = max(stride + kinds, TAIL_BYTES[version])
+    if len(content) < 1 + tail:
         raise _damaged()
     block = min(MAX_BLOCK_BYTES // stride // GROUP * GROUP, MAX_BLOCK)
     out = np.zeros((count, stride), np.uint8)
-    baseline = content[len(content) - stride :].copy()
-    if not _decode_blocks(content[1 : len(content) - tail], block, baseline, out):
+    end = len(content) - kinds
+    channels = content[end:].copy() if version else np.zeros(stride // 4, np.uint8)
+    first = content[end - stride : end].copy()
+    if not _decode_blocks(content[1 : len(content) - tail], (block, version), first, channels, out):
         raise _damaged()
     return out.reshape(-1)
 
 
 @kernel
-def _decode_blocks(data: Any, block: int, last: Any, out: Any) -> bool:  # noqa: C901 - one pass over bits
-    """Decode blocks of deltas into `out` (count, stride), which begins after the element `last`; False if too short."""
-    count = out.shape[0]
-    stride = out.shape[1]
+def _decode_blocks(data: Any, form: Any, last: Any, channels: Any, out: Any) -> bool:
+    """Decode blocks into `out` (count, stride), which begins after the element `last`; False if they are damaged.
+
+    `form` is the size of a block in elements and the version; `channels` the kinds of each four bytes.
+    """
+    count, stride = out.shape
+    block, version = form
+    deltas = np.zeros((stride, block), np.uint8)
     at = 0
     for first in range(0, count, block):
         n = min(block, count - first)
-        n_groups = (n + 15) // 16
-        for column in range(stride):
-            header = at
-            at += (n_groups + 3) // 4
-            if at > len(data):
+        at = _unpack_block(data, at, version, n, deltas)
+        if at < 0:
+            return False
+        for channel in range(stride // 4):
+            kind, four = channels[channel] & 3, slice(4 * channel, 4 * channel + 4)
+            shown = out[first : first + n, four]
+            if kind == 3:
                 return False
-            value = np.uint8(last[column])
-            for group in range(n_groups):
-                kind = (data[header + group // 4] >> (2 * (group % 4))) & 3
-                width = 0 if kind == 0 else (2 if kind == 1 else (4 if kind == 2 else 8))
-                packed, extra = at, at + 2 * width
-                if extra > len(data):
-                    return False
-                for i in range(16):
-                    delta = np.uint8(0)
-                    if width == 8:
-                        delta = data[packed + i]
-                    elif width > 0:
-                        per_byte = 8 // width
-                        shift = (per_byte - 1 - i % per_byte) * width
-                        full = (1 << width) - 1
-                        delta = np.uint8((data[packed + i // per_byte] >> shift) & full)
-                        if delta == full:
-                            if extra >= len(data):
-                                return False
-                            delta = data[extra]
-                            extra += 1
-                    row = group * 16 + i
-                    if row < n:
-                        value = np.uint8((value + ((delta >> 1) ^ (0xFF if delta & 1 else 0))) & 0xFF)
-                        out[first + row, column] = value
-                at = extra
-            last[column] = value
+            if kind == 2:
+                _change_bits(deltas[four], channels[channel] >> 4, last[four], shown)
+            else:
+                _add_differences(deltas[four], 1 + kind, last[four], shown)
     return True
+
+
+@kernel
+def _unpack_block(data: Any, at: int, version: int, n: int, deltas: Any) -> int:  # noqa: C901 - one pass over bits
+    """Unpack bytes of `n` elements into rows of `deltas` from a place of the data on; the place behind them, or -1."""
+    n_groups = (n + 15) // 16
+    control = at
+    at += version * (len(deltas) // 4)
+    for column in range(len(deltas)):
+        if at > len(data):
+            return -1
+        mode = (int(data[control + column // 4]) >> (2 * (column % 4))) & 3 if version == 1 else 0
+        row = deltas[column]
+        row[:] = 0
+        # all 0; or as they are
+        if mode == 2:
+            continue
+        if mode == 3:
+            if at + n > len(data):
+                return -1
+            row[:n] = data[at : at + n]
+            at += n
+            continue
+        header = at
+        at += (n_groups + 3) // 4
+        for group in range(n_groups):
+            if at > len(data):
+                return -1
+            step = (int(data[header + group // 4]) >> (2 * (group % 4))) & 3
+            # bits of a delta: 0, 2, 4, 8 of version 0; 0, 1, 2, 4 or 1, 2, 4, 8 of version 1
+            power = step - 1 + mode if version == 1 else (step if step else -1)
+            width = 1 << power if power >= 0 else 0
+            packed, extra = at, at + 2 * width
+            if extra > len(data):
+                return -1
+            for i in range(16 if width else 0):
+                if width == 8:
+                    row[16 * group + i] = data[packed + i]
+                    continue
+                per_byte = 8 // width
+                # single bits from the lowest, others from the highest
+                shift = i % 8 if width == 1 else (per_byte - 1 - i % per_byte) * width
+                delta = (int(data[packed + i // per_byte]) >> shift) & ((1 << width) - 1)
+                # the largest value says that the delta follows as a byte
+                if delta == (1 << width) - 1:
+                    if extra >= len(data):
+                        return -1
+                    delta = int(data[extra])
+                    extra += 1
+                row[16 * group + i] = delta
+            at = extra
+    return at if at <= len(data) else -1
+
+
+@kernel
+def _add_differences(deltas: Any, size: int, last: Any, out: Any) -> None:
+    """Four bytes of `last` and of each element, numbers of `size` bytes that add up."""
+    for i in range(len(out)):
+        for byte in range(0, 4, size):
+            delta, value = np.int64(0), np.int64(0)
+            for part in range(size):
+                delta |= np.int64(deltas[byte + part, i]) << (8 * part)
+                value |= np.int64(last[byte + part]) << (8 * part)
+            # the lowest bit is the sign
+            value += (delta >> 1) ^ -(delta & 1)
+            for part in range(size):
+                last[byte + part] = (value >> (8 * part)) & 0xFF
+        out[i] = last
+
+
+@kernel
+def _change_bits(deltas: Any, turn: int, last: Any, out: Any) -> None:
+    """Four bytes of `last` and of each element, whose changed bits stand turned to the left by some places."""
+    for i in range(len(out)):
+        word = np.int64(0)
+        for byte in range(4):
+            word |= np.int64(deltas[byte, i]) << (8 * byte)
+        word = (word >> turn) | (word << (32 - turn))
+        for byte in range(4):
+            last[byte] ^= (word >> (8 * byte)) & 0xFF
+        out[i] = last
 
 
 class _IndexStream:

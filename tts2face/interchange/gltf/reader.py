@@ -1,7 +1,7 @@
 """Reading of glTF 2.0 files (.glb, .gltf, .vrm): the JSON, buffers and accessors, checked against hostile content.
 
-Source: Khronos glTF 2.0 specification, sections 3.6 (binary data) and 4.4 (GLB); extensions KHR_mesh_quantization and
-EXT_meshopt_compression.
+Source: Khronos glTF 2.0 specification, sections 3.6 (binary data) and 4.4 (GLB); extensions KHR_mesh_quantization,
+EXT_meshopt_compression and KHR_meshopt_compression.
 """
 
 import base64
@@ -20,7 +20,14 @@ from lexicon.values.files import check_regular_file, decode_utf8
 from lexicon.values.json_text import parse_json
 from tts2face.interchange.gltf.container import ALIGNMENT, BINARY_CHUNK, JSON_CHUNK, MAGIC
 from tts2face.interchange.gltf.fields import MISSING, Fields
-from tts2face.interchange.gltf.meshopt import EXPONENTIAL, NO_FILTER, apply_exponential_filter, decode_buffer
+from tts2face.interchange.gltf.meshopt import (
+    COLOR,
+    EXPONENTIAL,
+    NO_FILTER,
+    apply_color_filter,
+    apply_exponential_filter,
+    decode_buffer,
+)
 from tts2face.numeric.arrays import FloatArray
 
 MAX_FILE_BYTES = 512_000_000  # a film character with 4k textures has about 100 MB
@@ -42,6 +49,7 @@ COMPONENTS: dict[int, type[np.integer[Any] | np.floating[Any]]] = {
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 DRACO = "KHR_draco_mesh_compression"
+UNDO_DRACO = "`npx @gltf-transform/cli copy IN.glb OUT.glb`"
 # Extensions that a file may require: they change materials only, or are read here or in other modules of this package.
 READABLE = (
     "KHR_mesh_quantization", "EXT_meshopt_compression", "KHR_meshopt_compression", "KHR_texture_transform",
@@ -198,6 +206,8 @@ class GltfFile:
         self._reserve(count * stride, fields)
         kept = fields.text("filter", NO_FILTER)
         content = decode_buffer(self._slice(fields), fields.text("mode"), count, stride)
+        if kept == COLOR and stride in (4, 8):
+            return apply_color_filter(content, stride)
         return apply_exponential_filter(content) if kept == EXPONENTIAL else content
 
     def buffer(self, number: int) -> NDArray[np.uint8]:
@@ -275,7 +285,10 @@ def _split_glb(content: bytes, path: Path) -> tuple[bytes, bytes | None]:
 def _check_extensions(root: Fields) -> None:
     for name in root.texts("extensionsRequired"):
         if name == DRACO:
-            raise DataError(f"{root.place} is compressed with Draco ({DRACO}); export it again without compression")
+            raise DataError(
+                f"{root.place} is compressed with Draco ({DRACO}); export it again without compression, or run "
+                f"{UNDO_DRACO} and import its copy"
+            )
         # without an extension of materials a character looks plainer; others change its mesh
         if name not in READABLE and not name.startswith(MATERIAL_EXTENSION):
             raise DataError(f"{root.place} requires the glTF extension {name[:60]}; export it again without it")
