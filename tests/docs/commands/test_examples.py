@@ -1,16 +1,21 @@
 """The programs of docs/examples run as their docstrings say, and make what they promise."""
 
 import csv
+import json
 import re
+import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import av
 import numpy as np
+import pygltflib
 import pytest
 
 import tts2face
 from tests.docs.programs import install, prepare_example, run
+from tests.interchange.exports.made import signed_clip, with_gesture
 from tests.rendered_takes import NAMES
 from tts2face.types import frame_count
 
@@ -45,6 +50,53 @@ def test_a_clip(tmp_path: Path) -> None:
     assert words[-1][2] == "b aɪ"
     times = [float(time) for time, _, _ in words]
     assert times == sorted(times)
+
+
+FBX_SCRIPT = """
+import json, sys
+import bpy
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.ops.wm.fbx_import(filepath=sys.argv[1])
+keys = next(keys for keys in bpy.data.shape_keys if "jawOpen" in keys.key_blocks)
+weights = []
+for frame in range(1, 1 + int(sys.argv[2])):
+    bpy.context.scene.frame_set(frame)
+    weights.append(keys.key_blocks["jawOpen"].value)
+print("ANSWER" + json.dumps({"weights": weights, "rate": bpy.context.scene.render.fps}))
+"""
+
+
+def played(path: Path, n_frames: int) -> dict[str, object]:
+    """Weights of jawOpen in frames of an .fbx file that Blender reads, and its frame rate."""
+    command = [sys.executable, "-c", FBX_SCRIPT, str(path), str(n_frames)]
+    printed = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
+    return dict(json.loads(next(line for line in printed.splitlines() if line.startswith("ANSWER"))[6:]))
+
+
+@pytest.mark.skipif(find_spec("bpy") is None, reason="Blender's package bpy is not installed")
+@pytest.mark.parametrize("has_head", [True, False])
+def test_a_clip_becomes_fbx_and_an_fbx_a_character(tmp_path: Path, has_head: bool) -> None:
+    clip = signed_clip(25, face := with_gesture())
+    tts2face.export(clip, tmp_path / "clip.glb", face=face, fps=25)
+    if not has_head:
+        content = pygltflib.GLTF2().load(tmp_path / "clip.glb")
+        animation = content.animations[0]
+        animation.channels = [one for one in animation.channels if one.target.path == "weights"]
+        content.save(tmp_path / "clip.glb")
+    assert "at 25 frames a second" in run_example("glb_to_fbx", tmp_path)
+    expected = tts2face.export(clip, tmp_path / "clip.npz", face=face, fps=25) and np.load(tmp_path / "clip.npz")
+    weights = expected["motion"][:, face.shape_names.index("jawOpen")]
+    answer = played(tmp_path / "clip.fbx", len(weights))
+    assert answer["rate"] == 25
+    assert np.allclose(answer["weights"], weights, rtol=0, atol=1e-3)
+    (tmp_path / "clip.fbx").rename(tmp_path / "character.fbx")
+    assert "6 shapes: " in run_example("fbx_to_glb", tmp_path)
+    made = pygltflib.GLTF2().load(tmp_path / "character.glb")
+    mesh = next(mesh for mesh in made.meshes if mesh.primitives[0].targets)
+    assert set(mesh.extras["targetNames"]) == {*face.shape_names, "brows0Minus"}
+    assert not any(mesh.weights)
+    assert not made.animations
+    assert len(made.images) == 1
 
 
 def test_a_batch_renders_what_has_changed(tmp_path: Path) -> None:
