@@ -15,12 +15,12 @@ from tts2face.picture.options import Picture
 from tts2face.storage.output_paths import check_file_name, refuse_overwriting
 
 if TYPE_CHECKING:
-    from tts2face.interchange.characters.importing import ImportReport
     from tts2face.models.face import Face
 
 OUTPUTS = {
     "--out": ("a face", (".face",)),
     "--preview": ("a picture", (".png",)),
+    "--sheet": ("a picture", (".png",)),
     "--write-landmarks": ("a table of landmarks", (".tsv",)),
     "--write-mapping": ("a mapping", (".tsv",)),
     "--write-fit": ("a fit", (".json",)),
@@ -46,32 +46,44 @@ def import_character(  # noqa: PLR0913 - one parameter a flag
         str | None, Parameter(help="Axis that the character looks along: +z, -z, +x or -x; by default found.")
     ] = None,
     preview: Annotated[Path | None, Parameter(help="Write a picture with the landmarks drawn (.png).")] = None,
+    sheet: Annotated[Path | None, Parameter(help="Write a contact sheet of all shapes, with sources (.png).")] = None,
     write_landmarks: Annotated[Path | None, Parameter(help="Write the landmarks as a table to edit (.tsv).")] = None,
     write_mapping: Annotated[Path | None, Parameter(help="Write the used mapping as a table to edit (.tsv).")] = None,
     model: Model = None,
     yes: Yes = False,
     quiet: Annotated[bool, switch("Print no report.")] = False,
 ) -> None:
-    """Make a .face file of a character; print the mapping of its shapes, and what replaces missing ones."""
+    """Make a .face file of a character; print which shapes are found, replaced and missing."""
     _check_outputs(
-        {"--out": out, "--preview": preview, "--write-landmarks": write_landmarks, "--write-mapping": write_mapping},
+        {
+            "--out": out,
+            "--preview": preview,
+            "--sheet": sheet,
+            "--write-landmarks": write_landmarks,
+            "--write-mapping": write_mapping,
+        },
         {"the character": character, "--mapping": mapping, "--landmarks": landmarks, "--model": model},
     )
     from tts2face.interchange.characters.importing import import_face
     from tts2face.interchange.characters.landmark_table import landmark_table
+    from tts2face.interchange.characters.preview import draw_import_sheet, png_bytes
+    from tts2face.interchange.characters.report import report_text
     from tts2face.interchange.characters.saving import save_face
     from tts2face.interchange.characters.shapes import mapping_table
     from tts2face.storage.files import write_atomically
 
     imported = import_face(character, mapping=mapping, landmarks=landmarks, front=front, model=model)
     _write_preview(preview, imported.face)
+    if sheet is not None:
+        with progress_bar("drawing", quiet) as on_progress:
+            write_atomically(sheet, png_bytes(draw_import_sheet(imported, on_progress)))
     if write_landmarks is not None:
         write_atomically(write_landmarks, landmark_table(imported.report.landmarks).encode())
     if write_mapping is not None:
         write_atomically(write_mapping, mapping_table(imported.report.mapping).encode())
     save_face(out, imported.face)
     if not quiet:
-        print(_report_text(imported.report), end="")  # noqa: T201 - the result
+        print(report_text(imported.report), end="")  # noqa: T201 - the result
         write_message(f"wrote {out}")
 
 
@@ -258,18 +270,3 @@ def _write_preview(preview: Path | None, made: "Face") -> None:
 
     if preview is not None:
         write_atomically(preview, png_bytes(draw_preview(made)))
-
-
-def _report_text(report: "ImportReport") -> str:
-    """Report of an import: mapping, missing shapes, landmarks, notes."""
-    from tts2face.interchange.characters.shapes import mapping_table
-
-    score = "read from the table" if report.score is None else f"tracked, score {report.score:.2f}"
-    score = score if report.landmarks else "none is found"
-    lines = [mapping_table(report.mapping).rstrip()]
-    lines += [f"missing {name}: {replacement}" for name, replacement in report.missing.items()]
-    lines += [f"unused: {', '.join(report.unused)}"] if report.unused else []
-    lines += [f"landmarks: {len(report.landmarks)}, {score}; eyeballs: {report.n_eyeballs}"]
-    lines += [f"note: {note}" for note in report.notes]
-    lines += [f"licence: {report.licence or 'not stated; check it before publishing clips'}"]
-    return "\n".join(lines) + "\n"

@@ -79,12 +79,20 @@ def equivalent_weights(face: Face, source: Face) -> FloatArray:
     along = np.diag(curvature)
     gains = np.clip(ordered_product(known.T, wanted) / along[:, None], *WEIGHT_LIMITS)
     is_named = (source_names[:, None] == names).astype(np.float64)
-    pull = NAMED_SHARE * along[:, None] * is_named
+    # towards the namesake as far as the shape goes along it, and towards 0 for all others
+    pull = SPREAD * np.median(along) + NAMED_SHARE * along[:, None] * is_named
     limits = np.where(np.isin(source_names, ALONE)[:, None], 0.0, np.tile(WEIGHT_LIMITS, (len(theirs), 1)))
-    ridge = SPREAD * np.median(along) + pull.T[:, :, None]
-    linear = ordered_product(wanted.T, known) + (pull * gains).T
-    equal = bounded_least_squares(curvature + ridge * np.eye(len(theirs)), linear, limits).T
+    linear = ordered_product(wanted.T, known) + (pull * gains * is_named).T
+    equal = bounded_least_squares(curvature + pull.T[:, :, None] * np.eye(len(theirs)), linear, limits).T
     return np.where(np.isin(names, ALONE), gains * is_named, equal)
+
+
+def strengths(face: Face) -> dict[str, float]:
+    """Weight of the default head's shape of the same name that equals weight 1 of each shape that speech moves."""
+    head = default_head()
+    names, theirs = ([model.shape_names[at] for at in _speech_shapes(model)] for model in (face, head))
+    equal = equivalent_weights(face, head)
+    return {name: float(equal[theirs.index(name), at]) for at, name in enumerate(names) if name in theirs}
 
 
 def _speech_shapes(face: Face) -> NDArray[np.int64]:

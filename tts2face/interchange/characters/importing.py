@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.face.mesh_calibration import calibrate_on_mesh
+from tts2face.face.mesh_calibration import calibrate_on_mesh, strengths
 from tts2face.face.stand_in import VISEME_PREFIX
 from tts2face.interchange.characters.binding import KEY, CharacterBinding
 from tts2face.interchange.characters.character import Character
@@ -83,6 +83,8 @@ class ImportReport:
         What was changed or left out, in sentences.
     licence
         What the file says about its licence and author.
+    strengths
+        Weight of the default head's shape of the same name that moves its mouth as weight 1 of a shape does.
     """
 
     mapping: ShapeMapping
@@ -93,6 +95,7 @@ class ImportReport:
     n_eyeballs: int
     notes: tuple[str, ...]
     licence: str
+    strengths: Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -206,6 +209,7 @@ def import_face(
             *notes,
         ),
         licence=character.licence,
+        strengths=strengths(face) if located is not NO_LANDMARKS else {},
     )
     return ImportedFace(face, report)
 

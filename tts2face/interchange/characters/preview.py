@@ -1,11 +1,14 @@
 """Pictures to check a face with: its landmarks, and a contact sheet of all shapes."""
 
 import io
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.face.deformation import build_rig
+from tts2face.face.expressions import add_expression_shapes
 from tts2face.face.eyelids import BLINK_SHAPES
 from tts2face.face.landmarks import scatter_landmarks
 from tts2face.models.face import Face
@@ -25,6 +28,9 @@ from tts2face.picture.provenance import png_labels
 from tts2face.picture.renderer import mesh_renderer
 from tts2face.types import Progress, ignore_progress
 
+if TYPE_CHECKING:
+    from tts2face.interchange.characters.importing import ImportedFace
+
 # Lines through landmarks and their sRGB colours: lids, inner lips, outer lips, outline.
 LINES = (
     *(((*ring, ring[0]), (70, 190, 255)) for ring in LID_RINGS),
@@ -40,7 +46,9 @@ LABEL_PX = 16
 N_COLUMNS = 8
 OPEN_WEIGHT = 0.5  # of the opening shape in the second picture of the preview
 WALL = "#8a8f98"
-PAPER, INK = (245, 245, 243), (20, 20, 20)
+EYES = "(eyes)"  # source of shapes that no morph target moves: eyeballs turn
+MAX_LABEL = 32  # letters, the last of a name
+PAPER, INK, SOURCE_INK, REPLACED_INK = (245, 245, 243), (20, 20, 20), (110, 110, 110), (190, 60, 20)
 
 
 def draw_preview(face: Face) -> Pixels:
@@ -59,27 +67,48 @@ def draw_preview(face: Face) -> Pixels:
     return np.concatenate([_draw_landmarks(face, weights, camera) for weights, camera in views], axis=1)
 
 
-def draw_contact_sheet(face: Face, on_progress: Progress = ignore_progress) -> Pixels:
-    """Picture (H, W, 3) of the face at rest and with each of its shapes at its highest weight, with names."""
+def draw_contact_sheet(
+    face: Face, on_progress: Progress = ignore_progress, sources: Mapping[str, str] | None = None
+) -> Pixels:
+    """Picture (H, W, 3) of the face at rest and with each of its shapes at its highest weight, with names.
+
+    Parameters
+    ----------
+    sources
+        Where shapes come from, written below their names; shapes without are those of the default head.
+    """
     from PIL import Image, ImageDraw
 
-    renderer = mesh_renderer(face, Picture(size=f"{CELL_PX}x{CELL_PX}"))
+    renderer = mesh_renderer(face, Picture(size=f"{CELL_PX}x{CELL_PX}", camera="front" if sources is None else "close"))
     poses = [("at rest", np.zeros(len(face.shape_names), np.float32))]
     for number, name in enumerate(face.shape_names):
         weights = np.zeros(len(face.shape_names), np.float32)
         weights[number] = face.limits[number, 1]
         poses.append((name, weights))
     n_rows = -(-len(poses) // N_COLUMNS)
-    sheet = Image.new("RGB", (N_COLUMNS * CELL_PX, n_rows * (CELL_PX + LABEL_PX)), PAPER)
+    row_px = CELL_PX + LABEL_PX * (1 if sources is None else 2)
+    sheet = Image.new("RGB", (N_COLUMNS * CELL_PX, n_rows * row_px), PAPER)
     pen = ImageDraw.Draw(sheet)
     for number, (name, weights) in enumerate(poses):
         row, column = divmod(number, N_COLUMNS)
-        corner = (column * CELL_PX, row * (CELL_PX + LABEL_PX))
+        corner = (column * CELL_PX, row * row_px)
         sheet.paste(Image.fromarray(renderer.draw(weights)), corner)
-        label = name.encode("latin-1", "replace").decode("latin-1")[:32]
-        pen.text((corner[0] + 4, corner[1] + CELL_PX + 2), label, fill=INK)
+        lines = [(name, INK)]
+        if sources is not None and number:
+            lines += [(sources[name], SOURCE_INK) if name in sources else ("of the default head", REPLACED_INK)]
+        for line, (written, ink) in enumerate(lines):
+            label = written.encode("latin-1", "replace").decode("latin-1")[-MAX_LABEL:]
+            pen.text((corner[0] + 4, corner[1] + CELL_PX + 2 + line * LABEL_PX), label, fill=ink)
         on_progress(number + 1, len(poses))
     return np.array(sheet)
+
+
+def draw_import_sheet(imported: "ImportedFace", on_progress: Progress = ignore_progress) -> Pixels:
+    """Contact sheet of an imported face with the sources of its shapes, and with those that replace missing ones."""
+    face, mapping = imported.face, imported.report.mapping
+    complete = add_expression_shapes(face) if len(face.landmarks) else face
+    sources = {name: " + ".join(source.name for source in mapping.get(name, ())) or EYES for name in face.shape_names}
+    return draw_contact_sheet(complete, on_progress, sources)
 
 
 def png_bytes(pixels: Pixels, notice: str = "") -> bytes:

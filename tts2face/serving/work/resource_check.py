@@ -182,6 +182,7 @@ def _check_character(source: Path, out: Path) -> dict[str, Any]:
     """Make a face of a character whose file holds everything that it needs, with the mapping that is sent with it."""
     from lexicon.values.json_text import read_json
     from tts2face.interchange.characters.importing import import_face
+    from tts2face.interchange.characters.report import summary
     from tts2face.models.face_file import write_face
 
     named = source.with_name("character.glb")
@@ -195,7 +196,8 @@ def _check_character(source: Path, out: Path) -> dict[str, Any]:
     imported = import_face(named, mapping=mapping)
     made = out.with_name("imported.face")
     write_face(made, imported.face)
-    return _check_face(made, out) | {"notes": list(imported.report.notes)}
+    rows = [f"{name}: {text}" for name, text in summary(imported.report)]
+    return _check_face(made, out) | {"notes": [*imported.report.notes, *rows]}
 
 
 def _check_photo(source: Path, out: Path) -> dict[str, Any]:

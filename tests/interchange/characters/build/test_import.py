@@ -1,5 +1,6 @@
 """A character made from the shipped head is imported back: same vertices, shapes, landmarks, eyes and speech."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -247,14 +248,24 @@ def test_the_commands_import_and_show(tmp_path: Path, capsys: pytest.CaptureFixt
     table, face = write_landmarks(tmp_path / "landmarks.tsv"), tmp_path / "me.face"
     words = ["face", "import", str(character), "--out", str(face), "--landmarks", str(table)]
     words += ["--preview", str(tmp_path / "check.png"), "--write-mapping", str(tmp_path / "map.tsv")]
+    words += ["--sheet", str(tmp_path / "sources.png")]
     assert run(words) == 0
     printed = capsys.readouterr().out
-    assert "jawOpen\tjawOpen\t1" in printed
-    assert "missing cheekPuff: nothing" in printed
+    assert "jawOpen\tjawOpen\t1" in (tmp_path / "map.tsv").read_text()
+    assert {"found       51 of ARKit's 52", "missing     cheekPuff"} <= {*printed.splitlines()}
+    strong = re.findall(r"(\w+) (\d\.\d\d) \((\w+)\)", " ".join(printed.split()))
+    assert len(strong) == 6
+    assert all((shape, own) == (source, "1.00") for shape, own, source in strong)
+    assert len(printed.splitlines()) <= 24
     assert run(["face", "show", str(face), "--out", str(tmp_path / "sheet.png"), "--quiet"]) == 0
     assert run(["face", "still", str(face), "--size", "128x160", "--out", str(tmp_path / "still.png")]) == 0
     assert "128 x 160 pixels" in capsys.readouterr().err
-    sizes = {"sheet.png": (8 * 192, 7 * 208), "check.png": (3 * 640, 640), "still.png": (128, 160)}
+    sizes = {
+        "sheet.png": (8 * 192, 7 * 208),
+        "check.png": (3 * 640, 640),
+        "sources.png": (8 * 192, 7 * 224),
+        "still.png": (128, 160),
+    }
     for name, size in sizes.items():
         with Image.open(tmp_path / name) as picture:
             assert picture.size == size
