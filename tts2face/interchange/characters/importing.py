@@ -113,7 +113,10 @@ def read_character(path: Path) -> Character:
     if not path.exists():
         raise InputError(f"there is no character {path}; check the path")
     if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f"a character is a {', '.join(SUFFIXES)} file or a folder of .obj files, not {path.name}")
+        raise InputError(
+            f"a character is a {', '.join(SUFFIXES)} file or a folder of .obj files, not {path.name}; export "
+            "it as .glb (docs/examples.md has a program that makes one of an .fbx file)"
+        )
     return read_gltf_character(path)
 
 

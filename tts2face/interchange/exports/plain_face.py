@@ -14,6 +14,7 @@ SKIN_PART, CLOTHES_PART = "skin", "shirt"
 LINEAR = decode_srgb(np.arange(256) / 255)
 FORWARD = 0.3  # least share of a triangle's normal that points forward where its light counts
 SHADE = (0.4, 1.8)  # least and largest light of a strand, of the mean: the lamps of others shade it again
+USUAL_HUE = 0.75  # share of the hair's usual hue in each place: highlights have that of the lamp
 INWARD = 0.2  # weight of the other two corners of the place at which a corner's light is read, off the texture's seams
 
 
@@ -43,9 +44,12 @@ def _film_hair(face: Face) -> Face:
     sums = np.column_stack([np.bincount(corners, axis, len(face.vertices)) for axis in strands.reshape(-1, 3).T])
     rows = np.unique(corners)
     light = sums[rows] / np.bincount(corners)[rows][:, None]
-    shade = light.sum(axis=1, keepdims=True) / mean.sum()
+    brightness = light.sum(axis=1, keepdims=True)
+    hue = light / np.maximum(brightness, 1e-6)
+    hue += USUAL_HUE * (np.median(hue, axis=0) - hue)
+    shade = np.clip(brightness / mean.sum(), *SHADE) * mean.sum() / lamp
     colours = face.colours.copy()
-    colours[rows] = encode_srgb(light * np.clip(shade, *SHADE) / np.maximum(shade, 1e-6) / lamp)
+    colours[rows] = encode_srgb(shade * hue)
     return replace(face, colours=colours)
 
 
