@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 import tts2face
-from lexicon.errors import BackendError
+from lexicon.errors import BackendError, InputError
 from tests.interchange.exports.made import FACE, made_clip, signed_clip, turned_clip, with_gesture
 from tests.packages import package
 from tts2face.face.deformation import build_rig
@@ -138,3 +138,12 @@ def test_without_usd_core_the_extra_is_named(tmp_path, monkeypatch):
     with pytest.raises(BackendError, match=r"pip install 'tts2face\[usd\]'"):
         tts2face.export(made_clip(), tmp_path / "a.usdc", face=FACE)
     assert not list(tmp_path.iterdir())
+
+
+def test_nothing_is_left_of_an_export_that_fails(tmp_path):
+    (tmp_path / "a.usda.skin_0.jpg").write_text("of an earlier clip")
+    pieces = [made_clip(2), made_clip(2, channels=("other",))]
+    with pytest.raises(InputError):
+        tts2face.export(pieces, tmp_path / "a.usda", face=FACE)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.usda.skin_0.jpg"]
+    assert (tmp_path / "a.usda.skin_0.jpg").read_text() == "of an earlier clip"
