@@ -14,6 +14,7 @@ from tts2face.models.baked_light import BakedLight
 from tts2face.models.codec import model_of, stored_arrays
 from tts2face.models.face import VERTEX_COLOURS, WIDE_OPEN, Eye, Face, FacePart, Hairdo, Texture
 from tts2face.models.face_schema import (
+    CHARACTER,
     FOLLOW,
     LIGHT,
     LIP_TOLERANCE,
@@ -140,6 +141,9 @@ def read_face(path: Path, identity: str | None = None, *, checks_pictures: bool 
     """
     arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
     check_face(path, arrays, header)
+    # a file that holds its character is the place where it is read from
+    if CHARACTER in arrays and isinstance(held := header["metadata"].get(CHARACTER), dict):
+        header["metadata"] = header["metadata"] | {CHARACTER: held | {"file": str(path)}}
     names = [name for name, _, _ in header["identities"]]
     if identity is not None and identity not in names:
         offered = ", ".join(names) or "none"

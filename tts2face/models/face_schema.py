@@ -23,6 +23,7 @@ SCORE_INPUTS = "score_inputs"  # key of the metadata: names of the shapes that t
 # Key of the metadata, and arrays, of the view of a photographed face.
 PHOTOGRAPH, FOLLOW = "photograph", "follow"
 PHOTO_LAYERS = PHOTO_ALPHA, PHOTO_BEHIND = "photo_alpha", "photo_behind"
+CHARACTER = "character"  # array of the file that a face was imported from, and the key of its metadata about it
 LIGHT = "light"  # array of baked light, and the key of the metadata that describes it
 # of a face; a shipped one has three
 MAX_TEXTURES = 16
@@ -72,7 +73,10 @@ TENSORS: Mapping[str, Tensor] = {
     **{name: OWN[name] for name in ("vertices", "triangles")},
     **SHAPE_TENSORS,
     **OWN,
-    **{name: Tensor("uint8", (f"bytes of {name}",), is_optional=True) for name in ("occlusion", LIGHT, *PHOTO_LAYERS)},
+    **{
+        name: Tensor("uint8", (f"bytes of {name}",), is_optional=True)
+        for name in ("occlusion", LIGHT, CHARACTER, *PHOTO_LAYERS)
+    },
     FOLLOW: Tensor("uint8", ("vertices",), is_optional=True),
 }
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from lexicon.errors import InputError
-from tts2face.interchange.characters.binding import character_file, read_binding
+from tts2face.interchange.characters.binding import character_bytes, character_file, read_binding
 from tts2face.interchange.characters.bone_tracks import BoneTracks, Track
 from tts2face.interchange.characters.character import Character, MorphTarget
-from tts2face.interchange.characters.gltf_reader import read_gltf_character
+from tts2face.interchange.characters.gltf_reader import character_of
 from tts2face.interchange.characters.head_mesh import mapped_targets, source_weights
 from tts2face.interchange.characters.own_weights import own_weights
 from tts2face.interchange.characters.shapes import ShapeMapping, ShapeSource
@@ -102,7 +102,8 @@ def animate_character(
     motion, head = (held(trajectory, len(times)) for trajectory in (motion, head))
     binding = read_binding(face)
     path = character_file(binding, character)
-    file, source = read_gltf(path), read_gltf_character(path)
+    file = read_gltf(path, character_bytes(path))
+    source = character_of(file)
     tree = read_nodes(file.root)
     weights = target_weights(motion, face, source, binding.mapping)
     writer = GlbWriter(file)
@@ -132,7 +133,8 @@ def expression_motion(
         As `write_character`.
     """
     binding = read_binding(face)
-    source = read_gltf_character(character_file(binding, character))
+    path = character_file(binding, character)
+    source = character_of(read_gltf(path, character_bytes(path)))
     if not source.expressions:
         return None
     weights = target_weights(motion, face, source, binding.mapping)

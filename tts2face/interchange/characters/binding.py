@@ -9,9 +9,13 @@ from typing import Any
 
 from lexicon.errors import DataError, InputError
 from tts2face.interchange.characters.shapes import ShapeMapping, ShapeSource
+from tts2face.interchange.gltf.container import MAGIC
 from tts2face.models.face import Face
+from tts2face.models.face_file import FORMAT_VERSION, KIND
+from tts2face.models.face_schema import CHARACTER
+from tts2face.storage.tensors import read_tensors
 
-KEY = "character"  # of the face's metadata
+KEY = CHARACTER  # of the face's metadata
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,17 +85,19 @@ def shape_mapping(face: Face) -> ShapeMapping | None:
     return None if found is None else _parse(found).mapping
 
 
-def without_file(metadata: Mapping[str, Any]) -> dict[str, Any]:
+def without_file(metadata: Mapping[str, Any], content: bytes | None = None) -> dict[str, Any]:
     """Metadata of a face whose binding names no file of this machine, but keeps the names of the shapes if it is whole.
 
-    The file that a sent face names would be read by exports.
+    The file that a sent face names would be read by exports. `content` is that of the character where the face's file
+    holds it.
     """
     kept = {key: value for key, value in metadata.items() if key != KEY}
     try:
         binding = _parse(metadata.get(KEY))
     except DataError:
         return kept
-    return kept | {KEY: replace(binding, file="", sha256="").as_metadata()}
+    held = "" if content is None else sha256(content).hexdigest()
+    return kept | {KEY: replace(binding, file="", sha256=held).as_metadata()}
 
 
 def _parse(found: Any) -> CharacterBinding:
@@ -133,12 +139,25 @@ def character_file(binding: CharacterBinding, given: str | Path | None = None) -
             f"there is no character {path}, from which the face was imported; "
             "if it was moved, run `tts2face face relink FACE.face CHARACTER`"
         )
-    if sha256(path.read_bytes()).hexdigest() != binding.sha256:
+    if sha256(character_bytes(path)).hexdigest() != binding.sha256:
         raise DataError(
             f"the content of {path} differs from the file from which the face was imported; "
             "import it again, or give that file"
         )
     return path
+
+
+def character_bytes(path: Path) -> bytes:
+    """Content of a character's file, or of that which a ``.face`` file holds."""
+    content = path.read_bytes()
+    is_gltf = content[:4] == MAGIC or content.lstrip()[:1] == b"{"
+    # a file of tensors begins with the length of its header, which is JSON
+    if is_gltf or content[8:9] != b"{":
+        return content
+    arrays, _ = read_tensors(path, KIND, FORMAT_VERSION)
+    if CHARACTER not in arrays:
+        raise DataError(f"{path} holds no character; import it again, or relink it")
+    return arrays[CHARACTER].tobytes()
 
 
 def _damaged() -> DataError:

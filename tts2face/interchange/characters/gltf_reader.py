@@ -18,12 +18,16 @@ Expressions = dict[str, Mapping[MorphTarget, float]]
 
 def read_gltf_character(path: Path) -> Character:
     """Character of a .glb, .gltf or .vrm file."""
-    file = read_gltf(path)
+    return character_of(read_gltf(path))
+
+
+def character_of(file: GltfFile) -> Character:
+    """Character of an opened file."""
     notes: list[str] = []
     tree = read_nodes(file.root)
     pieces = tuple(read_pieces(file, tree))
     if not any(len(piece.triangles) for piece in pieces):
-        raise DataError(f"{path} has no mesh with triangles in its scene; export the character again")
+        raise DataError(f"{file.path} has no mesh with triangles in its scene; export the character again")
     materials = (*MaterialReader(file, notes).materials(), Material("plain"))
     names = {
         MorphTarget(number, target): name

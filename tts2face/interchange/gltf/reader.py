@@ -228,15 +228,15 @@ class GltfFile:
         return self._buffers[number]
 
 
-def read_gltf(path: Path) -> GltfFile:
-    """Open a .glb, .gltf or .vrm file.
+def read_gltf(path: Path, content: bytes | None = None) -> GltfFile:
+    """Open a .glb, .gltf or .vrm file; of a file within another one, `content` is what it holds.
 
     Raises
     ------
     DataError
         The file is missing, damaged or too large, of another version, or requires an extension that is not supported.
     """
-    content = read_bytes(path)
+    content = read_bytes(path) if content is None else content
     text, binary = _split_glb(content, path) if content[:4] == MAGIC else (content, None)
     parsed = parse_json(decode_utf8(text, str(path)), str(path))
     if not isinstance(parsed, dict):

@@ -160,11 +160,11 @@ def _try_speech(content: Path) -> None:
         raise RefusedFileError(f"a short sentence takes more than {MAX_SPEECH_CPU_S:g} s to synthesise")
 
 
-def _check_face(source: Path, out: Path) -> dict[str, Any]:
+def _check_face(source: Path, out: Path, character: bytes | None = None) -> dict[str, Any]:
     from tts2face.models import face_file
     from tts2face.session.catalogue import describe_face
 
-    _rewrite(source, out, FACE, face_file.FORMAT_VERSION)
+    _rewrite(source, out, FACE, face_file.FORMAT_VERSION, character)
     face = face_file.read_face(out)
     if is_of_photo(face.metadata, in_picture=face.light.is_flat) and not states_consent(face.metadata):
         raise DataError("it shows a person's photograph, but states no consent; make it with --consent")
@@ -183,6 +183,8 @@ def _check_character(source: Path, out: Path) -> dict[str, Any]:
     from lexicon.values.json_text import read_json
     from tts2face.interchange.characters.importing import import_face
     from tts2face.interchange.characters.report import summary
+    from tts2face.interchange.gltf.reader import read_gltf
+    from tts2face.interchange.gltf.writer import GlbWriter
     from tts2face.models.face_file import write_face
 
     named = source.with_name("character.glb")
@@ -197,7 +199,9 @@ def _check_character(source: Path, out: Path) -> dict[str, Any]:
     made = out.with_name("imported.face")
     write_face(made, imported.face)
     rows = [f"{name}: {text}" for name, text in summary(imported.report)]
-    return _check_face(made, out) | {"notes": [*imported.report.notes, *rows]}
+    # clips as .glb are this file, written again from what was read of it
+    content = GlbWriter(read_gltf(named)).content()
+    return _check_face(made, out, content) | {"notes": [*imported.report.notes, *rows]}
 
 
 def _check_photo(source: Path, out: Path) -> dict[str, Any]:
@@ -282,16 +286,24 @@ def _check_dictionary(source: Path, out: Path) -> dict[str, Any]:
     return {"n_words": len(entries)}
 
 
-def _rewrite(source: Path, out: Path, kind: str, version: int) -> None:
-    """Write arrays and metadata again, without links to files of the machine that made them."""
-    from tts2face.interchange.characters.binding import without_file
+def _rewrite(source: Path, out: Path, kind: str, version: int, character: bytes | None = None) -> None:
+    """Write arrays and metadata again, without links to files of the machine that made them.
+
+    `character` is the content of the file that a face was imported from here; what a sent face holds is left out.
+    """
+    import numpy as np
+
+    from tts2face.interchange.characters.binding import KEY, without_file
     from tts2face.models.face_schema import check_face
     from tts2face.storage.tensors import read_tensors, write_tensors
 
     arrays, metadata = read_tensors(source, kind, version)
     if kind == FACE:
         check_face(source, arrays, metadata)
-        metadata = metadata | {"metadata": without_file(metadata["metadata"])}
+        metadata = metadata | {"metadata": without_file(metadata["metadata"], character)}
+        arrays.pop(KEY, None)
+        if character is not None:
+            arrays[KEY] = np.frombuffer(character, np.uint8)
     write_tensors(out, kind, version, arrays, metadata, is_packed=kind == FACE)
 
 
@@ -390,12 +402,7 @@ def _sentence(error: Exception, source: Path, folder: Path) -> str:
     text = " ".join(str(error).split()).replace("--mapping", "the part mapping")
     for suffix in (".tsv", ".toml"):
         text = text.replace(str(source.with_name(f"mapping{suffix}")), "the mapping")
-    for path in (
-        source,
-        folder / CONTENT,
-        source.with_name("character.glb"),
-        folder / "imported.face",
-        folder / "photo.face",
-    ):
+    faces = [folder / f"{made}.face" for made in ("imported", "photo")]
+    for path in (source, folder / CONTENT, source.with_name("character.glb"), *faces):
         text = text.replace(f"{path}: ", "").replace(str(path), "it")
     return text

@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 from safetensors.numpy import save
 
-from tests.interchange.characters.made import Variant, head_without_mouth, write_character_file
+from tests.interchange.characters.made import Variant, head_without_mouth, split_glb, write_character_file
 from tests.models.made import write_made_models, write_made_talker
 from tests.photo.pictures import still
 from tests.processes.answered import refusal
@@ -22,6 +22,7 @@ from tts2face.models.consent import PHOTO_TOOL
 from tts2face.models.face_file import read_face
 from tts2face.models.light import Photographed
 from tts2face.serving.work.resource_check import PLACES, SHOWN, STATEMENT, draw_resource, is_picture
+from tts2face.session.session import Session
 from tts2face.storage.shipped import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 
@@ -111,7 +112,35 @@ def test_a_character_becomes_a_face(tmp_path: Path) -> None:
     assert message == ""
     about = json.loads((checked / "description.json").read_text())
     assert (about["summary"], about["licence"]) == ("mesh with 51 shapes", "made by a test")  # it has no tongue
-    assert read_face(checked / "content").metadata["character"]["file"] == ""
+    assert read_face(checked / "content").metadata["character"]["file"] == str(checked / "content")
+
+
+@pytest.mark.usefixtures("face_model")
+def test_clips_of_a_sent_character_are_its_own_rigged_file(tmp_path: Path) -> None:
+    variant = Variant(is_skinned=True, rename=lambda name: f"Wolf3D.{name}")
+    source = write_character_file(tmp_path / "avatar", variant, head_without_mouth())
+    sent, _ = split_glb(source.read_bytes())
+    message, checked = check("face", source, tmp_path)
+    assert message == ""
+    source.unlink()
+    moved = (checked / "content").rename(tmp_path / "blob")  # as a store names it, on another machine
+    Session(face=str(moved), palette=None).export("Papa.", [tmp_path / "a.glb"], fps=10)
+    root, _ = split_glb((tmp_path / "a.glb").read_bytes())
+    for key in ("meshes", "skins", "materials"):
+        assert root[key] == sent[key]
+    assert root["nodes"][: len(sent["nodes"])] == sent["nodes"]
+    assert root["animations"][0]["name"] == "tts2face"
+    assert {channel["target"]["path"] for channel in root["animations"][0]["channels"]} == {"weights", "rotation"}
+
+
+@pytest.mark.smoke
+def test_a_character_within_a_sent_face_is_left_out(files: dict[str, Path], tmp_path: Path) -> None:
+    """It was not made here, and would be served as it is."""
+    arrays, header = read_tensors(files["face"], "face", 1)
+    write_tensors(tmp_path / "held.face", "face", 1, {**arrays, KEY: np.frombuffer(b"<script>", np.uint8)}, header)
+    message, checked = check("face", tmp_path / "held.face", tmp_path)
+    assert message == ""
+    assert KEY not in read_tensors(checked / "content", "face", 1)[0]
 
 
 @pytest.mark.usefixtures("face_model")
