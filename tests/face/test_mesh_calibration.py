@@ -9,7 +9,7 @@ import pytest
 
 from lexicon.errors import DataError
 from tts2face.face.landmarks import landmark_motion
-from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES, build_lip_constraints
+from tts2face.face.lip_constraints import OVERLAP, SPEECH_SHAPE_PREFIXES, build_lip_constraints
 from tts2face.face.mesh_calibration import calibrate_on_mesh, equivalent_weights
 from tts2face.face.shape_transfer import default_head
 from tts2face.models.face import Face
@@ -77,7 +77,7 @@ def test_a_source_without_scores_is_refused() -> None:
 
 @pytest.mark.parametrize("tolerance", [0.0, 0.3])
 def test_lips_that_touch_follow_a_gesture_by_the_tolerance(tolerance: float) -> None:
-    """A weak smile acts alone; a strong one changes the gaps by no more than the tolerance."""
+    """A weak smile acts alone; a strong one changes the gaps by no more than the tolerances."""
     face = replace(lips_alone(), lip_tolerance_mm=tolerance)
     mouth = build_lip_constraints(face).with_gesture_cost()
     smile = np.isin(face.shape_names, ("mouthSmileLeft", "mouthSmileRight")).astype(np.float64)
@@ -86,7 +86,7 @@ def test_lips_that_touch_follow_a_gesture_by_the_tolerance(tolerance: float) -> 
     own = added @ mouth.gaps.T
     assert np.abs(own[0]).max() < 0.3 < np.abs(own[1]).max()
     weak, strong = mouth.combine(shut, added)
-    np.testing.assert_allclose(mouth.gaps @ strong, np.clip(own[1], -tolerance, tolerance), atol=GAP_MM)
+    np.testing.assert_allclose(mouth.gaps @ strong, np.clip(own[1], -OVERLAP * tolerance, tolerance), atol=GAP_MM)
     if tolerance:
         np.testing.assert_allclose(weak, added[0], atol=2e-3)
     else:

@@ -37,6 +37,16 @@ def test_a_face_with_landmarks_of_its_lips_stands_for_itself() -> None:
     assert stand_in(face) is face
 
 
+def test_it_reads_as_the_default_head() -> None:
+    """So that its jaw drops as far; a face without any shape of the mouth has no scores."""
+    model, head = stand_in(without_landmarks("wobble", "mouthFunnel", "jawOpen")), default_head()
+    assert model.scores is not None
+    assert head.scores is not None
+    jaw = np.array([[name == "jawOpen" for name in head.scores.inputs]], np.float64)
+    np.testing.assert_allclose(model.scores.scores(np.array([[0.0, 0.7]])), head.scores.scores(0.7 * jaw), atol=0.01)
+    assert stand_in(without_landmarks("wobble")).scores is None
+
+
 def test_shapes_of_known_names_are_those_of_the_default_head() -> None:
     head = default_head()
     model = stand_in(without_landmarks("jawOpen", "wobble", "mouthViseme_ou"))

@@ -36,6 +36,7 @@ GESTURE_COST = 1.0  # of changes of all weights by gestures
 # Of sideways shapes where nothing rolls the lips: left and right together lift a jaw a little, and were used for it.
 SIDEWAYS, SIDEWAYS_COST = ("jawLeft", "jawRight", "mouthLeft", "mouthRight"), 20.0
 ROLLED = "mouthRollLower"
+OVERLAP = 3.0  # tolerance of lips pressed into each other, relative to that of a slit between them, which is seen
 USUAL_EXPRESSION = 0.3  # weight of a basis expression in speech, at which closed lips shall be so within the tolerance
 CLOSED_SMILE_COST = 0.3  # of the smile of a basis expression, whose lips are closed
 FULL_GROWTH_GAP_MM = 1.5  # gaps smaller than this are amplified by less than the gain
@@ -63,7 +64,7 @@ class LipConstraints:
     is_smile, is_sideways : (k,)
         Whether each of the `moving` shapes smiles, and whether it moves a mouth sideways whose lips nothing rolls.
     tolerance
-        By which gestures may widen or narrow the gap of lips that touch, mm.
+        By which gestures may part lips that touch, mm; they may press them together by `OVERLAP` times as much.
     """
 
     moving: NDArray[np.int64]
@@ -104,8 +105,8 @@ class LipConstraints:
         target_gaps, least = gaps + follow * widened, np.where(gaps > 0, MIN_GAP_SHARE * gaps, gaps)
         # on faces whose shapes were not modelled to keep lips shut, ten shapes would act against each other for .1 mm
         if self.tolerance:
-            target_gaps += (1.0 - follow) * np.clip(widened, -self.tolerance, self.tolerance)
-            least -= self.tolerance
+            target_gaps += (1.0 - follow) * np.clip(widened, -OVERLAP * self.tolerance, self.tolerance)
+            least -= OVERLAP * self.tolerance
         return self.solve(speech, added, np.maximum(target_gaps, least))
 
     def solve(

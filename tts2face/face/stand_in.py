@@ -12,6 +12,8 @@ from importlib.resources import files
 
 import numpy as np
 
+from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES
+from tts2face.face.mesh_calibration import calibrate_on_mesh
 from tts2face.face.shape_transfer import append_shapes, default_head
 from tts2face.models.face import Face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, OUTER_LIP_LOWER, OUTER_LIP_UPPER
@@ -33,7 +35,7 @@ def stand_in(face: Face) -> Face:
         return face
     head = default_head()
     shapes = np.stack([_shape(head, name) for name in face.shape_names])
-    return replace(
+    model = replace(
         head,
         shape_names=face.shape_names,
         shapes=shapes,
@@ -46,6 +48,9 @@ def stand_in(face: Face) -> Face:
         scores=None,
         opened_by=face.opened_by,
     )
+    speaks = any(name.startswith(SPEECH_SHAPE_PREFIXES) for name in face.shape_names)
+    # the jaw drops as on the head itself; its tolerance is the head's, too
+    return replace(model, scores=calibrate_on_mesh(model).scores) if speaks else model
 
 
 def consonants_beside_vowels(names: Sequence[str]) -> frozenset[str]:
