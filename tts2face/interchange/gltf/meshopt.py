@@ -15,7 +15,8 @@ from tts2face.numeric.kernels import kernel
 ATTRIBUTES = "ATTRIBUTES"
 TRIANGLES = "TRIANGLES"
 INDICES = "INDICES"
-NO_FILTER, EXPONENTIAL, COLOR = "NONE", "EXPONENTIAL", "COLOR"
+NO_FILTER, EXPONENTIAL = "NONE", "EXPONENTIAL"
+COLOR = "COLOR"
 GROUP = 16  # elements whose deltas share one width
 # bytes and elements of a block (EXT_meshopt_compression, appendix A)
 MAX_BLOCK_BYTES, MAX_BLOCK = 8192, 256

@@ -1,8 +1,7 @@
 """Curves of live streams: weights and head poses of frames, without jumps between their sources, as JSON texts.
 
-Weights are ARKit's, or those of the character's own shapes where the face was imported from one.
-
-Idle motion is made once for all streams of equal options (decision 203).
+Weights are ARKit's, or those of the character's own shapes where the face was imported from one. Idle motion is made
+once for all streams of equal options (decision 203).
 """
 
 import json

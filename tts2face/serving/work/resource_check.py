@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from lexicon.errors import DataError, InputError
 from tts2face.models.consent import PHOTO_TOOL, states_consent
 from tts2face.photo.photograph import HEIC_BRANDS
+from tts2face.serving.work.resource_texts import bounded, refusal, without_name
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -35,8 +36,6 @@ RESOURCE_KINDS = (TALKER, FACE, PALETTE, DICTIONARY)
 CONTENT = "content"
 DESCRIPTION = "description.json"
 PICTURE = "picture.png"
-MAX_TEXT = 200  # characters of a text of the description
-MAX_ENTRIES = 200  # identities or styles of the description
 PICTURE_SIDE_PX = 384
 TILE_SIDE_PX = 192
 TILE_COLUMNS = 4
@@ -93,7 +92,7 @@ def check_resource(kind: str, source: Path, folder: Path, max_bytes: float) -> N
         if kind != DICTIONARY:
             draw_resource(FACE if kind in {CHARACTER, PHOTO} else kind, folder / CONTENT, folder / PICTURE)
     except (DataError, InputError) as error:
-        raise RefusedFileError(_sentence(error, source, folder)) from error
+        raise RefusedFileError(refusal(error, source, folder, folder / CONTENT)) from error
     except MemoryError as error:
         raise RefusedFileError("it needs too much memory") from error
     except (
@@ -145,7 +144,7 @@ def _check_talker(source: Path, out: Path) -> dict[str, Any]:
     if found.appearance is not None and not states_consent(found.metadata):
         raise DataError("it shows a person's face, but states no consent; build it with --consent")
     _try_speech(out)
-    return _without_name(asdict(describe_talker(out)))
+    return without_name(asdict(describe_talker(out)))
 
 
 def _try_speech(content: Path) -> None:
@@ -170,7 +169,7 @@ def _check_face(source: Path, out: Path, character: bytes | None = None) -> dict
         raise DataError("it shows a person's photograph, but states no consent; make it with --consent")
     for identity in describe_face(out).identities:
         face_file.read_face(out, identity)
-    return _without_name(asdict(describe_face(out))) | {"licence": str(face.metadata.get("licence", "not stated"))}
+    return without_name(asdict(describe_face(out))) | {"licence": str(face.metadata.get("licence", "not stated"))}
 
 
 def is_of_photo(metadata: Mapping[str, Any], *, in_picture: bool) -> bool:
@@ -252,7 +251,7 @@ def find_places(source: Path, folder: Path) -> None:
         read_statement(source)
         picture, fit = places_in_photo(source, notes.append)
     except (DataError, InputError) as error:
-        raise RefusedFileError(_sentence(error, source, folder)) from error
+        raise RefusedFileError(refusal(error, source, folder, folder / CONTENT)) from error
     except MemoryError as error:
         raise RefusedFileError("it needs too much memory") from error
     height, width = picture.pixels.shape[:2]
@@ -378,31 +377,5 @@ _DRAW: Mapping[str, Callable[[Path], "Image"]] = {TALKER: _draw_talker, FACE: _d
 
 
 def _describe(description: dict[str, Any], folder: Path) -> None:
-    text = json.dumps(_bounded(description), ensure_ascii=False)
+    text = json.dumps(bounded(description), ensure_ascii=False)
     (folder / DESCRIPTION).write_text(text, encoding="utf-8")
-
-
-def _without_name(entry: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in entry.items() if key != "name"}
-
-
-def _bounded(value: Any) -> Any:
-    """JSON with texts and lists of limited length: a file chooses what its description says."""
-    if isinstance(value, str):
-        return value[:MAX_TEXT]
-    if isinstance(value, list | tuple):
-        return [_bounded(item) for item in value[:MAX_ENTRIES]]
-    if isinstance(value, dict):
-        return {str(key)[:MAX_TEXT]: _bounded(item) for key, item in value.items()}
-    return value
-
-
-def _sentence(error: Exception, source: Path, folder: Path) -> str:
-    """The message of an error without paths of this machine."""
-    text = " ".join(str(error).split()).replace("--mapping", "the part mapping")
-    for suffix in (".tsv", ".toml"):
-        text = text.replace(str(source.with_name(f"mapping{suffix}")), "the mapping")
-    faces = [folder / f"{made}.face" for made in ("imported", "photo")]
-    for path in (source, folder / CONTENT, source.with_name("character.glb"), *faces):
-        text = text.replace(f"{path}: ", "").replace(str(path), "it")
-    return text

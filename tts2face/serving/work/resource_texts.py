@@ -1,0 +1,34 @@
+"""Texts of a check of an upload: descriptions of limited length, and refusals without paths of this machine."""
+
+from pathlib import Path
+from typing import Any
+
+MAX_TEXT = 200  # characters of a text of the description
+MAX_ENTRIES = 200  # identities or styles of the description
+
+
+def without_name(entry: dict[str, Any]) -> dict[str, Any]:
+    """Entry of a catalogue of a model, without its name."""
+    return {key: value for key, value in entry.items() if key != "name"}
+
+
+def bounded(value: Any) -> Any:
+    """JSON with texts and lists of limited length: a file chooses what its description says."""
+    if isinstance(value, str):
+        return value[:MAX_TEXT]
+    if isinstance(value, list | tuple):
+        return [bounded(item) for item in value[:MAX_ENTRIES]]
+    if isinstance(value, dict):
+        return {str(key)[:MAX_TEXT]: bounded(item) for key, item in value.items()}
+    return value
+
+
+def refusal(error: Exception, source: Path, folder: Path, content: Path) -> str:
+    """The message of an error in a check of `source`, without paths of this machine; `content` is what is kept."""
+    text = " ".join(str(error).split()).replace("--mapping", "the part mapping")
+    for suffix in (".tsv", ".toml"):
+        text = text.replace(str(source.with_name(f"mapping{suffix}")), "the mapping")
+    faces = [folder / f"{made}.face" for made in ("imported", "photo")]
+    for path in (source, content, source.with_name("character.glb"), *faces):
+        text = text.replace(f"{path}: ", "").replace(str(path), "it")
+    return text
