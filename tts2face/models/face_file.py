@@ -157,7 +157,7 @@ def read_face(path: Path, identity: str | None = None, *, checks_pictures: bool 
 
 
 def _pose_fields(face: Face) -> dict[str, Any]:
-    """What the occlusion is for; nothing of ARKit's faces, whose files stay equal."""
+    """Fields that name the poses of the occlusion; none of ARKit's faces, whose files stay equal."""
     own = {OPENED_BY: face.opened_by} if face.opening is not None and face.opened_by != WIDE_OPEN else {}
     usual = lit_poses({"shape_names": face.shape_names, **own})
     return {**own, LIT_POSES: face.n_lit_poses} if face.occlusion is not None and face.n_lit_poses != usual else own

@@ -106,7 +106,7 @@ def test_spellings(name: str, shape: str) -> None:
     assert guess_mapping([name])[shape][0].name == name
 
 
-def test_a_look_of_both_eyes_is_divided() -> None:
+def test_a_gaze_of_both_eyes_is_divided() -> None:
     mapping = guess_mapping(["lookLeft", "lookRight"])
     assert mapping["eyeLookOutLeft"] == (ShapeSource("lookLeft", 1.0, "Left"),)
     assert mapping["eyeLookInRight"] == (ShapeSource("lookLeft", 1.0, "Right"),)

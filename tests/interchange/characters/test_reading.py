@@ -150,13 +150,13 @@ def _ball(centre: np.ndarray, radius: float, n: int = 200) -> np.ndarray:
 
 
 def test_lashes_and_hair_are_no_eyeballs() -> None:
-    parts, shapes, first = [], {}, 0
+    parts, shapes = [], {}
     places = {"Left": np.array([0.03, 0.0, 0.0]), "Right": np.array([-0.03, 0.0, 0.0])}
     for centre in places.values():
         parts += [_ball(centre, 0.012), _strip(centre, 0.013)]
     parts += [_ball(np.zeros(3), 0.1), np.array([[0.03, 0.004, 0.02], [-0.03, 0.004, 0.02], [0.0, 0.1, 0.0]])]
     vertices = np.concatenate(parts)
-    triangles = []
+    triangles, first = [], 0
     for part in parts:
         triangles.append(np.column_stack([np.arange(len(part) - 2) + first + k for k in range(3)]))
         first += len(part)

@@ -57,7 +57,7 @@ def place_face(face: Face, character: Character, head: HeadMesh, provisional: Pl
 def _place_by_eyes(face: Face, model: Face) -> Face:
     """A face without landmarks in mm: its eyeballs where the default head has them, otherwise its moved part."""
     if len(face.eyes) == 2:
-        near, far = ([eye.centre.astype(np.float64) for eye in one.eyes] for one in (face, model))
+        near, far = ([eye.centre.astype(np.float64) for eye in shown.eyes] for shown in (face, model))
         scale = float(np.linalg.norm(far[0] - far[1]) / np.linalg.norm(near[0] - near[1]))
         origin = np.mean(near, axis=0)
     else:

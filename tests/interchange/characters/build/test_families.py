@@ -59,8 +59,8 @@ def named(folder: Path, names: dict[str, str], size: float = 1.0) -> Path:
 def check_shape(face: Face, name: str, own: str) -> None:
     head = head_without_mouth()
     moved, true = (
-        landmark_motion(one, np.array([one.shape_names.index(shape)]))[:468]
-        for one, shape in ((face, name), (head, own))
+        landmark_motion(shown, np.array([shown.shape_names.index(shape)]))[:468]
+        for shown, shape in ((face, name), (head, own))
     )
     np.testing.assert_allclose(moved, true, atol=0.05)  # mm
 
