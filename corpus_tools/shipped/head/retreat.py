@@ -1,4 +1,4 @@
-"""Lower teeth and gums that retreat where an open jaw or a smile would carry them through the chin."""
+"""Lower teeth and gums that retreat where an open jaw, a smile or rounded lips would show them through the chin."""
 
 from collections.abc import Mapping
 
@@ -19,13 +19,14 @@ BELOW_LIP_MM = 1.0  # what is higher than this below the edge of the lower lip i
 LARGEST_MM = 8.0
 OPENINGS = (0.5, 0.7, 0.85, 1.0)  # weights of jawOpen with which a smile is corrected
 SMILES = ("mouthSmileLeft", "mouthSmileRight")
+ROUNDED = {"mouthPucker": 1.0, "mouthShrugLower": 0.8}  # of a rounded vowel, beside an open jaw
 BACKWARDS = np.array([0.0, 0.0, -1.0])
 
 
 def add_retreat(
     points: FloatArray, shapes: Mapping[str, FloatArray], skin: HeadSkin, lips: NDArray[np.int64]
 ) -> dict[str, FloatArray]:
-    """Shapes of the lower arch with vertices (N, 3) that stays behind the skin with an open jaw and with a smile.
+    """Shapes of the lower arch with vertices (N, 3) that stays behind the skin with an open jaw, with a smile and in a rounded vowel.
 
     Parameters
     ----------
@@ -37,14 +38,12 @@ def add_retreat(
     moved = dict(shapes)
     lower = ring_arcs(skin, lips)[1]
 
-    def lacking(opening: float, smiling: float) -> FloatArray:
+    def lacking(opening: float, lips_pose: Mapping[str, float]) -> FloatArray:
         """(N,) mm by which vertices must retreat in a pose."""
-        posed = skin.vertices + opening * skin.shapes["jawOpen"] + smiling * sum(skin.shapes[name] for name in SMILES)
+        moving = (weight * skin.shapes[name] for name, weight in lips_pose.items())
+        posed = sum(moving, skin.vertices + opening * skin.shapes["jawOpen"])
         place = points + opening * moved["jawOpen"]
-        line = posed[lower][np.argsort(posed[lower, 0])]
-        is_below = place[:, 1] < np.interp(place[:, 0], line[:, 0], line[:, 1]) - BELOW_LIP_MM
-        depth = place[:, 2] - front_depth(place[:, :2], posed, triangulate(skin.quads)) + COVER_MM
-        return np.where(is_below & (points[:, 2] > 0), np.clip(depth, 0.0, LARGEST_MM), 0.0)
+        return lacking_cover(place, posed, triangulate(skin.quads), lower) * (points[:, 2] > 0)
 
     beside = cKDTree(points[:, [0, 2]]).query_ball_point(points[:, [0, 2]], CROWN_MM)
 
@@ -52,12 +51,25 @@ def add_retreat(
         """(N,) largest retreat of the vertices above, below and beside each one."""
         return np.array([depth[near].max() for near in beside])
 
-    moved["jawOpen"] = moved["jawOpen"] + np.outer(whole(lacking(1.0, 0.0)), BACKWARDS)
-    most = whole(np.max([lacking(opening, 1.0) for opening in OPENINGS], axis=0))
+    moved["jawOpen"] = moved["jawOpen"] + np.outer(whole(lacking(1.0, {})), BACKWARDS)
+    smile = dict.fromkeys(SMILES, 1.0)
+    most = whole(np.max([lacking(opening, smile) for opening in OPENINGS], axis=0))
     for name in SMILES:
         is_own = points[:, 0] > 0 if name.endswith("Left") else points[:, 0] <= 0
         moved[name] = np.outer(most * is_own, BACKWARDS)
+    rounded = whole(np.max([lacking(opening, ROUNDED) for opening in OPENINGS], axis=0))
+    moved["mouthPucker"] = np.outer(rounded, BACKWARDS)
     return moved
+
+
+def lacking_cover(
+    places: FloatArray, skin: FloatArray, triangles: NDArray[np.int64], lower_lip: NDArray[np.int64]
+) -> FloatArray:
+    """(N,) mm by which places (N, 3) below the edge of a lower lip must retreat to be covered by the skin (V, 3)."""
+    line = skin[lower_lip][np.argsort(skin[lower_lip, 0])]
+    is_below = places[:, 1] < np.interp(places[:, 0], line[:, 0], line[:, 1]) - BELOW_LIP_MM
+    depth = places[:, 2] - front_depth(places[:, :2], skin, triangles) + COVER_MM
+    return np.where(is_below, np.clip(depth, 0.0, LARGEST_MM), 0.0)
 
 
 def front_depth(places: FloatArray, vertices: FloatArray, triangles: NDArray[np.int64]) -> FloatArray:
