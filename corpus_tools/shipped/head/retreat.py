@@ -26,7 +26,7 @@ BACKWARDS = np.array([0.0, 0.0, -1.0])
 def add_retreat(
     points: FloatArray, shapes: Mapping[str, FloatArray], skin: HeadSkin, lips: NDArray[np.int64]
 ) -> dict[str, FloatArray]:
-    """Shapes of the lower arch with vertices (N, 3) that stays behind the skin with an open jaw, with a smile and in a rounded vowel.
+    """Shapes of the lower arch (N, 3) that stays behind the skin with an open jaw, a smile and in a rounded vowel.
 
     Parameters
     ----------
