@@ -112,7 +112,12 @@ def test_a_character_becomes_a_face(tmp_path: Path) -> None:
     assert message == ""
     about = json.loads((checked / "description.json").read_text())
     assert (about["summary"], about["licence"]) == ("mesh with 51 shapes", "made by a test")  # it has no tongue
-    assert read_face(checked / "content").metadata["character"]["file"] == str(checked / "content")
+    face = read_face(checked / "content")
+    assert face.metadata["character"]["file"] == str(checked / "content")
+    assert face.scores is not None  # calibrated on the mesh
+    assert face.lip_tolerance_mm > 0
+    assert any(note.startswith("found: 51 of ARKit's 52") for note in about["notes"])
+    assert "missing: tongueOut" in about["notes"]
 
 
 @pytest.mark.usefixtures("face_model")
