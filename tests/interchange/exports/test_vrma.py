@@ -32,7 +32,7 @@ class Read:
         return np.frombuffer(self.binary, "<f4", accessor["count"] * width, start).reshape(-1, width)
 
     def track(self, node, path):
-        channel = next(one for one in self.animation["channels"] if one["target"] == {"node": node, "path": path})
+        channel = next(c for c in self.animation["channels"] if c["target"] == {"node": node, "path": path})
         return self.rows(self.animation["samplers"][channel["sampler"]]["output"])
 
     def expression(self, name):
@@ -150,3 +150,11 @@ def test_the_khronos_validator_finds_no_error(tmp_path):
     tts2face.export(arkit_clip(20), tmp_path / "a.vrma")
     report = json.loads(programs.run_node(programs.VALIDATE, packages, str(tmp_path / "a.vrma")))
     assert (report["issues"]["numErrors"], report["issues"]["numWarnings"]) == (0, 0), report["issues"]["messages"]
+
+
+def test_a_session_sends_the_same_file():
+    session = tts2face.Session(palette=None)
+    content = b"".join(chunk.content for chunk in session.stream_file("Hi.", "vrma", gestures="none"))
+    root, _ = split_glb(content)
+    assert {*root["extensions"]["VRMC_vrm_animation"]["expressions"]["preset"]} >= {*UNROUNDED, ROUNDED, "blink"}
+    assert len(root["animations"]) == 1
