@@ -45,6 +45,7 @@ CELL_PX = 192
 LABEL_PX = 16
 N_COLUMNS = 8
 OPEN_WEIGHT = 0.5  # of the opening shape in the second picture of the preview
+CLOSED = "mouthClose"  # closes lips over an open jaw, as ARKit has it
 WALL = "#8a8f98"
 EYES = "(eyes)"  # source of shapes that no morph target moves: eyeballs turn
 MAX_LABEL = 32  # letters, the last of a name
@@ -72,6 +73,8 @@ def draw_contact_sheet(
 ) -> Pixels:
     """Picture (H, W, 3) of the face at rest and with each of its shapes at its highest weight, with names.
 
+    Lips that close are drawn over a jaw that is open, as they are used.
+
     Parameters
     ----------
     sources
@@ -84,6 +87,8 @@ def draw_contact_sheet(
     for number, name in enumerate(face.shape_names):
         weights = np.zeros(len(face.shape_names), np.float32)
         weights[number] = face.limits[number, 1]
+        if name == CLOSED and face.opening is not None:
+            weights[face.opening] = weights[number]
         poses.append((name, weights))
     n_rows = -(-len(poses) // N_COLUMNS)
     row_px = CELL_PX + LABEL_PX * (1 if sources is None else 2)
