@@ -63,6 +63,34 @@ require('assimpjs')().then(assimp => {
 """
 
 
+BABYLON = """
+const {readFileSync} = require('node:fs'), {pathToFileURL} = require('node:url'), {join} = require('node:path');
+const [path, packages, seconds] = process.argv.slice(1);
+const from = name => import(pathToFileURL(join(packages, '@babylonjs', name)).href);
+globalThis.XMLHttpRequest = class {};
+console.log = () => {};
+(async () => {
+  const {NullEngine, Scene, SceneLoader} = await from('core/index.js');
+  await from('loaders/glTF/index.js');
+  const scene = new Scene(new NullEngine());
+  const content = new Uint8Array(readFileSync(path));
+  const read = await SceneLoader.ImportMeshAsync('', '', content, scene, undefined, '.glb');
+  const [clip] = read.animationGroups;
+  clip.start(false);
+  clip.goToFrame(seconds * clip.targetedAnimations[0].animation.framePerSecond);
+  const weights = {};
+  for (const {morphTargetManager: targets} of read.meshes)
+    for (let at = 0; at < (targets?.numTargets ?? 0); at++) {
+      const {name, influence} = targets.getTarget(at);
+      weights[name] = influence;
+    }
+  const rate = clip.targetedAnimations[0].animation.framePerSecond;
+  process.stdout.write(JSON.stringify({weights, seconds: clip.to / rate}));
+  process.exit(0);
+})();
+"""
+
+
 class GltfFile:
     """A file as pygltflib reads it, and its values at a frame by the rules of the glTF specification."""
 
@@ -250,6 +278,16 @@ def test_assimp_reads_parts_that_do_not_move(tmp_path):
     answer = json.loads(programs.run_node(ASSIMP, packages, str(tmp_path / "a.glb")))
     assert answer["meshes"] == len(divide_surface(FACE))
     assert answer["seconds"] == pytest.approx(4 / 30, abs=1e-3)
+
+
+def test_babylon_plays_the_weights_of_the_clip(tmp_path):
+    packages = programs.node_package("@babylonjs/loaders")
+    clip = made_clip(12)
+    tts2face.export(clip, tmp_path / "a.glb", face=FACE)
+    answer = json.loads(programs.run_node(BABYLON, packages, str(tmp_path / "a.glb"), str(packages), str(6 / 30)))
+    assert answer["seconds"] == pytest.approx(0.4, abs=1e-3)
+    expected = dict(zip(FACE.shape_names, clip.motion.values[6].tolist(), strict=True))
+    assert answer["weights"] == pytest.approx(expected, abs=2e-3)
 
 
 def test_openfacefx_reads_names_and_weights(tmp_path):
