@@ -49,7 +49,8 @@ CLOSED = "mouthClose"  # closes lips over an open jaw, as ARKit has it
 WALL = "#8a8f98"
 EYES = "(eyes)"  # source of shapes that no morph target moves: eyeballs turn
 MAX_LABEL = 32  # letters, the last of a name
-PAPER, INK, SOURCE_INK, REPLACED_INK = (245, 245, 243), (20, 20, 20), (110, 110, 110), (190, 60, 20)
+PAPER, INK = (245, 245, 243), (20, 20, 20)
+SOURCE_INK, REPLACED_INK = (110, 110, 110), (190, 60, 20)
 
 
 def draw_preview(face: Face) -> Pixels:

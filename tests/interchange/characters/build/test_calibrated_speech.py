@@ -26,7 +26,8 @@ def spoken(face: Face) -> tuple[float, float, float]:
     """Widest gap of the lips over the distance of the eyes, mean frown, and widest gap of a bilabial, mm."""
     session = Session(face=face)
     clip = session.clip(TEXT)
-    weights, names, times = clip.motion.values.astype(float), list(clip.motion.channels), clip.motion.times
+    weights, times = clip.motion.values.astype(float), clip.motion.times
+    names = list(clip.motion.channels)
     motion = scatter_landmarks(session.mesh, landmark_motion(session.mesh, np.arange(len(names))))
     gaps = weights @ (motion[list(INNER_LIP_UPPER), 1] - motion[list(INNER_LIP_LOWER), 1]).T
     frown = weights[:, [names.index("mouthFrownLeft"), names.index("mouthFrownRight")]].mean()
