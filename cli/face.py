@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
@@ -45,6 +45,10 @@ def import_character(  # noqa: PLR0913 - one parameter a flag
     front: Annotated[
         str | None, Parameter(help="Axis that the character looks along: +z, -z, +x or -x; by default found.")
     ] = None,
+    shapes: Annotated[
+        Literal["transfer"] | None,
+        Parameter(help="transfer: the shapes of a shipped head, for a head that has none; by default its own."),
+    ] = None,
     preview: Annotated[Path | None, Parameter(help="Write a picture with the landmarks drawn (.png).")] = None,
     sheet: Annotated[Path | None, Parameter(help="Write a contact sheet of all shapes, with sources (.png).")] = None,
     write_landmarks: Annotated[Path | None, Parameter(help="Write the landmarks as a table to edit (.tsv).")] = None,
@@ -72,7 +76,11 @@ def import_character(  # noqa: PLR0913 - one parameter a flag
     from tts2face.interchange.characters.shapes import mapping_table
     from tts2face.storage.files import write_atomically
 
-    imported = import_face(character, mapping=mapping, landmarks=landmarks, front=front, model=model)
+    with progress_bar("carrying shapes", quiet or shapes is None) as on_progress:
+        imported = import_face(
+            character, mapping=mapping, landmarks=landmarks, front=front, shapes=shapes, model=model,
+            on_progress=on_progress,
+        )  # fmt: skip
     _write_preview(preview, imported.face)
     if sheet is not None:
         with progress_bar("drawing", quiet) as on_progress:

@@ -19,6 +19,7 @@ SIDES = ("Left", "Right")  # of the face itself, in the order of `tts2face.model
 LID_LANDMARK_PAIRS = (((386, 385), (374, 380)), ((159, 158), (145, 153)))
 BLINK_SHAPES, WIDE_SHAPES = ("eyeBlinkLeft", "eyeBlinkRight"), ("eyeWideLeft", "eyeWideRight")
 NARROWING_SHAPES = (("eyeSquintLeft", "cheekSquintLeft"), ("eyeSquintRight", "cheekSquintRight"))
+STILL_LIDS = 1e9  # mm per weight of a shape that moves nothing, as of eyes that are one with the skin: it stays near 0
 MAX_NARROWING = 0.6  # largest share of the opening that squinting may close
 
 
@@ -89,6 +90,9 @@ def build_eyelid_model(face: Face) -> EyelidModel:
     )
     number = {name: column for column, name in enumerate(face.shape_names)}
     blink, wide = (np.array([number[name] for name in names], np.int64) for names in (BLINK_SHAPES, WIDE_SHAPES))
+    for columns, direction in ((blink, -STILL_LIDS), (wide, STILL_LIDS)):
+        is_still = ~face.shapes[columns].any(axis=(1, 2))
+        per_weight[is_still, columns[is_still]] = direction
     if not (np.isfinite(opening).all() and (opening > 0).all()):
         raise DataError("the face lacks landmarks of its lids; build it with its landmark table")
     if not all((per_weight[eye, blink[eye]] < 0) and (per_weight[eye, wide[eye]] > 0) for eye in range(len(SIDES))):

@@ -10,6 +10,7 @@ from tts2face.face.expressions import GAZE_SHAPES
 from tts2face.face.shape_transfer import default_head
 from tts2face.interchange.characters.character import Character
 from tts2face.interchange.characters.head_mesh import LEFT_EYE, RIGHT_EYE, HeadMesh
+from tts2face.interchange.characters.part_names import kind_by_name
 from tts2face.numeric.arrays import FloatArray, connected_pieces
 
 BLINKS = {LEFT_EYE: "eyeBlinkLeft", RIGHT_EYE: "eyeBlinkRight"}
@@ -19,15 +20,20 @@ MAX_ROUNDNESS_ERROR = 0.12  # standard deviation of the distance from the centre
 MIN_VERTICES = 20
 LEAST_DEPTH, LEAST_WIDTH = 0.5, 1.4  # radii along the shortest and the middle axis of half an eyeball or more
 LARGEST_RADIUS = 0.45  # of the distance of the lids: two eyeballs lie beside each other, hair lies round the head
+WITHIN = 1.2  # radii: what lies wholly within is a part of an eyeball
 LID_REACH = 1.0  # radii between the centre of an eyeball and the middle of the vertices that its lid moves, in x and y
 MOVED_BY_SHAPES = 0.02  # of the radius: a gaze shape that moves an eyeball's vertices further turns it itself
 
 
-def mark_eyeballs(head: HeadMesh, character: Character) -> HeadMesh:
-    """Head whose vertices of eyeballs are marked and last; unchanged where shapes turn the eyes or none are found."""
+def mark_eyeballs(head: HeadMesh, character: Character, lids: Mapping[int, FloatArray] | None = None) -> HeadMesh:
+    """Head whose vertices of eyeballs are marked and last; unchanged where shapes turn the eyes or none are found.
+
+    `lids` are the middles (3,) of the eyes' lids; by default of what the blinks move.
+    """
     marked = _by_bones(head, character)
     if not marked.any():
-        marked = _by_spheres(head)
+        marked = _by_spheres(head, _moved_lids(head) if lids is None else lids)
+        marked[_named_otherwise(head, character)] = 0
     # eyes that shapes turn would turn twice
     if not marked.any() or _moved_by_gaze(head, marked):
         return head
@@ -94,23 +100,36 @@ def _ancestors(node: int, parents: Mapping[int, int]) -> set[int]:
     return found
 
 
-def _by_spheres(head: HeadMesh) -> NDArray[np.int8]:
-    """Marks (V,) of connected spheres in the place of the eyes, which the blink shapes tell."""
+def _moved_lids(head: HeadMesh) -> dict[int, FloatArray]:
+    """Middle (3,) of the vertices that each blink moves; empty without both blinks."""
+    moved = all(name in head.shapes for name in BLINKS.values())
+    return {eye: _middle_of_motion(head, blink) for eye, blink in BLINKS.items()} if moved else {}
+
+
+def _by_spheres(head: HeadMesh, lids: Mapping[int, FloatArray]) -> NDArray[np.int8]:
+    """Marks (V,) of connected spheres in the places of the eyes, behind the middles (3,) of their lids."""
     marked = np.zeros(len(head.vertices), np.int8)
-    if not all(name in head.shapes for name in BLINKS.values()):
+    if not lids:
         return marked
-    component = _components(head)
+    component = mesh_components(head)
     sizes = np.bincount(component)
-    lids = {eye: _middle_of_motion(head, blink) for eye, blink in BLINKS.items()}
     largest = LARGEST_RADIUS * float(np.linalg.norm(lids[LEFT_EYE] - lids[RIGHT_EYE]))
     for eye, lid in lids.items():
+        balls: list[tuple[FloatArray, float]] = []
         for number in np.flatnonzero(sizes >= MIN_VERTICES):
             rows = component == number
             centre, radius, error = fit_sphere(head.vertices[rows])
-            near = float(np.hypot(*(centre - lid)[:2])) < LID_REACH * radius
+            near = float(np.hypot(*(centre - lid)[:2])) < LID_REACH * radius and abs(centre[2] - lid[2]) < 3 * radius
             near &= radius < largest and _is_ball(head.vertices[rows], radius)
-            if near and error < MAX_ROUNDNESS_ERROR * radius and abs(centre[2] - lid[2]) < 3 * radius:
-                marked[rows] = eye
+            if near and error < MAX_ROUNDNESS_ERROR * radius:
+                balls.append((centre, radius))
+        if not balls:
+            continue
+        # irises and corneas are round pieces of their own within the eyeball
+        centre, radius = max(balls, key=lambda ball: ball[1])
+        far = np.zeros(len(sizes))
+        np.maximum.at(far, component, np.linalg.norm(head.vertices - centre, axis=1))
+        marked[(far <= WITHIN * radius)[component]] = eye
     return marked
 
 
@@ -127,7 +146,14 @@ def _is_ball(points: FloatArray, radius: float) -> bool:
     return bool(flat > LEAST_DEPTH * radius and middle > LEAST_WIDTH * radius)
 
 
-def _components(head: HeadMesh) -> NDArray[np.int32]:
+def _named_otherwise(head: HeadMesh, character: Character) -> NDArray[np.int64]:
+    """Vertices of pieces whose names say that they are no eyes."""
+    kinds = [kind_by_name(piece, character) for piece in character.pieces]
+    is_other = np.array([kind not in (None, "eyes") for kind in kinds])
+    return np.unique(head.triangles[is_other[head.piece_of]])
+
+
+def mesh_components(head: HeadMesh) -> NDArray[np.int32]:
     """Number (V,) of the connected part that each vertex belongs to; vertices at one place are connected."""
     size = float(np.ptp(head.vertices, axis=0).max())
     # vertices along a seam of the texture lie at one place, to rounding

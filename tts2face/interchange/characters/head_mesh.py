@@ -37,6 +37,8 @@ class HeadMesh:
         Node that each vertex follows; 0, `LEFT_EYE` or `RIGHT_EYE`.
     turn : (3, 3)
         Rotation from the file's axes to these.
+    kind_of : (F,)
+        Kind of each triangle where places tell it; None where the names of the pieces do.
     """
 
     vertices: FloatArray
@@ -48,12 +50,15 @@ class HeadMesh:
     bones: IntArray
     eye_of: NDArray[np.int8]
     turn: FloatArray
+    kind_of: NDArray[np.str_] | None = None
 
     def keep(self, is_kept: NDArray[np.bool_]) -> "HeadMesh":
         """Mesh with the triangles (F,) that are kept and the vertices that they use."""
         triangles = self.triangles[is_kept]
         used, corners = np.unique(triangles, return_inverse=True)
-        return replace(self, triangles=corners.reshape(-1, 3), piece_of=self.piece_of[is_kept]).take(used)
+        kept = replace(self, triangles=corners.reshape(-1, 3), piece_of=self.piece_of[is_kept])
+        kinds = None if self.kind_of is None else self.kind_of[is_kept]
+        return replace(kept, kind_of=kinds).take(used)
 
     def cut(self, heights: FloatArray) -> "HeadMesh":
         """Mesh cut along a plane: the part where the heights (V,) of its vertices above the plane are not negative."""
@@ -100,15 +105,21 @@ def build_head_mesh(character: Character, mapping: ShapeMapping, yaw_deg: float)
     """Head of a character, turned by `yaw_deg` about the vertical axis so that it looks along z."""
     angle = np.radians(yaw_deg)
     turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]).round(12)
-    whole = _join(character, mapping, turn)
+    whole = join_pieces(character, mapping, turn)
     low, high = moved_box(whole)
+    head = crop_head(whole, low, high)
+    return divide_sides(head, mapping, BLEND_SHARE * float(high[1] - low[1]))
+
+
+def crop_head(whole: HeadMesh, low: FloatArray, high: FloatArray) -> HeadMesh:
+    """Head and neck of a character whose face has these corners (3,)."""
     height, middle = high[1] - low[1], (low[0] + high[0]) / 2
     lowest = low[1] - NECK_SHARE * height
     head = whole.keep((whole.vertices[:, 1] >= lowest)[whole.triangles].any(axis=1))
     head = head.cut(head.vertices[:, 1] - lowest)
     for side in (1, -1):
         head = head.cut(WIDTH_SHARE * height - side * (head.vertices[:, 0] - middle))
-    return divide_sides(head, mapping, BLEND_SHARE * height)
+    return head
 
 
 def moved_box(head: HeadMesh) -> tuple[FloatArray, FloatArray]:
@@ -150,7 +161,8 @@ def divide_sides(head: HeadMesh, mapping: ShapeMapping, blend: float) -> HeadMes
     return replace(head, shapes=shapes)
 
 
-def _join(character: Character, mapping: ShapeMapping, turn: FloatArray) -> HeadMesh:
+def join_pieces(character: Character, mapping: ShapeMapping, turn: FloatArray) -> HeadMesh:
+    """All pieces of a character as one mesh in turned axes, with the shapes of a mapping."""
     pieces = character.pieces
     starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
     weights = {shape: [source_weights(character, source) for source in sources] for shape, sources in mapping.items()}

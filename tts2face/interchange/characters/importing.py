@@ -1,8 +1,9 @@
 """Import of a character of another program as a face: ``tts2face face import``."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -33,22 +34,27 @@ from tts2face.interchange.characters.landmarks import (
     part_triangles,
 )
 from tts2face.interchange.characters.obj_reader import read_obj_folder
+from tts2face.interchange.characters.part_names import shells_before_eyes
 from tts2face.interchange.characters.shape_names import combinations_of_shapes, guess_mapping
-from tts2face.interchange.characters.shapes import ShapeMapping, read_mapping
+from tts2face.interchange.characters.shapes import TRANSFER, ShapeMapping, read_mapping
 from tts2face.interchange.characters.surface import (
     Placement,
     add_gaze_shapes,
     build_face,
     is_plain,
-    shells_before_eyes,
     unwrap,
 )
 from tts2face.interchange.characters.surface_points import SurfacePoints, nearest_points
+from tts2face.interchange.characters.transfer.first_look import find_head, placed_head
+from tts2face.interchange.characters.transfer.tracked import locate_bare_landmarks
+from tts2face.interchange.characters.transfer.transfer import transfer_shapes
 from tts2face.interchange.gltf.reader import SUFFIXES
 from tts2face.models.face import WIDE_OPEN, Face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
+from tts2face.numeric.arrays import FloatArray
 from tts2face.picture.occlusion import bake_occlusion
 from tts2face.processes.threads import available_cores
+from tts2face.types import Progress, ignore_progress
 from tts2face.video.tracking import MIN_SCORE
 
 WEAK_JAW_SHARE = 0.1  # of the largest motion by a viseme
@@ -58,6 +64,7 @@ WITHOUT_LANDMARKS = (
     "no face is recognised in its pictures, so speech and gestures give its shapes the weights of the default head, by "
     "name; if it has a human face, give the axis that it looks along with --front, or its landmarks with --landmarks"
 )
+N_STEPS = 10  # of a transfer's progress
 PROVISIONAL_HEIGHT_MM = 150.0  # of the moved part of a face, until the distance of its eyes is known
 
 
@@ -134,13 +141,15 @@ def propose_mapping(character: Character) -> ShapeMapping:
     return by_visemes if reach < WEAK_JAW_SHARE * max(map(character.reach, visemes), default=0.0) else mapping
 
 
-def import_face(
+def import_face(  # noqa: PLR0913 - one parameter an option
     path: str | Path,
     *,
     mapping: str | Path | ShapeMapping | None = None,
     landmarks: str | Path | None = None,
     front: str | None = None,
+    shapes: str | None = None,
     model: Path | None = None,
+    on_progress: Progress = ignore_progress,
 ) -> ImportedFace:
     """Make a face of a character's file.
 
@@ -155,13 +164,17 @@ def import_face(
     front
         Axis that the character looks along: ``+z``, ``-z``, ``+x`` or ``-x``; by default the one where a face is
         recognised.
+    shapes
+        ``transfer`` gives the character the shapes of a shipped head, whatever shapes it has; by default its own.
     model
         Path of ``face_landmarker.task``.
+    on_progress
+        Called after each step of a transfer.
 
     Raises
     ------
     InputError
-        A path does not exist, or an option is unknown.
+        A path does not exist, or an option is unknown or has no effect.
     DataError
         A file is damaged, or the character has no shape that moves its mouth, or no face is recognised.
     BackendError
@@ -176,25 +189,40 @@ def import_face(
     path = Path(path)
     if front is not None and front not in FRONTS:
         raise InputError(f"there is no front {front!r}; choose {', '.join(FRONTS)}")
+    is_transferred = _is_transfer(shapes, mapping)
     character = read_character(path)
-    chosen = _complete_mapping(character, mapping)
+    chosen = {} if is_transferred else _complete_mapping(character, mapping)
     table = None if landmarks is None else read_landmark_table(Path(landmarks))
-    candidates = _turned_heads(character, chosen, front)
-    if table is None:
-        head, provisional, views = _find_front(candidates, character, model)
-        drawn, located = views.face, locate_landmarks(views) or NO_LANDMARKS
+    step = _step_counter(on_progress)
+    if is_transferred:
+        head, provisional = _shapeless_head(character, front, table, model)
+        views = None
+        step()
+    elif table is None:
+        head, provisional, views = _find_front(_turned_heads(character, chosen, front), character, model)
     else:
-        head = next(candidates)
-        provisional = _provisional_placement(head)
-        drawn = build_face(head, character, provisional)
+        head = next(_turned_heads(character, chosen, front))
+        provisional, views = _provisional_placement(head), None
+    drawn = build_face(head, character, provisional) if views is None else views.face
+    if table is not None:
         located = _project_table(table, head, drawn)
+    else:
+        located = locate_bare_landmarks(drawn, model) if views is None else locate_landmarks(views) or NO_LANDMARKS
     face = place_face(_with_landmarks(drawn, located), character, head, provisional)
-    notes = [WITHOUT_LANDMARKS]
-    if located is not NO_LANDMARKS:
-        face, notes = drop_unsuited_shapes(face)
-        face = calibrate_on_mesh(face)
-    face = replace(face, metadata=_metadata(path, character, chosen, head, face))
+    step()
+    if is_transferred:
+        carried = transfer_shapes(face, is_tracked=table is None, on_step=step)
+        face, notes = carried.face, [*carried.notes]
+        made_of: dict[str, Any] = {"shapes_from": carried.source}
+    else:
+        notes = [WITHOUT_LANDMARKS]
+        if located is not NO_LANDMARKS:
+            face, notes = drop_unsuited_shapes(face)
+            face = calibrate_on_mesh(face)
+        made_of = {KEY: _binding(path, chosen, head, face).as_metadata()}
+    face = replace(face, metadata=_provenance(path, character) | made_of)
     face = bake_occlusion(face, available_cores())
+    step()
     positions = located.points.places(drawn.vertices) / provisional.scale + provisional.origin
     places = dict(zip(located.numbers.tolist(), positions @ head.turn, strict=True))
     report = ImportReport(
@@ -244,13 +272,38 @@ def _without_mouth(character: Character) -> str:
     if vowels:
         return (
             f"the character's mouth is painted: {_some(sorted(set(vowels)))} exchange textures or colours and move no "
-            "vertex, so speech cannot move it; take a character whose mouth has shapes"
+            "vertex, so speech cannot move it; take a character whose mouth has shapes, or, if the mesh has lips, carry "
+            "over those of a shipped head with --shapes transfer"
         )
     empty = f"; {_some(character.still_names)} move no vertex" if character.still_names else ""
     return (
         "the character has no shape of a known name that moves its mouth, so speech cannot move it; "
-        f"name its shapes in a file and give it as --mapping; it has: {_some(names)}{empty}"
+        "carry over those of a shipped head with --shapes transfer, or name its shapes in a file and give it as "
+        f"--mapping; it has: {_some(names)}{empty}"
     )
+
+
+def _is_transfer(shapes: str | None, mapping: object) -> bool:
+    if shapes is not None and shapes != TRANSFER:
+        raise InputError(f"there are no shapes {shapes!r}; choose {TRANSFER}, or leave --shapes out for its own")
+    if shapes == TRANSFER and mapping is not None:
+        raise InputError("--mapping has no effect with --shapes transfer; remove one of them")
+    return shapes == TRANSFER
+
+
+def _step_counter(on_progress: Progress) -> Callable[[], None]:
+    done = count(1)
+    return lambda: on_progress(min(next(done), N_STEPS), N_STEPS)
+
+
+def _shapeless_head(
+    character: Character, front: str | None, table: Mapping[int, FloatArray] | None, model: Path | None
+) -> tuple[HeadMesh, Placement]:
+    """Head of a character without its own shapes."""
+    likely = ["-z", "+z"] if character.faces_back else ["+z", "-z"]
+    fronts = [FRONTS[axis] for axis in ([front] if front is not None else [*likely, "+x", "-x"])]
+    found = find_head(character, fronts, model) if table is None else placed_head(character, fronts[0], table)
+    return found.mesh, found.placement
 
 
 def _some(names: Sequence[str]) -> str:
@@ -349,17 +402,19 @@ def _colour_notes(character: Character, head: HeadMesh) -> list[str]:
     return notes
 
 
-def _metadata(path: Path, character: Character, mapping: ShapeMapping, head: HeadMesh, face: Face) -> dict[str, Any]:
-    """Provenance of the face, and what is needed to write its animation onto the character's file."""
+def _binding(path: Path, mapping: ShapeMapping, head: HeadMesh, face: Face) -> CharacterBinding:
+    """What is needed to write the face's animation onto the character's file."""
     scale = float(np.ptp(face.vertices[:, 1]) / np.ptp(head.vertices[:, 1]))
     origin = head.vertices[0] - face.vertices[0].astype(np.float64) / scale
     digest = "" if path.is_dir() else sha256(path.read_bytes()).hexdigest()
     yaw_deg = float(np.degrees(np.arctan2(head.turn[0, 2], head.turn[0, 0])))
     x, y, z = (float(value) for value in origin)
-    binding = CharacterBinding(str(path.resolve()), digest, round(yaw_deg, 3), scale, (x, y, z), mapping)
+    return CharacterBinding(str(path.resolve()), digest, round(yaw_deg, 3), scale, (x, y, z), mapping)
+
+
+def _provenance(path: Path, character: Character) -> dict[str, Any]:
     return {
         "name": path.stem,
         "licence": character.licence or "not stated by the character's file",
         "attribution": "",
-        KEY: binding.as_metadata(),
     }

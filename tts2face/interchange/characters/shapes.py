@@ -13,6 +13,7 @@ from lexicon.values.toml_text import parse_toml
 MAX_GAIN = 10.0
 MAX_MAPPING_BYTES = 1_000_000
 NOTHING = "-"  # source of a shape that is left out
+TRANSFER = "transfer"  # shapes of a shipped head, in place of the character's own
 SIDES = ("Left", "Right")
 HEADER = ("shape", "source", "gain")
 

@@ -1,6 +1,5 @@
 """Surface of a character's head as a face: parts with materials, one texture, opacity, and colours."""
 
-import re
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +12,7 @@ from tts2face.interchange.characters.atlas import CUTOUT, Atlas, build_atlas, sr
 from tts2face.interchange.characters.character import OPAQUE, Character, Material
 from tts2face.interchange.characters.eyeballs import eyeball_centres, fit_sphere, gaze_turns
 from tts2face.interchange.characters.head_mesh import LEFT_EYE, RIGHT_EYE, HeadMesh
+from tts2face.interchange.characters.part_names import kind_by_name, shells_before_eyes
 from tts2face.models.face import VERTEX_COLOURS, WIDE_OPEN, Eye, Face, FacePart, Texture
 from tts2face.numeric.arrays import FloatArray
 
@@ -29,20 +29,6 @@ SHADING = {
     "skin": (0.16, 14.0, 0.35),
     "other": (0.06, 10.0, 0.1),
 }
-_KINDS = {
-    "lashes": re.compile(r"lash", re.I),
-    "brows": re.compile(r"brow", re.I),
-    "teeth": re.compile(r"teeth|tooth|dent(?:al|ure)", re.I),
-    "tongue": re.compile(r"tongue|gum", re.I),
-    "hair": re.compile(r"hair|beard|mustache|moustache", re.I),
-    "eyes": re.compile(r"eye(?!.?(?:lid|shadow|socket))|cornea|sclera|iris|pupil", re.I),  # unless speech moves it
-}
-# Transparent shells before the eye, by the names of Unreal, MetaHuman, Character Creator and DAZ; programs that lose
-# their transparency write them opaque, and they would cover the eye as skin.
-_SHELLS = re.compile(
-    r"lacrimal|tear.?(?:line|fluid|film)|(?<![a-z])tears?(?![a-z])|eye.?(?:occlusion|blend|shell|edge|moisture|wet)",
-    re.I,
-)
 # sRGB of white materials without an image: they would hide the features of the face.
 PLAIN = {
     "skin": (214, 164, 140),
@@ -111,9 +97,14 @@ def build_face(head: HeadMesh, character: Character, placement: Placement) -> Fa
     if not (opacity > 0).any():
         raise DataError("no triangle of the character is visible; check the alpha of its materials")
     kind_of = np.array([kinds[n] for n in range(len(character.pieces))])[head.piece_of]
+    if head.kind_of is not None:
+        kind_of = head.kind_of.copy()
     kind_of[head.eye_of[head.triangles].min(axis=1) > 0] = "eyes"
     # opaque first, skin first among these: what is translucent is drawn over what is behind it
-    order = np.lexsort((material_of, kind_of != "skin", -np.where(opacity == CUTOUT, 0.999, opacity)))
+    kind_rank = (kind_of != "skin").astype(np.int64)
+    if head.kind_of is not None:  # kinds by places are those of triangles, not of materials
+        kind_rank *= 1 + np.unique(kind_of, return_inverse=True)[1].reshape(-1)
+    order = np.lexsort((material_of, kind_rank, -np.where(opacity == CUTOUT, 0.999, opacity)))
     order = order[opacity[order] > 0]
     keys = [(str(kind_of[t]), int(material_of[t]), float(opacity[t])) for t in order]
     names = tuple(sorted(head.shapes))
@@ -124,7 +115,7 @@ def build_face(head: HeadMesh, character: Character, placement: Placement) -> Fa
         triangles=head.triangles[order].astype(np.int32),
         parts=_parts(keys, character, atlas),
         shape_names=names,
-        shapes=np.array([head.shapes[name] for name in names], np.float32).reshape(len(names), -1, 3)
+        shapes=np.array([head.shapes[name] for name in names], np.float32).reshape(len(names), len(head.vertices), 3)
         * np.float32(placement.scale),
         limits=np.tile(np.array([0.0, 1.0], np.float32), (len(names), 1)),
         eyes=_eyes(head, character, placement, names),
@@ -166,8 +157,7 @@ def _kinds(head: HeadMesh, character: Character) -> dict[int, str]:
             spoken |= shape.any(axis=1)
     kinds = {}
     for number, piece in enumerate(character.pieces):
-        name = f"{piece.name} {character.materials[piece.material].name}"
-        by_name = next((kind for kind, pattern in _KINDS.items() if pattern.search(name)), None)
+        by_name = kind_by_name(piece, character)
         corners = head.triangles[head.piece_of == number]
         # what shapes of speech move is no eyeball, whatever its name
         if by_name == "eyes" and spoken[corners].any():
@@ -226,16 +216,6 @@ def add_gaze_shapes(head: HeadMesh) -> HeadMesh:
             for name in gaze_turns(eye):
                 shapes.setdefault(name, np.zeros(head.vertices.shape, np.float32))
     return replace(head, shapes=shapes)
-
-
-def shells_before_eyes(character: Character) -> list[int]:
-    """Pieces that lie before the eyes and whose transparency the file has lost."""
-    return [
-        number
-        for number, piece in enumerate(character.pieces)
-        if character.materials[piece.material].alpha_mode == OPAQUE
-        and _SHELLS.search(f"{piece.name} {character.materials[piece.material].name}")
-    ]
 
 
 def is_plain(material: Material) -> bool:

@@ -61,6 +61,7 @@ class Sent:
     save: Callable[[Path], Awaitable[None]]
     photo: SentPhoto = NO_CHOICES
     mapping: str | None = None
+    shapes: str | None = None
 
 
 async def store_resource(state: ServiceState, key: ApiKey, sent: Sent) -> StoredResource:
@@ -88,6 +89,8 @@ async def _checked(state: ServiceState, key: ApiKey, sent: Sent, folder: UploadF
     kind = await asyncio.to_thread(_kind_of, sent.kind, given)
     if sent.mapping is not None and kind != CHARACTER:
         raise RefusedError(422, "invalid_request", "a mapping names shapes of a character; send one, or leave it out")
+    if sent.shapes is not None and kind != CHARACTER:
+        raise RefusedError(422, "invalid_request", "shapes are those of a character; send one, or leave shapes out")
     if kind == PHOTO:
         with _photo_turn(state, key):
             folder.state(given, {"name": sent.name, **asdict(sent.photo)})
@@ -96,8 +99,8 @@ async def _checked(state: ServiceState, key: ApiKey, sent: Sent, folder: UploadF
             return await folder.resource(FACE, given, n_bytes)
     if sent.photo.makes == AVATAR:
         raise RefusedError(422, "invalid_request", "a head is made of a picture; send one, or leave out makes")
-    if sent.mapping is not None:
-        folder.state(given, {"mapping": sent.mapping})
+    if kind == CHARACTER:
+        folder.state(given, {"mapping": sent.mapping, "shapes": sent.shapes})
     checked = await folder.resource(sent.kind, given, n_bytes)
     # also a face that was made of a photo elsewhere
     if sent.kind == FACE and not state.settings.photos:

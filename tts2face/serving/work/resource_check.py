@@ -189,17 +189,18 @@ def _check_character(source: Path, out: Path) -> dict[str, Any]:
     named = source.with_name("character.glb")
     named.hardlink_to(source)
     statement = source.with_name(STATEMENT)
-    text = read_json(statement).get("mapping") if statement.exists() else None
+    stated = read_json(statement) if statement.exists() else {}
+    text = stated.get("mapping")
     mapping = None
     if text is not None:
         mapping = source.with_name("mapping.toml" if TOML_SHAPES.search(text) else "mapping.tsv")
         mapping.write_text(text, encoding="utf-8")
-    imported = import_face(named, mapping=mapping)
+    imported = import_face(named, mapping=mapping, shapes=stated.get("shapes"))
     made = out.with_name("imported.face")
     write_face(made, imported.face)
     rows = [f"{name}: {text}" for name, text in summary(imported.report)]
-    # clips as .glb are this file, written again from what was read of it
-    content = GlbWriter(read_gltf(named)).content()
+    # clips as .glb are this file, written again from what was read of it, if its own shapes move it
+    content = None if stated.get("shapes") else GlbWriter(read_gltf(named)).content()
     return _check_face(made, out, content) | {"notes": [*imported.report.notes, *rows]}
 
 

@@ -26,6 +26,7 @@ def bounded(value: Any) -> Any:
 def refusal(error: Exception, source: Path, folder: Path, content: Path) -> str:
     """The message of an error in a check of `source`, without paths of this machine; `content` is what is kept."""
     text = " ".join(str(error).split()).replace("--mapping", "the part mapping")
+    text = text.replace("--shapes transfer", "the part shapes, transfer")
     for suffix in (".tsv", ".toml"):
         text = text.replace(str(source.with_name(f"mapping{suffix}")), "the mapping")
     faces = [folder / f"{made}.face" for made in ("imported", "photo")]

@@ -136,8 +136,9 @@ def test_a_mapping_comes_with_a_character_alone(ask: Ask, monkeypatch: pytest.Mo
     """As a part of text or as a file, by its rows or its TOML; the check itself is tried in `test_resource_check`."""
     given: list[tuple[str, str]] = []
 
-    def read(_: Path, *, mapping: Path | None) -> None:
+    def read(_: Path, *, mapping: Path | None, shapes: str | None) -> None:
         assert mapping is not None
+        assert shapes is None
         given.append((mapping.suffix, mapping.read_text()))
         raise DataError("the character is damaged")
 
@@ -160,3 +161,25 @@ def test_a_mapping_comes_with_a_character_alone(ask: Ask, monkeypatch: pytest.Mo
     assert "the part mapping has up to" in ask("ann", "POST", "/v1/faces", data={"name": "x"}, files=broken).text
     other = {"data": {"name": "x", "mapping": rows}, "files": {"file": ("d", WORDS)}}
     assert "there is no part 'mapping'" in ask("ann", "POST", "/v1/dictionaries", **other).text
+
+
+def test_shapes_are_carried_to_a_character_alone(ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[str | None] = []
+
+    def read(_: Path, *, mapping: Path | None, shapes: str | None) -> None:
+        assert mapping is None
+        given.append(shapes)
+        raise DataError("the character has no shape; carry over those of a shipped head with --shapes transfer")
+
+    monkeypatch.setattr(importing, "import_face", read)
+    for shapes in ({}, {"shapes": "transfer"}):
+        answer = ask("ann", "POST", "/v1/faces", data={"name": "x", **shapes}, files={"file": ("a.glb", GLB)})
+        assert refusal(answer) == (422, "invalid_data")
+        assert "carry over those of a shipped head with the part shapes, transfer" in answer.text
+    assert given == [None, "transfer"]
+    for content, shapes, reason in (
+        (WORDS, "transfer", "shapes are those of a character; send one, or leave shapes out"),
+        (GLB, "own", "the part shapes is transfer; leave it out for its own shapes"),
+    ):
+        answer = ask("ann", "POST", "/v1/faces", data={"name": "x", "shapes": shapes}, files={"file": ("a", content)})
+        assert (answer.status_code, answer.json()["error"]["message"]) == (422, reason)

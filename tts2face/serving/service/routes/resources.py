@@ -14,6 +14,7 @@ from fastapi import Request as HttpRequest
 from fastapi.responses import JSONResponse, Response
 from starlette.datastructures import FormData, UploadFile
 
+from tts2face.interchange.characters.shapes import TRANSFER
 from tts2face.models.named_colours import EYE_COLOURS, parse_eye_colour
 from tts2face.serving.service.access import require_scope
 from tts2face.serving.service.errors import RefusedError
@@ -129,6 +130,11 @@ def _form(kind: str) -> dict[str, Any]:
             "description": "With a character: names of its shapes, in place of the guessed ones; a file of "
                            "`face import --mapping` (docs/characters.md), its rows or its TOML.",
         }  # fmt: skip
+        parts["shapes"] = {
+            "type": "string", "enum": [TRANSFER],
+            "description": "With a character: carry over the shapes of a shipped head, for a head that has none; its "
+                           "own if left out.",
+        }  # fmt: skip
         parts["consent"] = {
             "type": "string",
             "example": "I agree that my face speaks what this service is asked for.",
@@ -202,12 +208,12 @@ async def _store(request: HttpRequest, kind: str) -> StoredResource:
     state = service_state(request)
     if not request.headers.get("content-type", "").startswith("multipart/form-data"):
         raise RefusedError(422, "invalid_request", "send a form (multipart/form-data) with the parts file and name")
-    async with request.form(max_files=2, max_fields=3 + len(fields(SentPhoto))) as form:
+    async with request.form(max_files=2, max_fields=4 + len(fields(SentPhoto))) as form:
         return await store_resource(state, key, await _read_form(form, kind))
 
 
 async def _read_form(form: FormData, kind: str) -> Sent:
-    more = ["mapping", *(field.name for field in fields(SentPhoto))] if kind == FACE else []
+    more = ["mapping", "shapes", *(field.name for field in fields(SentPhoto))] if kind == FACE else []
     unknown = set(form) - {"file", "name", *more}
     name, file = form.get("name"), form.get("file")
     if unknown:
@@ -215,7 +221,11 @@ async def _read_form(form: FormData, kind: str) -> Sent:
     if not isinstance(name, str) or not isinstance(file, UploadFile):
         raise RefusedError(422, "invalid_request", "the form needs a part file, with a file name, and a part name")
     mapping = _text({"mapping": await _content(form.get("mapping"))}, "mapping", MAX_MAPPING)
-    return Sent(kind, name, file.size or 0, partial(save_upload, file), _read_choices(form), mapping)
+    shapes = form.get("shapes")
+    if shapes not in (None, TRANSFER):
+        raise RefusedError(422, "invalid_request", f"the part shapes is {TRANSFER}; leave it out for its own shapes")
+    saved = partial(save_upload, file)
+    return Sent(kind, name, file.size or 0, saved, _read_choices(form), mapping, TRANSFER if shapes else None)
 
 
 async def _content(part: UploadFile | str | None) -> object:

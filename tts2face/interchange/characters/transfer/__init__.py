@@ -1,0 +1,1 @@
+"""Shapes of a shipped head carried over to a head without any, so that it speaks."""

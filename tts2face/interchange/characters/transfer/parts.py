@@ -1,0 +1,136 @@
+"""Parts of a head that are not skin: which they are, and how they move with the skin and the jaw of the source."""
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
+
+from tts2face.interchange.characters.transfer.skin import Skin
+from tts2face.models.face import Face
+from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
+from tts2face.numeric.arrays import FloatArray, IntArray, Mask, connected_pieces, nearest_rotation, smoothstep
+
+# Beginnings of the names of parts, of shipped faces and of imported ones.
+KINDS = {
+    "skin": ("skin", "mouth"),
+    "eyes": ("eyes", "sclera", "iris"),
+    "teeth": ("teeth", "gums"),
+    "tongue": ("tongue",),
+    "soft": ("lash", "brow"),
+}
+ROOT_SHARE = 0.3  # of a card's vertices: those nearest to the skin, on which it grows
+BITE_RISE = 0.15  # of the plane in which the teeth meet, in mm per mm towards the back
+BOTH_JAWS = 0.11  # of the distance of the outer eye corners, on both sides of the bite: gums of both jaws in one piece
+STILL_MM = 0.05  # a shape that moves the source's lower teeth less does not move the jaw
+
+
+def is_kind(name: str, kind: str) -> bool:
+    """Whether a part of this name is of a kind of `KINDS`, or of none of them (``other``)."""
+    if kind == "other":
+        return not any(name.startswith(beginnings) for beginnings in KINDS.values())
+    return name.startswith(KINDS[kind])
+
+
+def triangles_of(face: Face, *kinds: str) -> Mask:
+    """(F,) triangles of the parts of these kinds."""
+    chosen = np.zeros(len(face.triangles), bool)
+    for part in face.parts:
+        if any(is_kind(part.name, kind) for kind in kinds):
+            chosen[part.first : part.first + part.count] = True
+    return chosen
+
+
+def vertices_of(face: Face, *kinds: str) -> IntArray:
+    """Vertices that triangles of the parts of these kinds use."""
+    return np.unique(face.triangles[triangles_of(face, *kinds)]).astype(np.int64)
+
+
+def jaw_shares(face: Face, landmarks: FloatArray) -> FloatArray:
+    """(V,) share of the jaw's motion that each vertex takes: 1 for lower teeth and tongue, 0 beside teeth and tongue.
+
+    A connected piece belongs to the jaw on whose side of the bite its middle lies; one that holds the gums of both is
+    divided softly, by what is nearer along its surface.
+    """
+    shares = np.zeros(len(face.vertices))
+    corners = face.triangles[triangles_of(face, "teeth", "tongue")]
+    if not len(corners):
+        return shares
+    used, flat = np.unique(corners, return_inverse=True)
+    size = float(np.linalg.norm(landmarks[EYE_OUTER_LEFT] - landmarks[EYE_OUTER_RIGHT]))
+    above = _above_bite(face.vertices[used].astype(np.float64), landmarks)
+    piece = connected_pieces(corners, len(face.vertices))[used]
+    own = np.zeros(len(used))
+    for number in np.unique(piece).tolist():
+        rows = np.flatnonzero(piece == number)
+        low, high = float(above[rows].min()), float(above[rows].max())
+        if min(-low, high) < BOTH_JAWS * size:
+            own[rows] = float(above[rows].mean() < 0)
+            continue
+        graph = _edge_graph(face.vertices[used].astype(np.float64), flat.reshape(-1, 3))
+        far = [
+            dijkstra(graph, False, seeds, min_only=True)
+            for seeds in (rows[above[rows] > 0.7 * high], rows[above[rows] < 0.7 * low])
+        ]
+        own[rows] = smoothstep(far[0][rows] / np.maximum(far[0][rows] + far[1][rows], 1e-6), 0.35, 0.65)
+    shares[used] = own
+    return shares
+
+
+def _above_bite(places: FloatArray, landmarks: FloatArray) -> FloatArray:
+    """(N,) heights of places (N, 3) above the plane in which upper and lower teeth meet."""
+    seam = landmarks[[UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID]].mean(axis=0)
+    above: FloatArray = places[:, 1] - seam[1] - BITE_RISE * (seam[2] - places[:, 2])
+    return above
+
+
+def _edge_graph(places: FloatArray, triangles: IntArray) -> sp.csr_matrix:
+    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    lengths = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1) + 1e-9
+    graph: sp.csr_matrix = sp.coo_matrix((lengths, pairs.T), (len(places),) * 2).tocsr()
+    return graph.maximum(graph.T)
+
+
+def move_jaw(
+    face: Face,
+    shapes: FloatArray,
+    shares: FloatArray,
+    teeth: tuple[FloatArray, FloatArray],
+) -> None:
+    """Move lower teeth and tongue by their shares (V,) in shapes (K, V, 3), as rigidly as the source's lower teeth.
+
+    `teeth` are places (N, 3) and displacements (K, N, 3) of the source's, in the target's millimetres.
+    """
+    jaw = np.flatnonzero(shares)
+    start, moves = teeth
+    middle = start.mean(axis=0)
+    apart = face.vertices[jaw].astype(np.float64) - middle
+    for number, moved in enumerate(moves):
+        if len(jaw) and np.abs(moved).max() >= STILL_MM:
+            there = start + moved
+            turn = nearest_rotation(np.einsum("nc,nd->cd", there - there.mean(axis=0), start - middle))
+            shapes[number, jaw] = shares[jaw, None] * (apart @ (turn - np.eye(3)).T + moved.mean(axis=0))
+
+
+def move_cards(face: Face, shapes: FloatArray, skin: Skin) -> None:
+    """Move lashes and brows in shapes (K, V, 3): each vertex with the root of its card, the root with its lid."""
+    corners = face.triangles[triangles_of(face, "soft")]
+    if not len(corners):
+        return
+    used = np.unique(corners)
+    places = face.vertices.astype(np.float64)
+    first = np.zeros(len(skin.vertices), np.int64)
+    on_skin = np.flatnonzero(skin.of_face >= 0)
+    first[skin.of_face[on_skin]] = on_skin
+    candidates = np.flatnonzero(skin.is_seen)
+    far, near = (np.asarray(found) for found in cKDTree(skin.vertices[candidates]).query(places[used]))
+    near = candidates[near]
+    piece = connected_pieces(corners, len(places))[used]
+    for number in np.unique(piece).tolist():
+        rows = np.flatnonzero(piece == number)
+        roots = rows[far[rows] <= np.quantile(far[rows], ROOT_SHARE)]
+        side = int(np.bincount(skin.side[near[roots]]).argmax())
+        # a card grows on one lid: where lids nearly touch, the nearest skin is that of the other
+        grown = near[roots] if side == 0 else skin.nearest(places[used[roots]], side)
+        of = roots[np.asarray(cKDTree(places[used[roots]]).query(places[used[rows]])[1])]
+        at = dict(zip(roots.tolist(), first[grown].tolist(), strict=True))
+        shapes[:, used[rows]] = shapes[:, [at[int(root)] for root in of]]

@@ -1,0 +1,203 @@
+"""Registration of a source head's skin with a target's, and each target vertex's place on it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.interpolate import RBFInterpolator
+from scipy.sparse.linalg import SuperLU, splu
+from scipy.spatial import cKDTree
+
+from tts2face.interchange.characters.transfer.skin import Skin
+from tts2face.models.landmarks import LEFT_LIDS, LIP_LANDMARKS, RIGHT_LIDS
+from tts2face.numeric.arrays import FloatArray, IntArray, Mask, nearest_rotation
+
+# Nose, chin and middle of the brow: on skin without texture the tracker guesses the others (decision 244).
+MIDDLE_LANDMARKS = (
+    1, 2, 4, 5, 6, 168, 195, 197, 98, 327, 129, 358, 48, 278, 64, 294, 152, 175, 199, 200, 18, 148, 377, 176, 400, 8, 9,
+    10, 151,
+)  # fmt: skip
+FEATURES = np.unique([*MIDDLE_LANDMARKS, *LIP_LANDMARKS, *np.ravel(RIGHT_LIDS), *np.ravel(LEFT_LIDS)])
+STAGES = ((1000.0, 3.0), (300.0, 1.0), (100.0, 0.2))  # smoothness, weight of a landmark
+N_ITERATIONS = 5  # of closest points in each stage
+WARP_SMOOTHING = 3.0  # of the landmarks' remainder after the similarity
+NORMAL_MM = 10.0  # distance that counts as much as a right angle between normals over root two: lips meet lips
+N_SAMPLES = 8  # nearest samples among which one with a fitting normal is sought
+MIN_COSINE = 0.5  # normals within 60 degrees
+MAX_PULL_MM = 15.0  # farther samples are no correspondence
+MAX_SLIDE_MM = 2.0  # along the tangent plane of a sample
+N_TRIANGLES = 24  # of the source around a vertex of the target, among which the nearest is sought
+OPPOSED_MM, OTHER_SIDE_MM = 8.0, 50.0  # costs of a triangle that faces away, and of one of the other lip or lid
+FACE_MM = 30.0  # from a landmark of a feature
+FADE_MM = (10.0, 35.0)  # distance from the source between which shapes fade out
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Similarity:
+    """``scale * turn @ place + shift``."""
+
+    scale: float
+    turn: FloatArray
+    shift: FloatArray
+
+    def places(self, points: FloatArray) -> FloatArray:
+        """Places (..., 3) of points (..., 3)."""
+        moved: FloatArray = self.moves(points) + self.shift
+        return moved
+
+    def moves(self, displacements: FloatArray) -> FloatArray:
+        """Displacements (..., 3), turned and scaled."""
+        turned: FloatArray = self.scale * np.einsum("...k,jk->...j", displacements, self.turn)
+        return turned
+
+
+def fit_similarity(source: FloatArray, target: FloatArray) -> Similarity:
+    """Similarity of points (N, 3) with least squares (Umeyama 1991)."""
+    here, there = source - source.mean(axis=0), target - target.mean(axis=0)
+    turn = nearest_rotation(np.einsum("nc,nd->cd", there, here))
+    scale = float(np.einsum("nc,cd,nd->", there, turn, here) / (here**2).sum())
+    return Similarity(scale, turn, target.mean(axis=0) - scale * turn @ source.mean(axis=0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Registration:
+    """The source's skin on the target's.
+
+    Parameters
+    ----------
+    similarity
+        From the source's to the target's millimetres.
+    triangles, weights : (S,), (S, 3)
+        Triangle of the source on which each vertex of the target's skin lies, and its weights there.
+    share : (S,)
+        Share of the source's motion that each takes: 0 far from the source.
+    """
+
+    similarity: Similarity
+    corners: IntArray
+    weights: FloatArray
+    share: FloatArray
+
+    def carry(self, moves: FloatArray) -> FloatArray:
+        """Displacements (K, S, 3) of the target, from those (K, R, 3) of the source's skin."""
+        scaled = self.similarity.moves(moves)
+        carried: FloatArray = np.einsum("nk,mnkd->mnd", self.weights * self.share[:, None], scaled[:, self.corners])
+        return carried
+
+
+def register(source: Skin, target: Skin, on_stage: Callable[[], object]) -> Registration:
+    """Registration by landmarks of features, then closest points of visible skin; what is hidden follows smoothly."""
+    similarity = fit_similarity(source.landmarks[FEATURES], target.landmarks[FEATURES])
+    marks, wanted = similarity.places(source.landmarks[FEATURES]), target.landmarks[FEATURES]
+    even = similarity.places(source.vertices)
+    warp = RBFInterpolator(marks, wanted - marks, kernel="linear", smoothing=WARP_SMOOTHING, degree=1)
+    start = even + warp(even)
+    held = source.nearest(source.landmarks[FEATURES])
+    goal = wanted + start[held] - marks - warp(marks)
+    laplacian, samples = source.laplacian(), _Samples(target)
+    bending = (laplacian.T @ laplacian).tocsc()
+    n, placed = len(start), start
+    for smoothness, mark in STAGES:
+        on_stage()
+        held_weights = np.bincount(held, minlength=n) * mark
+        pulled_marks = np.zeros((n, 3))
+        np.add.at(pulled_marks, held, mark * (goal - start[held]))
+        for _ in range(N_ITERATIONS):
+            there, found = samples.nearest(placed, source.normals(placed), source.side)
+            found &= source.is_seen & (np.linalg.norm(there - placed, axis=1) < MAX_PULL_MM)
+            system = smoothness * bending + sp.diags(found + held_weights + 1e-6)
+            placed = start + factorise(system).solve(found[:, None] * (there - start) + pulled_marks)
+    on_stage()
+    # the size of the face is that of the whole surface around its features; landmarks are single places
+    is_face = source.is_seen & (np.asarray(cKDTree(source.landmarks[FEATURES]).query(source.vertices)[0]) < FACE_MM)
+    similarity = fit_similarity(source.vertices[is_face], placed[is_face])
+    return Registration(similarity, *_bind(source, placed, target))
+
+
+def factorise(matrix: sp.spmatrix) -> SuperLU:
+    """Factors of a symmetric positive definite matrix."""
+    options = {"SymmetricMode": True}
+    return splu(sp.csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A", options=options, diag_pivot_thresh=0.01)
+
+
+class _Samples:
+    """Vertices and middles of the seen triangles of a skin, with their normals, by lip and lid."""
+
+    def __init__(self, skin: Skin) -> None:
+        whole = skin.triangles[skin.is_seen[skin.triangles].all(axis=1)]
+        normals = skin.normals()
+        flat = normals[whole].sum(axis=1)
+        flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-12)
+        self._places = np.concatenate([skin.vertices[skin.is_seen], skin.vertices[whole].mean(axis=1)])
+        self._normals = np.concatenate([normals[skin.is_seen], flat])
+        self._side = np.concatenate([skin.side[skin.is_seen], skin.side[whole].max(axis=1)])
+        self._trees: dict[int, tuple[cKDTree, IntArray]] = {}
+
+    def nearest(self, places: FloatArray, normals: FloatArray, side: IntArray) -> tuple[FloatArray, Mask]:
+        """Places (N, 3) on the planes of the nearest fitting samples, and whether there is one."""
+        there, found = places.copy(), np.zeros(len(places), bool)
+        for number in np.unique(side).tolist():
+            rows = np.flatnonzero(side == number)
+            tree, members = self._tree(number)
+            far, near = tree.query(np.column_stack([places[rows], NORMAL_MM * normals[rows]]), k=N_SAMPLES)
+            near = members[np.minimum(near, len(members) - 1)]
+            fits = ((self._normals[near] * normals[rows, None]).sum(axis=2) > MIN_COSINE) & np.isfinite(far)
+            best = near[np.arange(len(rows)), np.where(fits, far, np.inf).argmin(axis=1)]
+            apart = places[rows] - self._places[best]
+            off = (apart * self._normals[best]).sum(axis=1, keepdims=True) * self._normals[best]
+            slide = apart - off
+            length = np.linalg.norm(slide, axis=1, keepdims=True)
+            there[rows] = self._places[best] + slide * np.minimum(1.0, MAX_SLIDE_MM / np.maximum(length, 1e-9))
+            found[rows] = fits.any(axis=1)
+        return there, found
+
+    def _tree(self, side: int) -> tuple[cKDTree, IntArray]:
+        if side not in self._trees:
+            members = np.flatnonzero((self._side == side) | (self._side == 0) if side else self._side >= 0)
+            at = np.column_stack([self._places[members], NORMAL_MM * self._normals[members]])
+            self._trees[side] = cKDTree(at), members
+        return self._trees[side]
+
+
+def _bind(source: Skin, placed: FloatArray, target: Skin) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Vertices (S, 3) of the registered source's triangle under each vertex of the target, weights, share of motion."""
+    corners = placed[source.triangles]
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    near = np.asarray(cKDTree(corners.mean(axis=1)).query(target.vertices, k=N_TRIANGLES)[1])
+    weights, far = nearest_on_triangles(target.vertices[:, None], corners[near])
+    cost = far + OPPOSED_MM * ((flat[near] * target.normals()[:, None]).sum(axis=2) < 0)
+    side = source.side[source.triangles].max(axis=1)[near]
+    own = target.side[:, None]
+    cost += OTHER_SIDE_MM * ((side > 0) & (own > 0) & (side != own))
+    row, best = np.arange(len(near)), cost.argmin(axis=1)
+    share = 1.0 - np.clip((far[row, best] - FADE_MM[0]) / (FADE_MM[1] - FADE_MM[0]), 0.0, 1.0)
+    return source.triangles[near[row, best]], weights[row, best], share
+
+
+def nearest_on_triangles(places: FloatArray, corners: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Weights (..., 3) of the points of triangles (..., 3, 3) nearest to places (..., 3), and the distances (...).
+
+    The best of the face and of the three edges. Source: Ericson 2005, Real-Time Collision Detection, section 5.1.5.
+    """
+    a, b, c = (corners[..., k, :] for k in range(3))
+    first, second, there = b - a, c - a, places - a
+    ee, eg, gg = ((u * v).sum(axis=-1) for u, v in ((first, first), (first, second), (second, second)))
+    de, dg = ((there * v).sum(axis=-1) for v in (first, second))
+    area = np.maximum(ee * gg - eg * eg, 1e-20)
+    u, w = (gg * de - eg * dg) / area, (ee * dg - eg * de) / area
+    along_first = np.clip(de / np.maximum(ee, 1e-20), 0.0, 1.0)
+    along_second = np.clip(dg / np.maximum(gg, 1e-20), 0.0, 1.0)
+    third = c - b
+    along_third = ((places - b) * third).sum(axis=-1) / np.maximum((third * third).sum(axis=-1), 1e-20)
+    along_third = np.clip(along_third, 0.0, 1.0)
+    none = np.zeros_like(u)
+    candidates = np.stack([
+        np.stack([1.0 - u - w, u, w], axis=-1), np.stack([1.0 - along_first, along_first, none], axis=-1),
+        np.stack([1.0 - along_second, none, along_second], axis=-1),
+        np.stack([none, 1.0 - along_third, along_third], axis=-1),
+    ])  # fmt: skip
+    far = np.linalg.norm(np.einsum("k...i,...id->k...d", candidates, corners) - places, axis=-1)
+    far[0] = np.where((candidates[0] >= 0).all(axis=-1), far[0], np.inf)
+    best = far.argmin(axis=0)
+    return np.take_along_axis(candidates, best[None, ..., None], axis=0)[0], far.min(axis=0)
