@@ -272,8 +272,8 @@ def _without_mouth(character: Character) -> str:
     if vowels:
         return (
             f"the character's mouth is painted: {_some(sorted(set(vowels)))} exchange textures or colours and move no "
-            "vertex, so speech cannot move it; take a character whose mouth has shapes, or, if the mesh has lips, carry "
-            "over those of a shipped head with --shapes transfer"
+            "vertex, so speech cannot move it; take a character whose mouth has shapes, or, if its mesh has lips, "
+            "carry over those of a shipped head with --shapes transfer"
         )
     empty = f"; {_some(character.still_names)} move no vertex" if character.still_names else ""
     return (

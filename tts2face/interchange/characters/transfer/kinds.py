@@ -73,7 +73,8 @@ def _skin_pieces(
     # lashes lie under some landmarks, too
     lids = cKDTree(landmarks[list({*np.ravel(LEFT_LIDS), *np.ravel(RIGHT_LIDS)})])
     is_lash = [_is_lash(head.vertices[np.unique(head.triangles[component == number])], lids, size) for number in hit]
-    return hit[~np.array(is_lash, bool)]
+    skin: IntArray = hit[~np.array(is_lash, bool)]
+    return skin
 
 
 def _is_lash(places: FloatArray, lids: cKDTree, size: float) -> bool:

@@ -1,10 +1,13 @@
 """Parts of a head that are not skin: which they are, and how they move with the skin and the jaw of the source."""
 
+from dataclasses import replace
+
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
+from tts2face.interchange.characters.transfer.registration import Similarity
 from tts2face.interchange.characters.transfer.skin import Skin
 from tts2face.models.face import Face
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
@@ -12,7 +15,8 @@ from tts2face.numeric.arrays import FloatArray, IntArray, Mask, connected_pieces
 
 # Beginnings of the names of parts, of shipped faces and of imported ones.
 KINDS = {
-    "skin": ("skin", "mouth"),
+    "skin": ("skin",),
+    "mouth": ("mouth",),
     "eyes": ("eyes", "sclera", "iris"),
     "teeth": ("teeth", "gums"),
     "tongue": ("tongue",),
@@ -109,6 +113,27 @@ def move_jaw(
             there = start + moved
             turn = nearest_rotation(np.einsum("nc,nd->cd", there - there.mean(axis=0), start - middle))
             shapes[number, jaw] = shares[jaw, None] * (apart @ (turn - np.eye(3)).T + moved.mean(axis=0))
+
+
+def add_teeth(face: Face, source: Face, similarity: Similarity) -> Face:
+    """Face without shapes that has the source's teeth, gums and tongue, too."""
+    parts = [part for part in source.parts if is_kind(part.name, "teeth") or is_kind(part.name, "tongue")]
+    corners = np.concatenate([source.triangles[part.first : part.first + part.count] for part in parts])
+    used, corners = np.unique(corners, return_inverse=True)
+    firsts = len(face.triangles) + np.cumsum([0, *(part.count for part in parts)])
+    n = len(face.vertices) + len(used)
+    added = tuple(
+        replace(part, name=f"{'tongue' if part.name == 'tongue' else 'teeth'}:{part.name}", first=int(first))
+        for part, first in zip(parts, firsts, strict=False)
+    )
+    return replace(
+        face,
+        vertices=np.concatenate([face.vertices, similarity.places(source.vertices[used])]).astype(np.float32),
+        colours=np.concatenate([face.colours, source.colours[used]]),
+        uv=None if face.uv is None else np.concatenate([face.uv, np.zeros((len(used), 2), np.float32)]),
+        triangles=np.concatenate([face.triangles, len(face.vertices) + corners.reshape(-1, 3)]).astype(np.int32),
+        parts=(*face.parts, *added), shapes=np.zeros((0, n, 3), np.float32),
+    )  # fmt: skip
 
 
 def move_cards(face: Face, shapes: FloatArray, skin: Skin) -> None:

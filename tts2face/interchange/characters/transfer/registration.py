@@ -28,6 +28,7 @@ MIN_COSINE = 0.5  # normals within 60 degrees
 MAX_PULL_MM = 15.0  # farther samples are no correspondence
 MAX_SLIDE_MM = 2.0  # along the tangent plane of a sample
 N_TRIANGLES = 24  # of the source around a vertex of the target, among which the nearest is sought
+HIDDEN_MM = 20.0  # cost of a hidden triangle for a vertex that is seen
 OPPOSED_MM, OTHER_SIDE_MM = 8.0, 50.0  # costs of a triangle that faces away, and of one of the other lip or lid
 FACE_MM = 30.0  # from a landmark of a feature
 FADE_MM = (10.0, 35.0)  # distance from the source between which shapes fade out
@@ -170,6 +171,9 @@ def _bind(source: Skin, placed: FloatArray, target: Skin) -> tuple[IntArray, Flo
     side = source.side[source.triangles].max(axis=1)[near]
     own = target.side[:, None]
     cost += OTHER_SIDE_MM * ((side > 0) & (own > 0) & (side != own))
+    is_inside = np.asarray(~source.is_seen[source.triangles].any(axis=1))
+    # the inside of the source's mouth lies close behind the lips, and moves otherwise
+    cost += HIDDEN_MM * (target.is_seen[:, None] & is_inside[near])
     row, best = np.arange(len(near)), cost.argmin(axis=1)
     share = 1.0 - np.clip((far[row, best] - FADE_MM[0]) / (FADE_MM[1] - FADE_MM[0]), 0.0, 1.0)
     return source.triangles[near[row, best]], weights[row, best], share

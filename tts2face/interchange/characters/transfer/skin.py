@@ -87,12 +87,14 @@ class Skin:
         return moved
 
 
-def build_skin(face: Face, landmarks: FloatArray) -> Skin:
-    """Skin of a face whose landmarks (468, 3) are known."""
+def build_skin(face: Face, landmarks: FloatArray, cut: IntArray | None = None) -> Skin:
+    """Skin of a face whose landmarks (468, 3) are known; `cut` (V,) is 1 and 2 for vertices of lips that are parted."""
     corners = part_triangles(face, SKIN)
     used, flat = np.unique(corners, return_inverse=True)
     places = face.vertices[used].astype(np.float64)
-    _, first, welded = np.unique(np.rint(places / WELD_MM), axis=0, return_index=True, return_inverse=True)
+    lip = np.zeros(len(used), np.int64) if cut is None else cut[used]
+    keys = np.column_stack([np.rint(places / WELD_MM), lip])
+    _, first, welded = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     welded = welded.ravel()
     triangles = welded[flat].reshape(-1, 3)
     is_whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
@@ -101,7 +103,7 @@ def build_skin(face: Face, landmarks: FloatArray) -> Skin:
     hidden = np.zeros(len(first))
     np.maximum.at(hidden, welded, hidden_shares(face)[used])
     skin = Skin(places[first], triangles[is_whole], of_face, hidden < BURIED, landmarks)
-    return replace(skin, side=_sides(skin))
+    return replace(skin, side=_sides(skin, lip[first]))
 
 
 def hidden_shares(face: Face) -> FloatArray:
@@ -113,14 +115,19 @@ def hidden_shares(face: Face) -> FloatArray:
     return shares
 
 
-def _sides(skin: Skin) -> IntArray:
-    """Lip or lid (S,) whose line of landmarks is nearer along the surface: an opening separates them."""
+def _sides(skin: Skin, lip: IntArray) -> IntArray:
+    """Lip or lid (S,) whose line of landmarks is nearer along the surface: an opening separates them.
+
+    `lip` (S,) is 1 and 2 for vertices that are known to be of the upper and the lower lip.
+    """
     graph, side = skin.graph(), np.zeros(len(skin.vertices), np.int64)
     for number, lines in enumerate(RINGS):
         corners = skin.landmarks[[lines[0][0], lines[0][-1]]]
         reach = REACH * float(np.linalg.norm(corners[0] - corners[1]))
         # the corners belong to both lines, and their neighbours to either
         seeds = [np.unique(skin.nearest(skin.landmarks[list(line[2:-2])])) for line in lines]
+        if number == 0:
+            seeds = [np.union1d(rows, np.flatnonzero(lip == k)) for k, rows in enumerate(seeds, 1)]
         upper, lower = (dijkstra(graph, False, rows, min_only=True, limit=reach) for rows in seeds)
         is_near = np.isfinite(np.minimum(upper, lower))
         side[is_near] = 2 * number + np.where(upper <= lower, 1, 2)[is_near]

@@ -36,7 +36,9 @@ def locate_bare_landmarks(face: Face, model: Path | None = None) -> LocatedLandm
             "the head's face is recognised in fewer than half of its pictures; give the axis that it looks along with "
             "--front, or the positions of its landmarks with --landmarks"
         )
-    return replace(located, points=SurfacePoints(rows[located.points.vertices], located.points.weights))
+    return replace(
+        located, points=SurfacePoints(rows[located.points.vertices].astype(np.int64), located.points.weights)
+    )
 
 
 def without_colours(face: Face) -> Face:

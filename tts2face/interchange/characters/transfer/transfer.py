@@ -4,7 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 
+from lexicon.errors import DataError
 from tts2face.face.eyelids import BLINK_SHAPES, SIDES
 from tts2face.interchange.characters.landmarks import SKIN, part_triangles
 from tts2face.interchange.characters.surface_points import nearest_points
@@ -18,13 +20,29 @@ from tts2face.interchange.characters.transfer.lids import (
     seen_eyeball,
     shut_lids,
 )
-from tts2face.interchange.characters.transfer.parts import jaw_shares, move_cards, move_jaw, vertices_of
+from tts2face.interchange.characters.transfer.mouth_cut import (
+    RELIEF,
+    OpenedMouth,
+    is_closed,
+    lip_relief,
+    open_mouth,
+)
+from tts2face.interchange.characters.transfer.parts import add_teeth, jaw_shares, move_cards, move_jaw, vertices_of
 from tts2face.interchange.characters.transfer.registration import Registration, Similarity, register
 from tts2face.interchange.characters.transfer.skin import Skin, build_skin
 from tts2face.interchange.characters.transfer.source import Source, choose_source, load_source, own_landmarks
 from tts2face.models.face import Face
-from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
+from tts2face.models.landmarks import (
+    EYE_OUTER_LEFT,
+    EYE_OUTER_RIGHT,
+    INNER_LIP_LOWER,
+    INNER_LIP_UPPER,
+    LOWER_LIP_INNER_MID,
+    UPPER_LIP_INNER_MID,
+)
 from tts2face.numeric.arrays import FloatArray
+
+N_SMOOTHED = 3  # rounds in which displacements of cut lips become smooth
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,25 +68,75 @@ def transfer_shapes(
     on_step
         Called after each of seven steps.
     """
-    landmarks = lids_in_sight(face, own_landmarks(face))
-    face = _with_landmarks(face, landmarks)
+    given, landmarks = face, lids_in_sight(face, own_landmarks(face))
+    face = _with_landmarks(_without_shapes(face), landmarks)
     head = load_source(source or choose_source(landmarks), is_tracked=is_tracked)
     on_step()
-    skin = build_skin(face, landmarks)
+    face, skin, opened = _with_parted_lips(face, landmarks, head)
     registration = register(head.skin, skin, on_step)
-    moves = head.moves()
-    shapes = registration.carry(moves)
-    shapes, notes = _lids(face, skin, head, shapes, registration)
+    carried = registration.carry(head.moves())
+    if opened is not None:
+        carried = _smoothed(skin, carried)
+    shapes, notes = _lids(face, skin, head, carried, registration)
+    similarity = _at_lips(registration.similarity, head, skin.landmarks)
+    shares = np.zeros(len(face.vertices))
+    if opened is not None:
+        shares[opened.rows] = opened.jaw
+        notes = [
+            *notes,
+            "the mouth was closed: its lips are cut apart, and a mouth with teeth lies behind them",
+        ]
     spread = skin.spread(shapes)
-    move_jaw(face, spread, jaw_shares(face, landmarks), _lower_teeth(head, registration.similarity, landmarks))
+    if opened is not None:
+        spread[:, opened.rows] = 0.0
+    if opened is not None and not len(vertices_of(face, "teeth", "tongue")):
+        face = add_teeth(face, head.face, similarity)
+        n_added = len(face.vertices) - len(shares)
+        shares, spread = np.pad(shares, (0, n_added)), np.pad(spread, ((0, 0), (0, n_added), (0, 0)))
+    move_jaw(face, spread, np.maximum(shares, jaw_shares(face, skin.landmarks)), _lower_teeth(head, similarity))
+    if opened is not None:
+        spread[:, opened.rows] += opened.shares[:, None] * spread[:, opened.lips]
     move_cards(face, spread, skin)
     made = replace(
         face,
         shape_names=head.shape_names,
         shapes=spread.astype(np.float32),
         limits=np.tile(np.array([0.0, 1.0], np.float32), (len(head.shape_names), 1)),
+        eyes=given.eyes,
     )
     return Transferred(made, head.name, tuple(notes))
+
+
+def _without_shapes(face: Face) -> Face:
+    return replace(
+        face, shape_names=(), shapes=np.zeros((0, *face.vertices.shape), np.float32), occlusion=None,
+        limits=np.zeros((0, 2), np.float32), eyes=tuple(replace(eye, turns={}) for eye in face.eyes),
+    )  # fmt: skip
+
+
+def _with_parted_lips(face: Face, landmarks: FloatArray, head: Source) -> tuple[Face, Skin, OpenedMouth | None]:
+    """The face and its skin, whose lips are cut apart where they were one surface."""
+    skin = build_skin(face, landmarks)
+    if not is_closed(skin):
+        return face, skin, None
+    relief = lip_relief(face, landmarks)
+    if relief < RELIEF:
+        raise DataError(
+            f"the mouth has no relief (lips and groove rise by {100 * relief:.1f} % of the distance of the eyes' "
+            f"corners, of at least {100 * RELIEF:.1f} %): it is painted, so it cannot open; take a head with lips"
+        )
+    corners = [EYE_OUTER_LEFT, EYE_OUTER_RIGHT]
+    apart = [float(np.linalg.norm(np.subtract(*places[corners]))) for places in (landmarks, head.skin.landmarks)]
+    opened = open_mouth(face, skin, apart[0] / apart[1])
+    if opened is None:
+        return face, skin, None
+    found = landmarks.copy()
+    lips = list({*INNER_LIP_UPPER, *INNER_LIP_LOWER})
+    found[lips] = own_landmarks(opened.face)[lips]
+    parted = build_skin(opened.face, found, opened.sides)
+    # there is no inside of a mouth: the bottom of the groove between the lips is their edge
+    is_lip = (parted.side == 1) | (parted.side == 2)
+    return opened.face, replace(parted, is_seen=parted.is_seen | is_lip), opened
 
 
 def _with_landmarks(face: Face, landmarks: FloatArray) -> Face:
@@ -109,11 +177,26 @@ def _shuts(face: Face, skin: Skin, shapes: FloatArray, blinks: list[int]) -> boo
     return True
 
 
-def _lower_teeth(head: Source, similarity: Similarity, landmarks: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Places (N, 3) and displacements (K, N, 3) of the source's lower teeth, its line of lips on the target's."""
+def _smoothed(skin: Skin, shapes: FloatArray) -> FloatArray:
+    """Shapes (K, S, 3) whose displacements of the lips are smooth along each of them, for edges that were cut."""
+    is_lip = (skin.side == 1) | (skin.side == 2)
+    graph = skin.graph(is_weighted=False)
+    mean = sp.diags(1.0 / np.maximum(np.asarray(graph.sum(axis=1)).ravel(), 1.0)) @ graph
+    flat = np.moveaxis(shapes, 1, 0).reshape(len(skin.vertices), -1)
+    for _ in range(N_SMOOTHED):
+        flat = np.where(is_lip[:, None], (flat + mean @ flat) / 2, flat)
+    return np.moveaxis(flat.reshape(len(skin.vertices), len(shapes), 3), 1, 0)
+
+
+def _at_lips(similarity: Similarity, head: Source, landmarks: FloatArray) -> Similarity:
+    """The similarity, moved so that the source's line of lips lies on the target's."""
     lips = [UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID]
-    shift = landmarks[lips].mean(axis=0) - similarity.places(head.skin.landmarks[lips].mean(axis=0))
+    off = landmarks[lips].mean(axis=0) - similarity.places(head.skin.landmarks[lips].mean(axis=0))
+    return replace(similarity, shift=similarity.shift + off)
+
+
+def _lower_teeth(head: Source, similarity: Similarity) -> tuple[FloatArray, FloatArray]:
+    """Places (N, 3) and displacements (K, N, 3) of the source's lower teeth in the target's millimetres."""
     part = next(part for part in head.face.parts if part.name == "teeth_lower")
     rows = np.unique(head.face.triangles[part.first : part.first + part.count])
-    places = similarity.places(head.face.vertices[rows].astype(np.float64)) + shift
-    return places, similarity.moves(head.shapes(rows))
+    return similarity.places(head.face.vertices[rows].astype(np.float64)), similarity.moves(head.shapes(rows))
