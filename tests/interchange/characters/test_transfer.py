@@ -47,7 +47,7 @@ def test_nearest_points_of_triangles_are_those_of_dense_samples() -> None:
 
 def test_what_is_seen_is_the_foremost() -> None:
     square = np.array([[0.0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]])
-    places = np.concatenate([square, square * [0.5, 1, 1] + [0, 0, 1.0]])
+    places = np.concatenate([square, square * [0.45, 1, 1] + [0, 0, 1.0]])
     triangles = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
     sight = look(places, triangles, (np.zeros(3), np.full(3, 4.0)), 0.5)
     assert sight.depth.shape == (8, 8)

@@ -190,13 +190,13 @@ def import_face(  # noqa: PLR0913 - one parameter an option
     if front is not None and front not in FRONTS:
         raise InputError(f"there is no front {front!r}; choose {', '.join(FRONTS)}")
     is_transferred = _is_transfer(shapes, mapping)
+    made_of: dict[str, Any]
     character = read_character(path)
     chosen = {} if is_transferred else _complete_mapping(character, mapping)
     table = None if landmarks is None else read_landmark_table(Path(landmarks))
     step = _step_counter(on_progress)
     if is_transferred:
-        head, provisional = _shapeless_head(character, front, table, model)
-        views = None
+        (head, provisional), views = _shapeless_head(character, front, table, model), None
         step()
     elif table is None:
         head, provisional, views = _find_front(_turned_heads(character, chosen, front), character, model)
@@ -212,8 +212,7 @@ def import_face(  # noqa: PLR0913 - one parameter an option
     step()
     if is_transferred:
         carried = transfer_shapes(face, is_tracked=table is None, on_step=step)
-        face, notes = carried.face, [*carried.notes]
-        made_of: dict[str, Any] = {"shapes_from": carried.source}
+        face, notes, made_of = carried.face, [*carried.notes], {"shapes_from": carried.source}
     else:
         notes = [WITHOUT_LANDMARKS]
         if located is not NO_LANDMARKS:

@@ -23,7 +23,8 @@ KINDS = {
     "soft": ("lash", "brow"),
 }
 ROOT_SHARE = 0.3  # of a card's vertices: those nearest to the skin, on which it grows
-BITE_RISE = 0.15  # of the plane in which the teeth meet, in mm per mm towards the back
+BITE = -0.02  # of the distance of the outer eye corners: height over the lips' line at which teeth meet
+BITE_RISES = (0.0, 0.08, 0.15, 0.22)  # of the plane in which they meet, in mm per mm towards the back
 BOTH_JAWS = 0.11  # of the distance of the outer eye corners, on both sides of the bite: gums of both jaws in one piece
 STILL_MM = 0.05  # a shape that moves the source's lower teeth less does not move the jaw
 
@@ -56,13 +57,18 @@ def jaw_shares(face: Face, landmarks: FloatArray) -> FloatArray:
     divided softly, by what is nearer along its surface.
     """
     shares = np.zeros(len(face.vertices))
-    corners = face.triangles[triangles_of(face, "teeth", "tongue")]
+    is_tongue = np.zeros(len(face.triangles), bool)
+    for part in face.parts:
+        if is_kind(part.name, "tongue") and "gum" not in part.name.lower():
+            is_tongue[part.first : part.first + part.count] = True
+    shares[face.triangles[is_tongue]] = 1.0
+    corners = face.triangles[triangles_of(face, "teeth", "tongue") & ~is_tongue]
     if not len(corners):
         return shares
     used, flat = np.unique(corners, return_inverse=True)
     size = float(np.linalg.norm(landmarks[EYE_OUTER_LEFT] - landmarks[EYE_OUTER_RIGHT]))
-    above = _above_bite(face.vertices[used].astype(np.float64), landmarks)
-    piece = connected_pieces(corners, len(face.vertices))[used]
+    piece = np.unique(connected_pieces(corners, len(face.vertices))[used], return_inverse=True)[1].reshape(-1)
+    above = _above_bite(face.vertices[used].astype(np.float64), piece, landmarks, size)
     own = np.zeros(len(used))
     for number in np.unique(piece).tolist():
         rows = np.flatnonzero(piece == number)
@@ -80,11 +86,22 @@ def jaw_shares(face: Face, landmarks: FloatArray) -> FloatArray:
     return shares
 
 
-def _above_bite(places: FloatArray, landmarks: FloatArray) -> FloatArray:
-    """(N,) heights of places (N, 3) above the plane in which upper and lower teeth meet."""
+def _above_bite(places: FloatArray, piece: IntArray, landmarks: FloatArray, size: float) -> FloatArray:
+    """(N,) heights of places (N, 3) above the plane in which upper and lower teeth meet.
+
+    The plane is that near the line of the lips which leaves the widest gap between the middles of the pieces.
+    """
     seam = landmarks[[UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID]].mean(axis=0)
-    above: FloatArray = places[:, 1] - seam[1] - BITE_RISE * (seam[2] - places[:, 2])
-    return above
+    best = -np.inf
+    found: FloatArray = places[:, 1] - seam[1]
+    for rise in BITE_RISES:
+        above = places[:, 1] - seam[1] - rise * (seam[2] - places[:, 2])
+        middles = np.sort(np.bincount(piece, above) / np.bincount(piece))
+        between, gaps = (middles[1:] + middles[:-1]) / 2, np.diff(middles)
+        scores = gaps - 2 * np.abs(between - BITE * size)
+        if len(scores) and scores.max() > best:
+            best, found = float(scores.max()), above - between[scores.argmax()]
+    return found
 
 
 def _edge_graph(places: FloatArray, triangles: IntArray) -> sp.csr_matrix:
