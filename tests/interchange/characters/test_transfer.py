@@ -8,17 +8,26 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tests.interchange.characters.made import Variant, head_without_mouth, shipped_head, write_character_file
+from tests.interchange.characters.made import head_without_mouth, shipped_head, write_character_file
 from tts2face.face.eyelids import build_eyelid_model
 from tts2face.interchange.characters.importing import import_face
-from tts2face.interchange.characters.transfer.mouth_cut import is_closed
+from tts2face.interchange.characters.transfer.mouth_cut import MOUTH, RELIEF, is_closed, lip_relief, open_mouth
 from tts2face.interchange.characters.transfer.parts import jaw_shares
 from tts2face.interchange.characters.transfer.registration import fit_similarity, nearest_on_triangles
-from tts2face.interchange.characters.transfer.sight import look
+from tts2face.interchange.characters.transfer.sight import view_ahead
 from tts2face.interchange.characters.transfer.skin import build_skin
 from tts2face.interchange.characters.transfer.source import DRAWN, REALISTIC, choose_source, eye_height, own_landmarks
-from tts2face.models.face import Face
+from tts2face.models.face import Face, FacePart
 from tts2face.models.face_loading import load_face
+from tts2face.models.landmarks import (
+    INNER_LIP_LOWER,
+    INNER_LIP_UPPER,
+    LEFT_LIDS,
+    N_MESH_LANDMARKS,
+    OUTER_LIP_LOWER,
+    OUTER_LIP_UPPER,
+    RIGHT_LIDS,
+)
 
 
 def test_a_similarity_is_found_again() -> None:
@@ -49,7 +58,7 @@ def test_what_is_seen_is_the_foremost() -> None:
     square = np.array([[0.0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]])
     places = np.concatenate([square, square * [0.45, 1, 1] + [0, 0, 1.0]])
     triangles = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
-    sight = look(places, triangles, (np.zeros(3), np.full(3, 4.0)), 0.5)
+    sight = view_ahead(places, triangles, (np.zeros(3), np.full(3, 4.0)), 0.5)
     assert sight.depth.shape == (8, 8)
     np.testing.assert_allclose(sight.heights(np.array([True, True, False, False])), [0] * 4 + [4.0] * 4)
 
@@ -93,32 +102,70 @@ def test_options_without_effect_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_head_without_shapes_is_offered_the_transfer(tmp_path: Path) -> None:
-    bare = write_character_file(tmp_path / "bare.glb", face=_shapeless())
+    bare = write_character_file(tmp_path / "bare.glb", face=shapeless_head())
     with pytest.raises(DataError, match="carry over those of a shipped head with --shapes transfer"):
         import_face(bare)
 
 
+def test_lips_in_one_piece_are_cut_apart_and_a_mouth_lies_behind_them() -> None:
+    face, landmarks = _plate()
+    skin = build_skin(face, landmarks)
+    assert is_closed(skin)
+    assert lip_relief(face, landmarks) < RELIEF  # a plate is a painted mouth
+    opened = open_mouth(face, skin, 1.0)
+    assert opened is not None
+    upper, lower = (np.flatnonzero(opened.sides == side) for side in (1, 2))
+    places = opened.face.vertices
+    np.testing.assert_allclose(np.sort(places[upper, 0]), np.sort(places[lower, 0]))
+    assert np.ptp(places[upper, 0]) > 40.0  # of a mouth of 50 mm
+    assert np.abs(places[np.concatenate([upper, lower]), 1]).max() < 0.2
+    corners = opened.face.triangles
+    moved = places.astype(np.float64).copy()
+    moved[upper, 1] += 5.0
+    flat = np.cross(moved[corners[:, 1]] - moved[corners[:, 0]], moved[corners[:, 2]] - moved[corners[:, 0]])
+    skin_part = opened.face.parts[0]
+    assert (flat[: skin_part.first + skin_part.count, 2] > -1e-6).sum() > 0.9 * skin_part.count  # none is turned over
+    assert opened.face.parts[-1].name == MOUTH
+    assert (places[opened.rows, 2] < 0).all()
+    parted = build_skin(opened.face, landmarks, opened.sides)
+    assert not is_closed(parted)
+
+
+def _plate() -> tuple[Face, np.ndarray]:
+    """A plate of 120 x 120 mm as a face, and landmarks of a mouth in its middle and of eyes above it."""
+    x, y = np.meshgrid(np.linspace(-60, 60, 49), np.linspace(-59, 61, 49))
+    places = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    at = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = at[:-1, :-1].ravel(), at[:-1, 1:].ravel(), at[1:, 1:].ravel(), at[1:, :-1].ravel()
+    corners = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    landmarks = np.zeros((N_MESH_LANDMARKS, 3))
+    lines = ((INNER_LIP_UPPER, 0, 0), (INNER_LIP_LOWER, 0, 0), (OUTER_LIP_UPPER, 0, 7), (OUTER_LIP_LOWER, 0, -7))
+    lids = [(line, side * 30, 40 + high) for side, ring in ((-1, RIGHT_LIDS), (1, LEFT_LIDS))
+            for line, high in zip(ring, (4, -4), strict=True)]  # fmt: skip
+    for line, middle, height in (*lines, *lids):
+        half = 25.0 if middle == 0 else 14.0
+        landmarks[list(line), 0] = middle + np.linspace(-half, half, len(line))
+        landmarks[list(line), 1] = height
+    part = FacePart("skin:plate", 0, len(corners))
+    empty = np.zeros((0, 3))
+    return Face(
+        vertices=places.astype(np.float32), triangles=corners.astype(np.int32), parts=(part,), shape_names=(),
+        shapes=np.zeros((0, len(places), 3), np.float32), limits=np.zeros((0, 2), np.float32), eyes=(),
+        colours=np.full((len(places), 3), 200, np.uint8), uv=None, textures=(), landmarks=np.zeros(0, np.int32),
+        landmark_vertices=empty.astype(np.int32), landmark_weights=empty.astype(np.float32),
+        pivot=np.zeros(3, np.float32),
+    ), landmarks  # fmt: skip
+
+
 @cache
-def _shapeless() -> Face:
+def shapeless_head() -> Face:
+    """Skin and eyes of the shipped head without its shapes."""
     head = head_without_mouth()
-    return replace(head, shape_names=(), shapes=head.shapes[:0], limits=head.limits[:0], eyes=_still(head))
-
-
-def _still(head: Face) -> tuple:
-    return tuple(replace(eye, turns={}) for eye in head.eyes)
-
-
-@pytest.mark.build
-@pytest.mark.usefixtures("face_model")
-def test_the_shapes_of_a_head_come_back(tmp_path: Path) -> None:
-    """The shipped head without its shapes, turned aside: its own are carried over to it."""
-    path = write_character_file(tmp_path / "bare.glb", Variant(turn_deg=22.0), face=_shapeless())
-    steps: list[tuple[int, int]] = []
-    imported = import_face(path, shapes="transfer", on_progress=lambda done, of: steps.append((done, of)))
-    face, head = imported.face, head_without_mouth()
-    assert face.metadata["shapes_from"] == "head"
-    assert "character" not in face.metadata
-    assert len(face.eyes) == 2
-    assert steps[-1][0] == len(steps) <= steps[-1][1]
-    jaw = face.shapes[face.shape_names.index("jawOpen")]
-    assert np.abs(jaw).max() == pytest.approx(np.abs(head.shapes[head.shape_names.index("jawOpen")]).max(), rel=0.1)
+    eyes = tuple(replace(eye, turns={}) for eye in head.eyes)
+    return replace(
+        head,
+        shape_names=(),
+        shapes=head.shapes[:0],
+        limits=head.limits[:0],
+        eyes=tuple(replace(eye, turns={}) for eye in head.eyes),
+    )

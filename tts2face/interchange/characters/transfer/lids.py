@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from tts2face.interchange.characters.transfer.parts import triangles_of, vertices_of
 from tts2face.interchange.characters.transfer.registration import Similarity, factorise
-from tts2face.interchange.characters.transfer.sight import look
+from tts2face.interchange.characters.transfer.sight import view_ahead
 from tts2face.interchange.characters.transfer.skin import Skin
 from tts2face.models.face import Face
 from tts2face.models.landmarks import LEFT_LIDS, RIGHT_LIDS
@@ -18,7 +18,7 @@ LIDS = {"Right": RIGHT_LIDS, "Left": LEFT_LIDS}
 MIN_COLUMNS = 8  # of cells in which an eyeball is seen, for an eye to have edges
 SIGHT_STEP_MM = 0.5
 LID_SHAPES = ("eyeBlink", "eyeWide", "eyeSquint", "eyeLook")
-SEEN_MM = 0.25  # of an eyeball in a blink from which the lids do not shut
+SEEN_MM = 0.1  # of an eyeball in a blink above which the lids do not shut; a cell of the view has .25
 MAX_CROSSING = 1.25  # of the opening: a blink that closes more overshoots
 PULL, LOWER_HELD, SMOOTH = 20.0, 6.0, 20.0  # weights of a pair of lids, of the lower lid's rest, of smoothness
 FREE, FIXED = 1e-3, 1e3  # weights of rest near the lids and beyond `LID_REACH_MM`
@@ -53,7 +53,7 @@ def lids_in_sight(face: Face, landmarks: FloatArray) -> FloatArray:
     for centre, radius in eyeballs(face):
         lids = min(LIDS.values(), key=lambda lids: float(np.linalg.norm(landmarks[[*lids[0]]].mean(axis=0) - centre)))
         box = (centre - 1.2 * radius, centre + 1.2 * radius)
-        sight = look(places, face.triangles[shown], box, SIGHT_STEP_MM)
+        sight = view_ahead(places, face.triangles[shown], box, SIGHT_STEP_MM)
         seen = np.append(is_eye[shown], False)[sight.triangle]
         edges = {}
         for column in range(len(seen)):
@@ -101,7 +101,7 @@ def seen_eyeball(face: Face, landmarks: FloatArray, places: FloatArray, side: st
     around = landmarks[list({*LIDS[side][0], *LIDS[side][1]})]
     is_eye = triangles_of(face, "eyes")
     shown = is_eye | triangles_of(face, "skin")
-    sight = look(places, face.triangles[shown], (around.min(axis=0) - 2.0, around.max(axis=0) + 2.0))
+    sight = view_ahead(places, face.triangles[shown], (around.min(axis=0) - 2.0, around.max(axis=0) + 2.0))
     return float(sight.heights(is_eye[shown]).max(initial=0.0))
 
 

@@ -8,7 +8,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from tts2face.interchange.characters.surface import SHADING
 from tts2face.interchange.characters.transfer.parts import triangles_of
-from tts2face.interchange.characters.transfer.sight import look
+from tts2face.interchange.characters.transfer.sight import view_ahead
 from tts2face.interchange.characters.transfer.skin import Skin
 from tts2face.models.face import VERTEX_COLOURS, Face, FacePart
 from tts2face.models.landmarks import (
@@ -31,7 +31,7 @@ LEAST_SPAN = 0.15  # of the mouth's width: shorter stretches of cut triangles be
 # Depth behind the lips and height beside the seam, mm on the shipped head, of the rows from a lip to the throat.
 ROLL = np.array([(0.8, 0.3), (2.2, 1.2), (4.0, 4.0), (6.0, 10.0), (14.0, 16.0), (30.0, 15.0), (42.0, 6.0)])
 N_LIP_ROWS = 2  # of these: the rolled edge of the lip, with its colours
-CARRIED = np.array([1.0, 1.0, 0.9, 0.75, 0.55, 0.35, 0.2])  # share of a lip's motion that each row takes
+CARRIED = np.array([1.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.0])  # share of a lip's motion that each row takes
 COVER_MM = 5.0  # of skin before the mouth, on the shipped head
 WIDENED = 0.35  # by which the mouth is wider than the lips at its back
 INSIDE = (96, 34, 36)  # sRGB of a mouth that no light reaches
@@ -78,7 +78,7 @@ def lip_relief(face: Face, landmarks: FloatArray) -> float:
     middle = landmarks[[*INNER_LIP_UPPER, *INNER_LIP_LOWER]].mean(axis=0)
     half = np.array([RELIEF_BOX[0], RELIEF_BOX[1], 0.0]) * size
     shown = face.triangles[triangles_of(face, "skin")]
-    sight = look(face.vertices.astype(np.float64), shown, (middle - half, middle + half), 0.006 * size)
+    sight = view_ahead(face.vertices.astype(np.float64), shown, (middle - half, middle + half), 0.006 * size)
     depth = np.where(np.isfinite(sight.depth), sight.depth, np.nan)
     with np.errstate(all="ignore"):
         profile = np.nanmedian(depth, axis=0)
@@ -255,7 +255,7 @@ def _keep_behind_skin(face: Face, rows: FloatArray, scale: float) -> None:
     """Move places (..., 3) of a mouth back to `COVER_MM` behind the skin before them, in place: chins recede."""
     flat = rows.reshape(-1, 3)
     shown = face.triangles[triangles_of(face, "skin")]
-    sight = look(face.vertices.astype(np.float64), shown, (flat.min(axis=0) - 1.0, flat.max(axis=0) + 1.0), 1.0)
+    sight = view_ahead(face.vertices.astype(np.float64), shown, (flat.min(axis=0) - 1.0, flat.max(axis=0) + 1.0), 1.0)
     column, row = np.floor((flat[:, :2] - sight.low) / sight.step).astype(np.int64).T
     skin = sight.depth[column, row]
     least = np.where(np.isfinite(skin), skin - COVER_MM * scale, np.inf)

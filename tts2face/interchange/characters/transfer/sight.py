@@ -1,4 +1,4 @@
-"""What is seen of a head from straight ahead: the foremost triangle of each cell of a grid."""
+"""View of a head from straight ahead: the foremost triangle of each cell of a grid."""
 
 from dataclasses import dataclass
 
@@ -37,7 +37,7 @@ class Sight:
         return heights
 
 
-def look(
+def view_ahead(
     places: FloatArray, triangles: NDArray[np.integer], box: tuple[FloatArray, FloatArray], step: float = STEP_MM
 ) -> Sight:
     """View along z of triangles (F, 3) of a mesh with vertices (V, 3), within a box of x and y."""

@@ -14,13 +14,7 @@ from tts2face.models.face import VERTEX_COLOURS, Face, keep_parts
 
 
 def locate_bare_landmarks(face: Face, model: Path | None = None) -> LocatedLandmarks:
-    """Landmarks of a face, read in views without hair, lashes, clothes, teeth and shapes.
-
-    Raises
-    ------
-    DataError
-        No face is recognised in most of them.
-    """
+    """Landmarks of a face, read in views without hair, lashes, clothes, teeth and shapes."""
     bare = keep_parts(face, lambda part: is_kind(part.name, "skin") or is_kind(part.name, "eyes"))
     rows, corners = np.unique(bare.triangles, return_inverse=True)
     bare = replace(

@@ -42,6 +42,7 @@ from tts2face.models.landmarks import (
 )
 from tts2face.numeric.arrays import FloatArray
 
+BLINK_GAINS = (1.0, 1.05, 1.1, 1.15)  # by which a blink that leaves a slit may grow before its lids are moved apart
 N_SMOOTHED = 3  # rounds in which displacements of cut lips become smooth
 
 
@@ -158,8 +159,11 @@ def _lids(
         shapes[lids] = 0.0
         return shapes, ["the eyes are in one piece with the skin: they neither blink nor turn"]
     blinks = [head.shape_names.index(name) for name in BLINK_SHAPES]
-    if _shuts(face, skin, shapes, blinks):
-        return shapes, []
+    for gain in BLINK_GAINS:
+        grown = shapes.copy()
+        grown[blinks] *= gain
+        if _shuts(face, skin, grown, blinks):
+            return grown, []
     shut = shut_lids((head.skin, head.moves()), (skin, shapes), head.shape_names, registration.similarity)
     for blink in blinks:
         keep_off_eyeballs(face, skin, shut[blink])
