@@ -161,7 +161,6 @@ def _plate() -> tuple[Face, np.ndarray]:
 def shapeless_head() -> Face:
     """Skin and eyes of the shipped head without its shapes."""
     head = head_without_mouth()
-    eyes = tuple(replace(eye, turns={}) for eye in head.eyes)
     return replace(
         head,
         shape_names=(),

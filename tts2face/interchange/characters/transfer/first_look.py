@@ -30,7 +30,7 @@ CROPS = (1.0, 0.5, 0.3, 0.2, 0.14)
 TALL = 2.0  # height over width or depth from which the mesh is no head alone, and crops are tried first
 BESIDE_DEG = (0.0, 40.0, -40.0)  # turns from an axis at which a head that looks aside is seen
 LEVEL_DEG = 3.0  # a head that is turned less is not turned back
-N_LOOKS = 3  # pictures after which the turn of a head is final
+N_PICTURES = 3  # pictures after which the turn of a head is final
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,26 +43,20 @@ class FoundHead:
 
 
 def find_head(character: Character, fronts: Sequence[float], model: Path | None) -> FoundHead:
-    """Head of a character, sought along the axes with these turns in degrees, upright, then lying.
-
-    Raises
-    ------
-    DataError
-        No face is recognised in any picture.
-    """
+    """Head of a character, sought along the axes with these turns in degrees, upright, then lying."""
     whole = drop_shells(join_pieces(character, {}, np.eye(3)), character)
     best = 0.0
-    n_looks = 0
+    n_pictures = 0
     for turn in _turns(fronts):
         turned = replace(whole, vertices=whole.vertices @ turn.T, turn=turn)
         for crop in _crops(turned):
-            look = _look(turned.keep(crop), character, model)
-            n_looks += 1
-            best = max(best, look.score)
-            if look.score >= MIN_SCORE:
-                return _settled(turned, look, character, model)
+            seen = _sight(turned.keep(crop), character, model)
+            n_pictures += 1
+            best = max(best, seen.score)
+            if seen.score >= MIN_SCORE:
+                return _settled(turned, seen, character, model)
     raise DataError(
-        f"no face is recognised in {n_looks} pictures of the mesh from its sides and of its upper parts (highest "
+        f"no face is recognised in {n_pictures} pictures of the mesh from its sides and of its upper parts (highest "
         f"score {best:.2f} of the {MIN_SCORE:g} that a face has); give the axis that it looks along with --front, or "
         "the positions of its landmarks with --landmarks"
     )
@@ -82,7 +76,7 @@ def placed_head(character: Character, front: float, table: Mapping[int, FloatArr
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Look:
+class _Sighting:
     """Score of the tracker in a picture, and the landmarks (468, 3) that it shows, in the units of the mesh."""
 
     score: float
@@ -117,8 +111,8 @@ def _crops(head: HeadMesh) -> Iterator[Mask]:
             yield kept
 
 
-def _look(head: HeadMesh, character: Character, model: Path | None) -> _Look:
-    """What the tracker sees of a head from the front, without shadows and without the colours of hair and brows."""
+def _sight(head: HeadMesh, character: Character, model: Path | None) -> _Sighting:
+    """The tracker's view of a head from the front, without shadows and without the colours of hair and brows."""
     used = head.keep(np.ones(len(head.triangles), bool))
     low, high = used.vertices.min(axis=0), used.vertices.max(axis=0)
     placement = Placement((low + high) / 2, 1.5 * HEIGHT_MM / float(high[1] - low[1]))
@@ -127,11 +121,11 @@ def _look(head: HeadMesh, character: Character, model: Path | None) -> _Look:
     views = CharacterViews(face, model)
     pixels, score = views.read((0, 0), np.zeros(0, np.float32))
     if score < MIN_SCORE or not np.isfinite(pixels).all():
-        return _Look(score, np.zeros((N_MESH_LANDMARKS, 3)))
+        return _Sighting(score, np.zeros((N_MESH_LANDMARKS, 3)))
     points, _ = views.points(
         (0, 0), np.zeros(0, np.float32), pixels[:N_MESH_LANDMARKS], face.triangles.astype(np.int64)
     )
-    return _Look(score, points.places(face.vertices) / placement.scale + placement.origin)
+    return _Sighting(score, points.places(face.vertices) / placement.scale + placement.origin)
 
 
 def unshaded(face: Face) -> Face:
@@ -139,19 +133,19 @@ def unshaded(face: Face) -> Face:
     return replace(face, occlusion=np.zeros((1, len(face.vertices), N_DIRECTIONS // 8), np.uint8))
 
 
-def _settled(whole: HeadMesh, look: _Look, character: Character, model: Path | None) -> FoundHead:
+def _settled(whole: HeadMesh, seen: _Sighting, character: Character, model: Path | None) -> FoundHead:
     """The head of a first look, turned until it looks along z."""
-    for _ in range(N_LOOKS):
-        back = _level_turn(look.landmarks)
+    for _ in range(N_PICTURES):
+        back = _level_turn(seen.landmarks)
         angle = np.degrees(np.arccos(np.clip((np.trace(back) - 1) / 2, -1, 1)))
         if angle < LEVEL_DEG:
             break
         whole = replace(whole, vertices=whole.vertices @ back.T, turn=back @ whole.turn)
-        turned = replace(look, landmarks=look.landmarks @ back.T)
-        again = _look(crop_head(whole, *_face_box(turned.landmarks)), character, model)
+        turned = replace(seen, landmarks=seen.landmarks @ back.T)
+        again = _sight(crop_head(whole, *_face_box(turned.landmarks)), character, model)
         # a picture of the turned head that shows less is not believed
-        look = again if again.score >= MIN_SCORE else turned
-    return _finish(whole, look.landmarks, character)
+        seen = again if again.score >= MIN_SCORE else turned
+    return _finish(whole, seen.landmarks, character)
 
 
 def _level_turn(landmarks: FloatArray) -> FloatArray:
