@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.interchange.characters.made import Variant, head_without_mouth, write_character_file
+from tests.interchange.characters.made import Variant, head_without_mouth, write_character_file, write_landmarks
 from tests.interchange.characters.test_transfer import shapeless_head
 from tts2face.interchange.characters.importing import import_face
+from tts2face.models.landmarks import LEFT_LIDS, LIP_LANDMARKS, RIGHT_LIDS
 
 
 @pytest.mark.usefixtures("face_model")
@@ -22,4 +23,18 @@ def test_the_shapes_of_a_head_come_back(tmp_path: Path) -> None:
     assert len(face.eyes) == 2
     assert steps[-1][0] == len(steps) <= steps[-1][1]
     jaw = face.shapes[face.shape_names.index("jawOpen")]
+    assert np.abs(jaw).max() == pytest.approx(np.abs(head.shapes[head.shape_names.index("jawOpen")]).max(), rel=0.1)
+
+
+def test_a_table_of_lips_and_lids_is_enough(tmp_path: Path) -> None:
+    """Without the tracker: the source's landmarks are then its own."""
+    path = write_character_file(tmp_path / "bare.glb", face=shapeless_head())
+    needed = {*LIP_LANDMARKS, *np.ravel(LEFT_LIDS).tolist(), *np.ravel(RIGHT_LIDS).tolist()}
+    write_landmarks(tmp_path / "all.tsv")
+    header, *rows = (tmp_path / "all.tsv").read_text().splitlines()
+    kept = [row for row in rows if int(row.split("\t")[0]) in needed]
+    (tmp_path / "some.tsv").write_text("\n".join([header, *kept]) + "\n")
+    imported = import_face(path, shapes="transfer", landmarks=tmp_path / "some.tsv")
+    jaw = imported.face.shapes[imported.face.shape_names.index("jawOpen")]
+    head = head_without_mouth()
     assert np.abs(jaw).max() == pytest.approx(np.abs(head.shapes[head.shape_names.index("jawOpen")]).max(), rel=0.1)

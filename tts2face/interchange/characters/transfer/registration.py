@@ -89,12 +89,14 @@ class Registration:
 
 def register(source: Skin, target: Skin, on_stage: Callable[[], object]) -> Registration:
     """Registration by landmarks of features, then closest points of visible skin; what is hidden follows smoothly."""
-    similarity = fit_similarity(source.landmarks[FEATURES], target.landmarks[FEATURES])
-    marks, wanted = similarity.places(source.landmarks[FEATURES]), target.landmarks[FEATURES]
+    # tables of landmarks need not have all
+    known = FEATURES[np.isfinite(target.landmarks[FEATURES, 0]) & np.isfinite(source.landmarks[FEATURES, 0])]
+    similarity = fit_similarity(source.landmarks[known], target.landmarks[known])
+    marks, wanted = similarity.places(source.landmarks[known]), target.landmarks[known]
     even = similarity.places(source.vertices)
     warp = RBFInterpolator(marks, wanted - marks, kernel="linear", smoothing=WARP_SMOOTHING, degree=1)
     start = even + warp(even)
-    held = source.nearest(source.landmarks[FEATURES])
+    held = source.nearest(source.landmarks[known])
     goal = wanted + start[held] - marks - warp(marks)
     laplacian, samples = source.laplacian(), _Samples(target)
     bending = (laplacian.T @ laplacian).tocsc()
@@ -111,7 +113,7 @@ def register(source: Skin, target: Skin, on_stage: Callable[[], object]) -> Regi
             placed = start + factorise(system).solve(found[:, None] * (there - start) + pulled_marks)
     on_stage()
     # the size of the face is that of the whole surface around its features; landmarks are single places
-    is_face = source.is_seen & (np.asarray(cKDTree(source.landmarks[FEATURES]).query(source.vertices)[0]) < FACE_MM)
+    is_face = source.is_seen & (np.asarray(cKDTree(source.landmarks[known]).query(source.vertices)[0]) < FACE_MM)
     similarity = fit_similarity(source.vertices[is_face], placed[is_face])
     return Registration(similarity, *_bind(source, placed, target))
 
