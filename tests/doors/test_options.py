@@ -84,7 +84,7 @@ def test_text_after_two_dashes_is_synthesised(tones: World, here: Path) -> None:
         (["corpus", "build", "folder.json", "--out", "no/a.talker"], 2, "no folder no"),
         (["corpus", "evaluate", "--recordings", "folder.json", "--out", "no/a.html"], 2, "no folder no"),
         (["Hi.", "--talker", "t" * 300, "--out", "x.mp4"], 2, "File name too long; check the path"),
-        (["--audio", "t" * 300, "--out", "x.mp4"], 2, f"there is no recording {'t' * 300}; check the path"),
+        (["--audio", "t" * 300, "--out", "x.mp4"], 2, "File name too long; check the path"),
         (["Hi.", "--dictionary", "/dev/zero", "--out", "x.mp4"], 3, "/dev/zero is a device, not a file"),
         (["Hi.", "--timeline", "/dev/zero", "--out", "x.mp4"], 3, "/dev/zero is a device, not a file"),
         (["--file", "/dev/zero", "--out", "x.mp4"], 2, "/dev/zero contains more than"),

@@ -133,7 +133,7 @@ def test_a_truncated_file_is_refused(cut: int, tmp_path: Path) -> None:
     [
         (
             lambda root: root.update(extensionsRequired=["KHR_draco_mesh_compression"]),
-            r"compressed with Draco .* gltf-transform/cli copy IN.glb OUT.glb` and import its copy",
+            r"compressed with Draco .* @gltf-transform/cli copy IN.glb OUT.glb` and import its copy",
         ),
         (lambda root: root.update(extensionsRequired=["EXT_other"]), "requires the glTF extension EXT_other"),
         (lambda root: root["asset"].update(version="1.0"), "not glTF of version 2"),
