@@ -21,6 +21,7 @@ MIN_VERTICES = 20
 LEAST_DEPTH, LEAST_WIDTH = 0.5, 1.4  # radii along the shortest and the middle axis of half an eyeball or more
 LARGEST_RADIUS = 0.45  # of the distance of the lids: two eyeballs lie beside each other, hair lies round the head
 WITHIN = 1.2  # radii: what lies wholly within is a part of an eyeball
+MOVED_BY_LIDS = 0.2  # of the radius: what a blink moves further is no part of an eyeball
 LID_REACH = 1.0  # radii between the centre of an eyeball and the middle of the vertices that its lid moves, in x and y
 MOVED_BY_SHAPES = 0.02  # of the radius: a gaze shape that moves an eyeball's vertices further turns it itself
 
@@ -127,9 +128,11 @@ def _by_spheres(head: HeadMesh, lids: Mapping[int, FloatArray]) -> NDArray[np.in
             continue
         # irises and corneas are round pieces of their own within the eyeball
         centre, radius = max(balls, key=lambda ball: ball[1])
-        far = np.zeros(len(sizes))
+        far, lifted = np.zeros(len(sizes)), np.zeros(len(sizes))
         np.maximum.at(far, component, np.linalg.norm(head.vertices - centre, axis=1))
-        marked[(far <= WITHIN * radius)[component]] = eye
+        if BLINKS[eye] in head.shapes:  # lashes lie on the lid that moves them
+            np.maximum.at(lifted, component, np.linalg.norm(head.shapes[BLINKS[eye]], axis=1))
+        marked[((far <= WITHIN * radius) & (lifted <= MOVED_BY_LIDS * radius))[component]] = eye
     return marked
 
 

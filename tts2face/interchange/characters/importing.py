@@ -1,6 +1,6 @@
 """Import of a character of another program as a face: ``tts2face face import``."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from itertools import count
@@ -21,10 +21,10 @@ from tts2face.interchange.characters.gltf_reader import read_gltf_character
 from tts2face.interchange.characters.head_mesh import (
     HeadMesh,
     build_head_mesh,
-    mapped_targets,
     moved_box,
     source_weights,
 )
+from tts2face.interchange.characters.import_notes import colour_notes, name_notes, pose_notes, some_of
 from tts2face.interchange.characters.landmark_table import read_landmark_table
 from tts2face.interchange.characters.landmarks import (
     SKIN,
@@ -34,14 +34,12 @@ from tts2face.interchange.characters.landmarks import (
     part_triangles,
 )
 from tts2face.interchange.characters.obj_reader import read_obj_folder
-from tts2face.interchange.characters.part_names import shells_before_eyes
-from tts2face.interchange.characters.shape_names import combinations_of_shapes, guess_mapping
+from tts2face.interchange.characters.shape_names import guess_mapping
 from tts2face.interchange.characters.shapes import TRANSFER, ShapeMapping, read_mapping
 from tts2face.interchange.characters.surface import (
     Placement,
     add_gaze_shapes,
     build_face,
-    is_plain,
     unwrap,
 )
 from tts2face.interchange.characters.surface_points import SurfacePoints, nearest_points
@@ -204,15 +202,13 @@ def import_face(  # noqa: PLR0913 - one parameter an option
         head = next(_turned_heads(character, chosen, front))
         provisional, views = _provisional_placement(head), None
     drawn = build_face(head, character, provisional) if views is None else views.face
-    if table is not None:
-        located = _project_table(table, head, drawn)
-    else:
-        located = locate_bare_landmarks(drawn, model) if views is None else locate_landmarks(views) or NO_LANDMARKS
+    located = _project_table(table, head, drawn) if table is not None else _track(drawn, views, model)
     face = place_face(_with_landmarks(drawn, located), character, head, provisional)
     step()
     if is_transferred:
         carried = transfer_shapes(face, is_tracked=table is None, on_step=step)
-        face, notes, made_of = carried.face, [*carried.notes], {"shapes_from": carried.source}
+        face, made_of = carried.face, {"shapes_from": carried.source}
+        notes = [*carried.notes]
     else:
         notes = [WITHOUT_LANDMARKS]
         if located is not NO_LANDMARKS:
@@ -233,9 +229,9 @@ def import_face(  # noqa: PLR0913 - one parameter an option
         n_eyeballs=len(face.eyes),
         notes=(
             *character.notes,
-            *_name_notes(character),
-            *_pose_notes(character, chosen),
-            *_colour_notes(character, head),
+            *name_notes(character),
+            *pose_notes(character, chosen),
+            *colour_notes(character, head),
             *notes,
         ),
         licence=character.licence,
@@ -252,7 +248,7 @@ def _complete_mapping(character: Character, given: str | Path | ShapeMapping | N
         known = {*character.target_names.values(), *character.expressions}
         unknown = [source.name for sources in rows.values() for source in sources if source.name not in known]
         if unknown:
-            raise InputError(f"the character has no shape {unknown[0]!r}; it has: {_some(sorted(known))}")
+            raise InputError(f"the character has no shape {unknown[0]!r}; it has: {some_of(sorted(known))}")
         mapping |= rows
     mapping = {
         name: sources
@@ -270,15 +266,15 @@ def _without_mouth(character: Character) -> str:
     vowels = [source.name for sources in guess_mapping(character.painted).values() for source in sources]
     if vowels:
         return (
-            f"the character's mouth is painted: {_some(sorted(set(vowels)))} exchange textures or colours and move no "
-            "vertex, so speech cannot move it; take a character whose mouth has shapes, or, if its mesh has lips, "
+            f"the character's mouth is painted: {some_of(sorted(set(vowels)))} exchange textures or colours and move "
+            "no vertex, so speech cannot move it; take a character whose mouth has shapes, or, if its mesh has lips, "
             "carry over those of a shipped head with --shapes transfer"
         )
-    empty = f"; {_some(character.still_names)} move no vertex" if character.still_names else ""
+    empty = f"; {some_of(character.still_names)} move no vertex" if character.still_names else ""
     return (
         "the character has no shape of a known name that moves its mouth, so speech cannot move it; "
         "carry over those of a shipped head with --shapes transfer, or name its shapes in a file and give it as "
-        f"--mapping; it has: {_some(names)}{empty}"
+        f"--mapping; it has: {some_of(names)}{empty}"
     )
 
 
@@ -303,11 +299,6 @@ def _shapeless_head(
     fronts = [FRONTS[axis] for axis in ([front] if front is not None else [*likely, "+x", "-x"])]
     found = find_head(character, fronts, model) if table is None else placed_head(character, fronts[0], table)
     return found.mesh, found.placement
-
-
-def _some(names: Sequence[str]) -> str:
-    shown = [name[:40] for name in names[:12]]
-    return ", ".join(shown) + (f" and {len(names) - 12} more" if len(names) > 12 else "") if names else "no shapes"
 
 
 def _turned_heads(character: Character, mapping: ShapeMapping, front: str | None) -> Iterator[HeadMesh]:
@@ -338,6 +329,11 @@ def _find_front(
     return max(scored, key=lambda found: found[0])[1]
 
 
+def _track(drawn: Face, views: CharacterViews | None, model: Path | None) -> LocatedLandmarks:
+    """Landmarks found in pictures; in those of a head without shapes where there are no views of its shapes."""
+    return locate_bare_landmarks(drawn, model) if views is None else locate_landmarks(views) or NO_LANDMARKS
+
+
 def _project_table(table: Mapping[int, NDArray[np.float64]], head: HeadMesh, drawn: Face) -> LocatedLandmarks:
     numbers = np.array(sorted(table), np.int64)
     places = np.stack([table[int(number)] for number in numbers]) @ head.turn.T
@@ -366,43 +362,8 @@ def _unused_names(character: Character, mapping: ShapeMapping) -> tuple[str, ...
     return tuple(name for name in names if name not in used)
 
 
-def _name_notes(character: Character) -> list[str]:
-    """Notes about shapes that move nothing, and about combinations of shapes."""
-    empty, combined = character.still_names, combinations_of_shapes(character.moving_names)
-    notes = [f"shapes that move no vertex are as good as missing: {_some(empty)}"] if empty else []
-    return notes + ([f"shapes that combine others are left alone: {_some(combined)}"] if combined else [])
-
-
-def _pose_notes(character: Character, mapping: ShapeMapping) -> list[str]:
-    """A note about default weights of the file, which the face at rest does not have."""
-    driven = mapped_targets(character, mapping)
-    posed = {t: weight for piece in character.pieces for t, weight in piece.defaults.items() if t in driven}
-    largest = sorted(posed, key=lambda target: -abs(posed[target]))[:3]
-    named = ", ".join(f"{character.target_names[target][:40]} {posed[target]:.2f}" for target in largest)
-    return (
-        [f"the file poses {len(posed)} of the mapped shapes ({named}); the face at rest has none of them"]
-        if posed
-        else []
-    )
-
-
-def _colour_notes(character: Character, head: HeadMesh) -> list[str]:
-    """Notes about white materials, whose colour is replaced, and about shells that are left out."""
-    shells = set(shells_before_eyes(character)) & set(head.piece_of.tolist())
-    used = [character.pieces[number] for number in np.unique(head.piece_of).tolist() if number not in shells]
-    plain = {
-        piece.material for piece in used if piece.colours is None and is_plain(character.materials[piece.material])
-    }
-    names = sorted(character.materials[number].name for number in plain)
-    notes = [f"the material {name[:60]!r} is white without an image; plain colours replace it" for name in names]
-    if shells:
-        left_out = sorted({character.materials[character.pieces[number].material].name for number in shells})
-        notes.append(f"shells before the eyes that are not transparent are left out: {_some(left_out)}")
-    return notes
-
-
 def _binding(path: Path, mapping: ShapeMapping, head: HeadMesh, face: Face) -> CharacterBinding:
-    """What is needed to write the face's animation onto the character's file."""
+    """Place, scale and names by which the face's animation is written onto the character's file."""
     scale = float(np.ptp(face.vertices[:, 1]) / np.ptp(head.vertices[:, 1]))
     origin = head.vertices[0] - face.vertices[0].astype(np.float64) / scale
     digest = "" if path.is_dir() else sha256(path.read_bytes()).hexdigest()

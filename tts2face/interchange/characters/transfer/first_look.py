@@ -24,6 +24,7 @@ from tts2face.picture.occlusion import N_DIRECTIONS
 from tts2face.video.tracking import MIN_SCORE
 
 FOREHEAD = 10  # landmark at the top of the forehead
+EYE_RINGS = {LEFT_EYE: LEFT_LIDS, RIGHT_EYE: RIGHT_LIDS}
 HEIGHT_MM = 180.0  # from chin to the top of the forehead, until the distance of the eyes is known
 # Heights of the crops in which a face is sought, as shares of the mesh's: heads, busts, half and whole bodies.
 CROPS = (1.0, 0.5, 0.3, 0.2, 0.14)
@@ -165,7 +166,7 @@ def _face_box(landmarks: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _finish(whole: HeadMesh, landmarks: FloatArray, character: Character) -> FoundHead:
-    """Cropped head with its parts told apart by their places, and eyeballs marked."""
+    """Cropped head with its parts distinguished by their places, and eyeballs marked."""
     low, high = _face_box(landmarks)
     head = unwrap(crop_head(whole, low, high), character)
     lids = {eye: landmarks[list({*ring[0], *ring[1]})].mean(axis=0) for eye, ring in EYE_RINGS.items()}
@@ -173,6 +174,3 @@ def _finish(whole: HeadMesh, landmarks: FloatArray, character: Character) -> Fou
     head = sort_kinds(head, character, landmarks)
     placement = Placement((low + high) / 2, HEIGHT_MM / float(high[1] - low[1]))
     return FoundHead(add_gaze_shapes(head), placement, landmarks)
-
-
-EYE_RINGS = {LEFT_EYE: LEFT_LIDS, RIGHT_EYE: RIGHT_LIDS}

@@ -87,7 +87,8 @@ def _kind_by_place(places: FloatArray, landmarks: FloatArray, size: float, skin:
         return "lashes"
     corners = landmarks[[MOUTH_CORNER_RIGHT, MOUTH_CORNER_LEFT]]
     lips = landmarks[list({*INNER_LIP_UPPER, *INNER_LIP_LOWER})]
-    middle, low, high = lips.mean(axis=0), places.min(axis=0), places.max(axis=0)
+    middle = lips.mean(axis=0)
+    low, high = places.min(axis=0), places.max(axis=0)
     width = float(abs(corners[0, 0] - corners[1, 0]))
     is_within = max(high[0] - middle[0], middle[0] - low[0]) < 0.8 * width
     is_level = low[1] > middle[1] - MOUTH_HEIGHT * size and high[1] < middle[1] + MOUTH_HEIGHT * size

@@ -178,7 +178,8 @@ def _cut(face: Face, skin: Skin, seam: FloatArray) -> _Slit | None:
         source += [rows[chosen]] * 3
     for edge, opposite, tip in ((to_after, before, after), (to_before, after, before)):
         chosen = ~whole & is_end[edge]
-        a, b, c, m = alone[chosen], tip[chosen], opposite[chosen], upper[edge[chosen]]
+        a, b = alone[chosen], tip[chosen]
+        c, m = opposite[chosen], upper[edge[chosen]]
         halves = [np.column_stack([a, m, c]), np.column_stack([m, b, c])]
         triangles += halves if edge is to_after else [half[:, ::-1] for half in halves]
         source += [rows[chosen]] * 2
@@ -264,7 +265,8 @@ def _keep_behind_skin(face: Face, rows: FloatArray, scale: float) -> None:
 
 def _strips(ladder: IntArray, *, is_upper: bool) -> IntArray:
     """Triangles (rows, 2 columns, 3) between the rows (R, N) of a lip's vertices, which face the mouth."""
-    a, b, c, d = ladder[:-1, :-1], ladder[:-1, 1:], ladder[1:, :-1], ladder[1:, 1:]
+    a, b = ladder[:-1, :-1], ladder[:-1, 1:]
+    c, d = ladder[1:, :-1], ladder[1:, 1:]
     triangles = np.concatenate([np.stack([a, c, b], axis=-1), np.stack([b, c, d], axis=-1)], axis=1)
     strips: IntArray = triangles if is_upper else triangles[..., ::-1]
     return strips

@@ -187,7 +187,8 @@ def nearest_on_triangles(places: FloatArray, corners: FloatArray) -> tuple[Float
     The best of the face and of the three edges. Source: Ericson 2005, Real-Time Collision Detection, section 5.1.5.
     """
     a, b, c = (corners[..., k, :] for k in range(3))
-    first, second, there = b - a, c - a, places - a
+    first, second = b - a, c - a
+    there = places - a
     ee, eg, gg = ((u * v).sum(axis=-1) for u, v in ((first, first), (first, second), (second, second)))
     de, dg = ((there * v).sum(axis=-1) for v in (first, second))
     area = np.maximum(ee * gg - eg * eg, 1e-20)
