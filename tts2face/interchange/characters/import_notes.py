@@ -11,11 +11,13 @@ from tts2face.interchange.characters.shape_names import combinations_of_shapes
 from tts2face.interchange.characters.shapes import ShapeMapping
 from tts2face.interchange.characters.surface import is_plain
 
+MAX_NAMES, MAX_LETTERS = 12, 40  # names in a sentence, and letters of each
 
-def some_of(names: Sequence[str]) -> str:
-    """The first of many names, and how many there are besides."""
-    shown = [name[:40] for name in names[:12]]
-    return ", ".join(shown) + (f" and {len(names) - 12} more" if len(names) > 12 else "") if names else "no shapes"
+
+def some_of(names: Sequence[str], most: int = MAX_NAMES) -> str:
+    """The first `most` of many names, and how many there are besides."""
+    shown = ", ".join(name[:MAX_LETTERS] for name in names[:most]) or "no shapes"
+    return shown + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def name_notes(character: Character) -> list[str]:

@@ -4,13 +4,14 @@ from textwrap import TextWrapper
 from typing import TYPE_CHECKING
 
 from tts2face.face.stand_in import VISEME_PREFIX
+from tts2face.interchange.characters.import_notes import some_of
 from tts2face.interchange.characters.shape_names import ARKIT_SHAPES
 
 if TYPE_CHECKING:
     from tts2face.interchange.characters.importing import ImportReport
 
 WIDTH, INDENT = 100, 12  # columns of the text, and of the names of its rows
-MAX_NAMES = 8  # of a row
+ROW_NAMES = 8  # names of a row
 NOTHING = "nothing"  # what replaces a shape that only faces outside speech and gestures need
 # Shapes on which speech depends most, whose sources and strengths are shown.
 SHOWN = ("jawOpen", "mouthPucker", "mouthFunnel", "mouthSmileLeft", "mouthUpperUpLeft", "mouthLowerDownLeft")
@@ -37,8 +38,8 @@ def summary(report: "ImportReport") -> list[tuple[str, str]]:
     for name, replacement in report.missing.items():
         replaced.setdefault(replacement, []).append(name)
     missing = replaced.pop(NOTHING, [])
-    text = f"{len(found)} of ARKit's {len(ARKIT_SHAPES)}" + (f", visemes {some(visemes)}" if visemes else "")
-    rows = [("found", text)]
+    beside = f", visemes {some_of(visemes, ROW_NAMES)}" if visemes else ""
+    rows = [("found", f"{len(found)} of ARKit's {len(ARKIT_SHAPES)}{beside}")]
     mouth = [
         f"{name} {report.strengths[name]:.2f} ({' + '.join(source.name for source in report.mapping[name])})"
         for name in SHOWN
@@ -46,12 +47,6 @@ def summary(report: "ImportReport") -> list[tuple[str, str]]:
     ]
     if mouth:
         rows.append(("strength", f"relative to the default head (source): {', '.join(mouth)}"))
-    rows += [("replaced", f"{some(names)}: {replacement}") for replacement, names in replaced.items()]
-    rows += [("missing", some(missing))] if missing else []
-    return rows + ([("unused", some(report.unused))] if report.unused else [])
-
-
-def some(names: list[str] | tuple[str, ...]) -> str:
-    """The first names of many."""
-    shown = ", ".join(name[:40] for name in names[:MAX_NAMES])
-    return shown + (f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else "")
+    rows += [("replaced", f"{some_of(names, ROW_NAMES)}: {replacement}") for replacement, names in replaced.items()]
+    rows += [("missing", some_of(missing, ROW_NAMES))] if missing else []
+    return rows + ([("unused", some_of(report.unused, ROW_NAMES))] if report.unused else [])
