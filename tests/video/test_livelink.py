@@ -58,6 +58,13 @@ def test_the_frame_rate_is_found(counted: int, fps: float, tmp_path: Path) -> No
     assert found.notes == ()
 
 
+@pytest.mark.parametrize("counted", [24, 25, 30, 50, 60])
+def test_the_first_frame_of_a_second_shows_the_rate(counted: int, tmp_path: Path) -> None:
+    times = np.arange(counted + 1) / counted
+    found = read(tmp_path, rows_of(times, [timecode(TEN + time, counted) for time in times]))
+    assert (len(found.weights), found.weights.fps, found.notes) == (counted + 1, counted, ())
+
+
 @pytest.mark.parametrize("day", [86_398.0, 86_399.99])
 def test_a_take_goes_on_after_midnight(day: float, tmp_path: Path) -> None:
     found = read(tmp_path, rows_of(FOUR_S, [timecode(day + time) for time in FOUR_S]))

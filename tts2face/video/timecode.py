@@ -137,12 +137,16 @@ def _number(label: str) -> float:
 def _fit_neighbours(fields: FloatArray) -> Mask:
     """Rows (T,) whose frame is near that of a row beside them in the same second; all, where few have such a row."""
     known = np.flatnonzero(np.isfinite(fields[:, 0]))
-    steps = np.diff(fields[known, 2])
-    inside = (np.diff(60.0 * fields[known, 0] + fields[known, 1]) == 0) & (steps > 0)
+    steps, seconds = np.diff(fields[known, 2]), np.diff(60.0 * fields[known, 0] + fields[known, 1])
+    inside = (seconds == 0) & (steps > 0)
     fits: Mask = np.zeros(len(fields), np.bool_)
     if inside.any():
-        near = inside & (steps <= MAX_MISMATCH_STEPS * np.median(steps[inside]))
+        step = np.median(steps[inside])
+        near = inside & (steps <= MAX_MISMATCH_STEPS * step)
         fits[known[1:][near]] = fits[known[:-1][near]] = True
+        # a take may end with the first frame of a second
+        begins = (seconds == 1) & (fields[known[1:], 2] < step) & fits[known[:-1]]
+        fits[known[1:][begins]] = True
     if 2 * fits.sum() < len(known):
         fits[known] = True
     return fits
