@@ -145,8 +145,8 @@ def _fit_neighbours(fields: FloatArray) -> Mask:
         near = inside & (steps <= MAX_MISMATCH_STEPS * step)
         fits[known[1:][near]] = fits[known[:-1][near]] = True
         # a take may end with the first frame of a second
-        begins = (seconds == 1) & (fields[known[1:], 2] < step) & fits[known[:-1]]
-        fits[known[1:][begins]] = True
+        starts = (seconds == 1) & (fields[known[1:], 2] < step) & fits[known[:-1]]
+        fits[known[1:][starts]] = True
     if 2 * fits.sum() < len(known):
         fits[known] = True
     return fits
