@@ -295,17 +295,21 @@ def _shapeless_head(
     character: Character, front: str | None, table: Mapping[int, FloatArray] | None, model: Path | None
 ) -> tuple[HeadMesh, Placement]:
     """Head of a character without its own shapes."""
-    likely = ["-z", "+z"] if character.faces_back else ["+z", "-z"]
-    fronts = [FRONTS[axis] for axis in ([front] if front is not None else [*likely, "+x", "-x"])]
+    fronts = _turns(character, front)
     found = find_head(character, fronts, model) if table is None else placed_head(character, fronts[0], table)
     return found.mesh, found.placement
 
 
+def _turns(character: Character, front: str | None) -> list[float]:
+    """Turns from the given axis, or from each one, the likely one first, degrees."""
+    likely = ["-z", "+z"] if character.faces_back else ["+z", "-z"]
+    return [FRONTS[axis] for axis in ([front] if front is not None else [*likely, "+x", "-x"])]
+
+
 def _turned_heads(character: Character, mapping: ShapeMapping, front: str | None) -> Iterator[HeadMesh]:
     """Heads turned to look along z from the given axis, or from each axis, the likely one first."""
-    likely = ["-z", "+z"] if character.faces_back else ["+z", "-z"]
-    for axis in [front] if front is not None else [*likely, "+x", "-x"]:
-        head = build_head_mesh(character, mapping, FRONTS[axis])
+    for turn in _turns(character, front):
+        head = build_head_mesh(character, mapping, turn)
         yield add_gaze_shapes(mark_eyeballs(unwrap(head, character), character))
 
 

@@ -1,15 +1,12 @@
 """Animation of an imported face as the character's own .glb file."""
 
-import numpy as np
-
 from lexicon.errors import InputError
 from tts2face.interchange.characters.animation import animate_character
 from tts2face.interchange.characters.binding import character_file, has_binding, read_binding
 from tts2face.interchange.exports.face_glb import FaceGlbWriter
 from tts2face.interchange.exports.parts import FormatWriter, Part, Target
+from tts2face.interchange.exports.spooled_frames import SpooledFrames
 from tts2face.storage.output_paths import refuse_overwriting
-from tts2face.storage.spool import Spool
-from tts2face.types import HEAD_CHANNELS, Trajectory
 
 
 class CharacterGlbWriter:
@@ -21,26 +18,20 @@ class CharacterGlbWriter:
         source = character_file(read_binding(target.face))  # a missing file is reported with the first clip
         refuse_overwriting({"the export": target.path.with_name(target.name)}, {"the character": source})
         self._target, self._face = target, target.face
-        self._motion, self._head = Spool(len(target.channels)), Spool(len(HEAD_CHANNELS))
-        self._end = 0.0
+        self._frames = SpooledFrames(target.channels)
 
     def add(self, part: Part) -> None:
         """Append frames."""
-        self._end = max(self._end, part.end)
-        self._motion.add(part.motion)
-        self._head.add(part.head)
+        self._frames.add(part)
 
     def finish(self) -> None:
         """Write the file."""
-        fps = float(self._target.fps)
-        motion = Trajectory(self._target.channels, np.array(self._motion.rows(), np.float32), fps)
-        head = Trajectory(HEAD_CHANNELS, np.array(self._head.rows(), np.float32), fps)
-        self._target.path.write_bytes(animate_character(motion, head, self._face, end_s=self._end).content)
+        motion, head = self._frames.trajectories(float(self._target.fps))
+        self._target.path.write_bytes(animate_character(motion, head, self._face, end_s=self._frames.end_s).content)
 
     def close(self) -> None:
         """Remove the temporary files."""
-        self._motion.close()
-        self._head.close()
+        self._frames.close()
 
 
 def make_glb_writer(target: Target) -> FormatWriter:

@@ -21,6 +21,7 @@ from tts2face.interchange.characters.vrm_motion import gaze_turns, head_turns
 from tts2face.interchange.exports.arkit import ARKIT_SHAPES, build_arkit_projection, mouth_products
 from tts2face.interchange.exports.livelink import eye_angles
 from tts2face.interchange.exports.parts import Part, Target
+from tts2face.interchange.exports.spooled_frames import SpooledFrames
 from tts2face.interchange.gltf.container import key_times
 from tts2face.interchange.gltf.fields import Fields
 from tts2face.interchange.gltf.reader import GltfFile
@@ -28,8 +29,7 @@ from tts2face.interchange.gltf.vrm_animation import VrmMotion, add_vrm_animation
 from tts2face.interchange.gltf.writer import GlbWriter
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.numeric.arrays import FloatArray
-from tts2face.storage.spool import Spool
-from tts2face.types import HEAD_CHANNELS, Trajectory
+from tts2face.types import Trajectory
 
 UNROUNDED, ROUNDED = ("aa", "ih", "ee", "oh"), "ou"
 OPEN_ROUND = 0.5  # of what an oh as open as the lips narrows them, which is then no ou
@@ -42,21 +42,17 @@ class VrmaWriter:
     def __init__(self, target: Target) -> None:
         self._target = target
         self._projection = build_arkit_projection(target)
-        self._motion, self._head = Spool(len(target.channels)), Spool(len(HEAD_CHANNELS))
-        self._end = 0.0
+        self._frames = SpooledFrames(target.channels)
 
     def add(self, part: Part) -> None:
         """Append frames."""
-        self._end = max(self._end, part.end)
-        self._motion.add(part.motion)
-        self._head.add(part.head)
+        self._frames.add(part)
 
     def finish(self) -> None:
         """Write the file."""
         fps = float(self._target.fps)
-        times = key_times(self._motion.n_rows, fps, self._end)
-        motion = held(Trajectory(self._target.channels, np.array(self._motion.rows(), np.float32), fps), len(times))
-        head = held(Trajectory(HEAD_CHANNELS, np.array(self._head.rows(), np.float32), fps), len(times))
+        times = key_times(self._frames.n_frames, fps, self._frames.end_s)
+        motion, head = (held(frames, len(times)) for frames in self._frames.trajectories(fps))
         scene = {"scene": 0, "scenes": [{"nodes": []}]}
         asset = {"version": "2.0", "generator": ANIMATION, "extras": {"fps": fps, "sound": self._target.sound_name}}
         name = self._target.name
@@ -67,8 +63,7 @@ class VrmaWriter:
 
     def close(self) -> None:
         """Remove the temporary files."""
-        self._motion.close()
-        self._head.close()
+        self._frames.close()
 
     def _vrm_motion(self, motion: Trajectory, head: Trajectory) -> VrmMotion:
         face = self._target.face
