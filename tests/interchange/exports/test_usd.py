@@ -2,6 +2,7 @@
 
 import io
 import sys
+import zipfile
 from dataclasses import replace
 
 import numpy as np
@@ -42,6 +43,12 @@ def test_vertices_skinned_by_usd_are_those_of_the_renderer(suffix, tmp_path):
             mesh = stage.GetPrimAtPath(f"/Face/{surface.part.name}_{number}")
             found = np.array(mesh.GetAttribute("points").Get(frame))
             assert np.allclose(found, expected[surface.vertices], rtol=0, atol=TOLERANCE_MM)
+
+
+def test_a_package_is_dated_by_no_clock(tmp_path):
+    tts2face.export(made_clip(2), tmp_path / "a.usdz", face=FACE)
+    with zipfile.ZipFile(tmp_path / "a.usdz") as package_file:
+        assert {one.date_time for one in package_file.infolist()} == {(1980, 1, 1, 0, 0, 0)}
 
 
 def test_units_times_and_names(tmp_path):

@@ -6,8 +6,10 @@ file; a .usdz file holds them.
 
 import errno
 import importlib
+import os
 import re
 import tempfile
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -36,6 +38,7 @@ METRES_PER_UNIT = 0.001
 ROOT_PATH = "/Face"
 SINGLE_FILE = ".usdz"
 STAGE_IN_IT = "face.usdc"  # its name there: the first file is the one that is opened
+DATE_IN_IT = (1980, 1, 1)  # of all files, by the local clock, as USD dates them: equal clips are equal bytes
 
 
 class UsdWriter:
@@ -103,6 +106,9 @@ class UsdWriter:
     def _pack(self, files: dict[str, Path]) -> None:
         """Write the files, by their names in it, to one of USD's packages."""
         path = self._target.path
+        dated = time.mktime((*DATE_IN_IT, 0, 0, 0, 0, 0, -1))
+        for file in files.values():
+            os.utime(file, (dated, dated))
         with self._usd.Sdf.ZipFileWriter.CreateNew(str(path)) as package:
             if not all(package.AddFile(str(file), name) for name, file in files.items()):
                 raise OSError(errno.EIO, "USD could not write the file", str(path))
