@@ -60,7 +60,8 @@ FRONTS = {"+z": 0.0, "-z": 180.0, "+x": -90.0, "-x": 90.0}  # axis that a charac
 NO_LANDMARKS = LocatedLandmarks(np.zeros(0, np.int64), SurfacePoints(np.zeros((0, 3), np.int64), np.zeros((0, 3))), 0.0)
 WITHOUT_LANDMARKS = (
     "no face is recognised in its pictures, so speech and gestures give its shapes the weights of the default head, by "
-    "name; if it has a human face, give the axis that it looks along with --front, or its landmarks with --landmarks"
+    "name; if it has a human face, give `tts2face face import` the axis that it looks along with --front, or its "
+    "landmarks with --landmarks"
 )
 N_STEPS = 10  # of a transfer's progress
 PROVISIONAL_HEIGHT_MM = 150.0  # of the moved part of a face, until the distance of its eyes is known

@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any
 from lexicon.errors import DataError, InputError
 from tts2face.models.consent import PHOTO_TOOL, states_consent
 from tts2face.photo.photograph import HEIC_BRANDS
-from tts2face.serving.work.resource_texts import bounded, refusal, without_name
+from tts2face.serving.work.character_archive import MAGIC as ARCHIVE_MAGIC
+from tts2face.serving.work.character_archive import unpack_character
+from tts2face.serving.work.resource_texts import UNPACKED, bounded, refusal, without_name
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -47,7 +49,7 @@ MAX_STYLE_CPU_S = 8.0
 MAX_SPEECH_CPU_S = 4.0
 # First bytes of files that are sent by mistake, or on purpose.
 FOREIGN = {
-    b"PK\x03\x04": "a zip archive", b"\x80\x02": "a Python pickle", b"\x80\x03": "a Python pickle",
+    ARCHIVE_MAGIC: "a zip archive", b"\x80\x02": "a Python pickle", b"\x80\x03": "a Python pickle",
     b"\x80\x04": "a Python pickle", b"\x80\x05": "a Python pickle", b"\x93NUMPY": "a NumPy array",
     b"\x1f\x8b": "a gzip file", b"\x89PNG": "a picture", b"\xff\xd8\xff": "a picture", b"%PDF": "a PDF",
     b"glTF": "a glTF character", b"RIFF": "a sound or video", b"\x1aE\xdf\xa3": "a video",
@@ -69,8 +71,8 @@ def check_resource(kind: str, source: Path, folder: Path, max_bytes: float) -> N
     Parameters
     ----------
     kind
-        One of `RESOURCE_KINDS`. Characters (.glb, .vrm) and photos, which have a file `STATEMENT` beside them, become
-        faces.
+        One of `RESOURCE_KINDS`. Characters (.glb, .vrm, or folders as .zip) and photos, which have a file `STATEMENT`
+        beside them, become faces.
     max_bytes
         Largest size of the written content.
 
@@ -110,7 +112,7 @@ def check_resource(kind: str, source: Path, folder: Path, max_bytes: float) -> N
 
 def kind_of_face(head: bytes) -> str:
     """`CHARACTER`, `PHOTO` or `FACE`, by the first bytes of a file."""
-    return CHARACTER if head.startswith(GLTF_MAGIC) else PHOTO if is_picture(head) else FACE
+    return CHARACTER if head.startswith((GLTF_MAGIC, ARCHIVE_MAGIC)) else PHOTO if is_picture(head) else FACE
 
 
 def is_picture(head: bytes) -> bool:
@@ -186,8 +188,13 @@ def _check_character(source: Path, out: Path) -> dict[str, Any]:
     from tts2face.interchange.gltf.writer import GlbWriter
     from tts2face.models.face_file import write_face
 
+    with source.open("rb") as file:
+        is_archive = file.read(len(ARCHIVE_MAGIC)) == ARCHIVE_MAGIC
     named = source.with_name("character.glb")
-    named.hardlink_to(source)
+    if is_archive:
+        named = unpack_character(source, source.with_name(UNPACKED))
+    else:
+        named.hardlink_to(source)
     statement = source.with_name(STATEMENT)
     stated = read_json(statement) if statement.exists() else {}
     text = stated.get("mapping")
@@ -200,7 +207,8 @@ def _check_character(source: Path, out: Path) -> dict[str, Any]:
     write_face(made, imported.face)
     rows = [f"{name}: {text}" for name, text in summary(imported.report)]
     # clips as .glb are this file, written again from what was read of it, if its own shapes move it
-    content = None if stated.get("shapes") else GlbWriter(read_gltf(named)).content()
+    has_file = not named.is_dir() and not stated.get("shapes")
+    content = GlbWriter(read_gltf(named)).content() if has_file else None
     return _check_face(made, out, content) | {"notes": [*imported.report.notes, *rows]}
 
 

@@ -3,8 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-MAX_TEXT = 200  # characters of a text of the description
+MAX_TEXT = 1000  # characters of a text of the description
 MAX_ENTRIES = 200  # identities or styles of the description
+UNPACKED = "unpacked"  # folder of a character's files beside its archive
 
 
 def without_name(entry: dict[str, Any]) -> dict[str, Any]:
@@ -32,4 +33,5 @@ def refusal(error: Exception, source: Path, folder: Path, content: Path) -> str:
     faces = [folder / f"{made}.face" for made in ("imported", "photo")]
     for path in (source, content, source.with_name("character.glb"), *faces):
         text = text.replace(f"{path}: ", "").replace(str(path), "it")
-    return text
+    unpacked = source.with_name(UNPACKED)
+    return text.replace(f"{unpacked}/", "").replace(str(unpacked), "the archive")

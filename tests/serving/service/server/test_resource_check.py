@@ -138,6 +138,46 @@ def test_clips_of_a_sent_character_are_its_own_rigged_file(tmp_path: Path) -> No
     assert {channel["target"]["path"] for channel in root["animations"][0]["channels"]} == {"weights", "rotation"}
 
 
+def obj_text(vertices: np.ndarray) -> bytes:
+    """The skin and eyes of the shipped head as an .obj file, in metres."""
+    head = head_without_mouth()
+    rows = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in vertices / 1000.0]
+    for part in head.parts:
+        corners = head.triangles[part.first : part.first + part.count] + 1
+        rows += [f"usemtl {part.name}", *(f"f {a} {b} {c}" for a, b, c in corners.tolist())]
+    return "\n".join(rows).encode()
+
+
+@pytest.mark.usefixtures("face_model")
+def test_a_folder_of_obj_files_is_sent_as_an_archive(tmp_path: Path) -> None:
+    head = head_without_mouth()
+    files = [("head/neutral.obj", obj_text(head.vertices)), ("__MACOSX/head/._neutral.obj", b"\0")]
+    for name in ("jawOpen", "mouthPucker", "eyeBlinkLeft", "eyeBlinkRight"):
+        files.append((f"head/{name}.obj", obj_text(head.vertices + head.shapes[head.shape_names.index(name)])))
+    (tmp_path / "avatar").write_bytes(packed(*files))
+    message, checked = check("face", tmp_path / "avatar", tmp_path)
+    assert message == ""
+    about = json.loads((checked / "description.json").read_text())
+    assert any(note.startswith("found: 12 of ARKit's 52") for note in about["notes"])  # eight of gaze of the eyeballs
+    assert all(len(note) < 1000 for note in about["notes"])
+    assert len(Session(face=str(checked / "content"), palette=None).clip("Papa.").motion) > 10
+
+
+@pytest.mark.usefixtures("face_model")
+def test_a_gltf_file_is_sent_with_its_buffers_in_an_archive(tmp_path: Path) -> None:
+    write_character_file(tmp_path / "a.glb", face=head_without_mouth())
+    root, binary = split_glb((tmp_path / "a.glb").read_bytes())
+    root["buffers"][0]["uri"] = "buffers/all.bin"
+    files = ("scene.gltf", json.dumps(root).encode()), ("buffers/all.bin", binary)
+    (tmp_path / "avatar").write_bytes(packed(*files))
+    message, checked = check("face", tmp_path / "avatar", tmp_path)
+    assert message == ""
+    Session(face=str(checked / "content"), palette=None).export("Papa.", [tmp_path / "b.glb"], fps=10)
+    animated, _ = split_glb((tmp_path / "b.glb").read_bytes())
+    assert animated["meshes"] == root["meshes"]
+    assert "uri" not in animated["buffers"][0]
+
+
 @pytest.mark.smoke
 def test_a_character_within_a_sent_face_is_left_out(files: dict[str, Path], tmp_path: Path) -> None:
     """It was not made here, and would be served as it is."""
@@ -281,10 +321,16 @@ def test_a_photo_of_too_many_pixels_and_a_wrong_fit_are_refused(tmp_path: Path) 
 
 
 def zip_bomb() -> bytes:
-    """Archive of some kilobytes that unpacks to 100 MB."""
+    """Archive of some kilobytes that unpacks to 600 MB."""
+    return packed(("neutral.obj", bytes(600_000_000)))
+
+
+def packed(*files: tuple[str, bytes]) -> bytes:
+    """Archive of files."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("vertices.npy", bytes(100_000_000))
+        for name, content in files:
+            archive.writestr(name, content)
     return buffer.getvalue()
 
 
@@ -307,7 +353,11 @@ def pickled_npz(path: Path) -> bytes:
 @pytest.mark.parametrize(
     ("kind", "make", "reason"),
     [
-        ("face", lambda path: zip_bomb(), "it is a zip archive, not a .face file"),
+        ("face", lambda path: zip_bomb(), "the archive unpacks to 1 files of 600 MB, more than 2000 files or 512 MB"),
+        ("face", pickled_npz, "the archive holds no character (.glb, .gltf, .vrm, .obj), but vertices.npy"),
+        ("face", lambda path: packed(("a.glb", b""), ("b/b.vrm", b"")), "several characters (a.glb, b/b.vrm); pack o"),
+        ("face", lambda path: packed(("a/../../a.obj", b"v 0 0")), "a has no neutral.obj; name the face at rest so"),
+        ("face", lambda path: packed(("a.obj", b"v" * 999))[:-30], "the archive is damaged, locked or of an unknown c"),
         ("talker", pickled_npz, "it is a zip archive, not a .talker file"),
         ("palette", lambda path: pickle.dumps(Evil(path)), "it is a Python pickle, not a .palette file"),
         ("face", lambda path: b"", "it is not a .face file, or is truncated"),

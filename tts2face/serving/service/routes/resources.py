@@ -55,7 +55,8 @@ PICTURE_ANSWERS: dict[int | str, dict[str, Any]] = {
     304: {"description": "The picture has not changed."},
 }
 CONTENTS = {
-    "talker": "A .talker file.", "face": "A .face file, a character (.glb, .vrm), or a photo where it is allowed.",
+    "talker": "A .talker file.",
+    "face": "A .face file, a character (.glb, .vrm, .zip), or a photo where it is allowed.",
     "palette": "A .palette file.", "dictionary": "A pronunciation dictionary, UTF-8 text.",
 }  # fmt: skip
 
