@@ -59,7 +59,7 @@ def test_units_times_and_names(tmp_path):
     stage = Usd.Stage.Open(str(tmp_path / "a.usda"))
     assert UsdGeom.GetStageMetersPerUnit(stage) == 0.001
     assert UsdGeom.GetStageUpAxis(stage) == "Y"
-    assert (stage.GetTimeCodesPerSecond(), stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (24, 0, 4)
+    assert (stage.GetTimeCodesPerSecond(), stage.GetStartTimeCode()) == (24, 0)
     animation = UsdSkel.Animation(stage.GetPrimAtPath("/Face/Skeleton/Animation"))
     assert list(animation.GetBlendShapesAttr().Get()) == list(FACE.shape_names)
     turn = animation.GetRotationsAttr().Get(2)[0]
@@ -69,6 +69,21 @@ def test_units_times_and_names(tmp_path):
     assert (tmp_path / "a.wav").is_file()
     beside = {"a.usda", "a.usda.colours.png", "a.usda.skin_0.jpg", "a.wav"}
     assert {path.name for path in tmp_path.iterdir()} == beside
+
+
+@pytest.mark.parametrize("fps", [24.0, 30.0, 59.94])
+def test_the_last_frame_holds_to_the_end_of_the_sound(fps, tmp_path):
+    from pxr import UsdSkel
+
+    clip = made_clip(5, fps)
+    tts2face.export(clip, tmp_path / "a.usda", face=FACE)
+    stage = Usd.Stage.Open(str(tmp_path / "a.usda"))
+    end_s = stage.GetEndTimeCode() / stage.GetTimeCodesPerSecond()
+    assert end_s == pytest.approx(clip.speech.waveform.duration, abs=1e-5)
+    assert stage.GetEndTimeCode() > 4.9
+    weights = UsdSkel.Animation(stage.GetPrimAtPath("/Face/Skeleton/Animation")).GetBlendShapeWeightsAttr()
+    assert weights.GetTimeSamples()[:5] == [0, 1, 2, 3, 4]
+    assert np.array_equal(weights.Get(stage.GetEndTimeCode()), weights.Get(4))
 
 
 def _shown_colours(stage, path):

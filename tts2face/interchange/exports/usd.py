@@ -1,7 +1,7 @@
 """Head mesh with blend shapes, skeleton and animation as USD (UsdSkel), by usd-core (extra ``[usd]``).
 
-Millimetres (``metersPerUnit`` 0.001), y up, the face looks along +z. Time code i is frame i. Textures lie beside the
-file; a .usdz file holds them.
+Millimetres (``metersPerUnit`` 0.001), y up, the face looks along +z. Time code i is frame i; the last frame holds up to
+the end of the sound. Textures lie beside the file; a .usdz file holds them.
 """
 
 import errno
@@ -29,6 +29,7 @@ from tts2face.interchange.exports.surfaces import (
     vertex_normals,
 )
 from tts2face.interchange.exports.usd_materials import TextureFiles, define_material
+from tts2face.interchange.gltf.container import key_times
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import decode_srgb
 from tts2face.storage.spool import Spool
@@ -56,6 +57,7 @@ class UsdWriter:
         self._targets = morph_targets(target.face, target.channels)
         self._weights, self._places = Spool(len(self._targets.names)), Spool(3)
         self._turns = [Spool(4) for _ in self._skeleton.names[HEAD:]]
+        self._end_s = 0.0
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         if target.name.lower().endswith(SINGLE_FILE):
             self._folder = tempfile.TemporaryDirectory(prefix="tts2face-")
@@ -65,6 +67,7 @@ class UsdWriter:
 
     def add(self, part: Part) -> None:
         """Append frames."""
+        self._end_s = max(self._end_s, part.end)
         self._weights.add(self._targets.weights(part.motion))
         self._places.add(self._skeleton.head_places(part.head))
         self._turns[0].add(self._skeleton.head_rotations(part.head))
@@ -80,14 +83,15 @@ class UsdWriter:
         stage.SetTimeCodesPerSecond(float(target.fps))
         stage.SetFramesPerSecond(float(target.fps))
         stage.SetStartTimeCode(0)
-        stage.SetEndTimeCode(self._weights.n_rows - 1)
+        codes = key_times(self._weights.n_rows, 1.0, self._end_s * float(target.fps)).tolist()
+        stage.SetEndTimeCode(codes[-1])
         about = {"sound": target.sound_name, "generator": "tts2face", "notice": self._face.synthetic_notice}
         stage.GetRootLayer().customLayerData = {name: value for name, value in about.items() if value}
         root = usd.UsdSkel.Root.Define(stage, ROOT_PATH)
         stage.SetDefaultPrim(root.GetPrim())
         names = _identifiers(self._targets.names)
         _define_skeleton(usd, stage, self._skeleton)
-        self._define_animation(stage, names)
+        self._define_animation(stage, names, codes)
         for number, surface in enumerate(self._surfaces):
             self._define_surface(stage, surface, number, names)
         textures = self._textures.write()
@@ -120,7 +124,7 @@ class UsdWriter:
         if self._folder is not None:
             self._folder.cleanup()
 
-    def _define_animation(self, stage: Any, names: list[str]) -> None:
+    def _define_animation(self, stage: Any, names: list[str], codes: list[float]) -> None:
         usd = self._usd
         animation = usd.UsdSkel.Animation.Define(stage, f"{ROOT_PATH}/Skeleton/Animation")
         animation.CreateBlendShapesAttr(names)
@@ -133,11 +137,12 @@ class UsdWriter:
         rows = np.asarray(self._weights.rows())
         places = np.asarray(self._places.rows())
         turns = np.stack([np.asarray(spool.rows()) for spool in self._turns], axis=1)
-        for frame in range(len(rows)):
-            weights.Set(usd.Vt.FloatArray.FromNumpy(rows[frame].copy()), frame)
-            rotations.Set(usd.Vt.QuatfArray.FromNumpy(turns[frame].copy()), frame)
+        for number, code in enumerate(codes):
+            frame = min(number, len(rows) - 1)
+            weights.Set(usd.Vt.FloatArray.FromNumpy(rows[frame].copy()), code)
+            rotations.Set(usd.Vt.QuatfArray.FromNumpy(turns[frame].copy()), code)
             moved = np.vstack([places[frame : frame + 1], still]).astype(np.float32)
-            translations.Set(usd.Vt.Vec3fArray.FromNumpy(moved), frame)
+            translations.Set(usd.Vt.Vec3fArray.FromNumpy(moved), code)
 
     def _define_surface(self, stage: Any, surface: ExportSurface, number: int, shape_names: list[str]) -> None:
         usd = self._usd

@@ -15,13 +15,7 @@ FOREIGN = "__MACOSX"  # folder that macOS adds, with a file beside each file
 
 
 def unpack_character(archive: Path, folder: Path) -> Path:
-    """The file or folder of the one character in an archive, which is unpacked into a new folder.
-
-    Raises
-    ------
-    DataError
-        The archive is damaged, locked or too large, or holds no character or several.
-    """
+    """The file or folder of the one character in an archive, which is unpacked into a new folder."""
     try:
         with zipfile.ZipFile(archive) as packed:
             files = [entry for entry in packed.infolist() if not entry.is_dir() and FOREIGN not in entry.filename]

@@ -32,7 +32,8 @@ def sent(
     service: RunningService, request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[tuple[str, tuple[str, ...]]]:
     """Name of a face at the service, and the names of its character's shapes."""
-    folder, head, name = tmp_path_factory.mktemp("character"), head_without_mouth(), str(request.param)
+    folder, head = tmp_path_factory.mktemp("character"), head_without_mouth()
+    name = str(request.param)
     names = {shape: own for own, shape in FAMILIES[name].items()}
     variant = Variant(rename=names.__getitem__, dropped=frozenset(set(head.shape_names) - set(names)))
     character = write_character_file(folder / "a.glb", variant, head)
