@@ -14,9 +14,10 @@ from tts2face.interchange.characters.shapes import ShapeMapping, ShapeSource
 from tts2face.numeric.arrays import FloatArray, IntArray, ordered_product, smoothstep
 
 MOVED_SHARE = 0.1  # of a shape's largest displacement: vertices that it clearly moves
-NECK_SHARE = 0.55  # of the height of the moved face: length of neck kept below it
-WIDTH_SHARE = 1.8  # of the same height: width kept on each side of its middle
-BLEND_SHARE = 0.03  # of the same height: half width of the blend between the two halves of a divided shape
+# Of the height from the face's lowest point to the top of the head, by which pictures are framed: what is kept below,
+# and on each side of the middle. Upright pictures show as much of the bust, and wide ones of the shoulders.
+BUST_SHARE, WIDTH_SHARE = 0.8, 1.2
+BLEND_SHARE = 0.03  # of the height of the moved face: half width of the blend between two halves of a divided shape
 LEFT_EYE, RIGHT_EYE = 1, 2  # values of `HeadMesh.eye_of`
 
 
@@ -112,9 +113,11 @@ def build_head_mesh(character: Character, mapping: ShapeMapping, yaw_deg: float)
 
 
 def crop_head(whole: HeadMesh, low: FloatArray, high: FloatArray) -> HeadMesh:
-    """Head and neck of a character whose face has these corners (3,)."""
-    height, middle = high[1] - low[1], (low[0] + high[0]) / 2
-    lowest = low[1] - NECK_SHARE * height
+    """Head and bust of a character whose face has these corners (3,)."""
+    middle = (low[0] + high[0]) / 2
+    above = np.abs(whole.vertices[:, 0] - middle) < high[1] - low[1]  # no raised arms
+    height = whole.vertices[above, 1].max() - low[1]
+    lowest = low[1] - BUST_SHARE * height
     head = whole.keep((whole.vertices[:, 1] >= lowest)[whole.triangles].any(axis=1))
     head = head.cut(head.vertices[:, 1] - lowest)
     for side in (1, -1):

@@ -3,6 +3,7 @@
 from textwrap import TextWrapper
 from typing import TYPE_CHECKING
 
+from tts2face.face.expressions import GAZE_SHAPES
 from tts2face.face.stand_in import VISEME_PREFIX
 from tts2face.interchange.characters.import_notes import some_of
 from tts2face.interchange.characters.shape_names import ARKIT_SHAPES
@@ -32,7 +33,7 @@ def report_text(report: "ImportReport") -> str:
 
 def summary(report: "ImportReport") -> list[tuple[str, str]]:
     """Rows of name and text: the shapes found, those of the mouth, replaced, missing and unused ones."""
-    found = [name for name in ARKIT_SHAPES if name not in report.missing]
+    found = [name for name in ARKIT_SHAPES if name in report.mapping]
     visemes = [name.removeprefix(VISEME_PREFIX) for name in report.mapping if name.startswith(VISEME_PREFIX)]
     replaced: dict[str, list[str]] = {}
     for name, replacement in report.missing.items():
@@ -40,6 +41,8 @@ def summary(report: "ImportReport") -> list[tuple[str, str]]:
     missing = replaced.pop(NOTHING, [])
     beside = f", visemes {some_of(visemes, ROW_NAMES)}" if visemes else ""
     rows = [("found", f"{len(found)} of ARKit's {len(ARKIT_SHAPES)}{beside}")]
+    turned = [name for name in GAZE_SHAPES if name not in report.mapping and name not in report.missing]
+    rows += [("added", f"gaze ({len(turned)} shapes): the eyeballs turn")] if turned else []
     mouth = [
         f"{name} {report.strengths[name]:.2f} ({' + '.join(source.name for source in report.mapping[name])})"
         for name in SHOWN

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.interchange.characters.made import shipped_head, write_character_file
 from tts2face.interchange.characters.cutting import cut_triangles
 from tts2face.interchange.characters.gltf_reader import read_gltf_character
-from tts2face.interchange.characters.head_mesh import NECK_SHARE, WIDTH_SHARE, build_head_mesh, moved_box
+from tts2face.interchange.characters.head_mesh import BUST_SHARE, WIDTH_SHARE, build_head_mesh, moved_box
 from tts2face.interchange.characters.importing import propose_mapping
 
 ROUNDING = 1e-9  # of coordinates of about 1
@@ -58,7 +58,8 @@ def test_a_body_is_cut_straight_below_the_neck(tmp_path: Path) -> None:
     character = read_gltf_character(write_character_file(tmp_path / "body.glb", face=replace(head, vertices=long)))
     mesh = build_head_mesh(character, propose_mapping(character), 0.0)
     low, high = moved_box(mesh)
-    lowest = low[1] - NECK_SHARE * (high[1] - low[1])
+    height = mesh.vertices[:, 1].max() - low[1]
+    lowest = low[1] - BUST_SHARE * height
     assert abs(mesh.vertices[:, 1].min() - lowest) < 1e-6  # metres; single precision in the file
     edges = np.sort(mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     unique, uses = np.unique(edges, axis=0, return_counts=True)
@@ -67,7 +68,7 @@ def test_a_body_is_cut_straight_below_the_neck(tmp_path: Path) -> None:
     on_plane = np.abs(mesh.vertices[border[near]][:, :, 1] - lowest).max(axis=1) < 1e-6
     assert near.sum() > 30
     assert on_plane.mean() > 0.9  # others are borders of hair and seams of the texture
-    assert np.abs(mesh.vertices[:, 0]).max() <= WIDTH_SHARE * (high[1] - low[1]) + 1e-3
+    assert np.abs(mesh.vertices[:, 0]).max() <= WIDTH_SHARE * height + 1e-3
 
 
 def test_attributes_of_cut_edges_are_interpolated(tmp_path: Path) -> None:
