@@ -147,6 +147,7 @@ def test_receivers_that_never_answer_delay_no_other_key(
         async def run() -> None:
             async with sending(client, silent.host, receiver.host):
                 await asyncio.to_thread(eventually, lambda: {name for name, _ in receiver.messages} == names)
+                await asyncio.to_thread(eventually, lambda: len(silent.connections) >= KEY_PLACES)
 
         asyncio.run(run())
         assert len(silent.connections) == KEY_PLACES
@@ -167,6 +168,7 @@ def test_a_host_that_never_answers_delays_no_other_host(
         async def run() -> None:
             async with sending(client, silent.host, receiver.host):
                 await asyncio.to_thread(eventually, lambda: [one for one, _ in receiver.messages] == [name])
+                await asyncio.to_thread(eventually, lambda: len(silent.connections) >= 3)
 
         asyncio.run(run())
         assert len(silent.connections) == 3

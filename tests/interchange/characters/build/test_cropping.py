@@ -57,7 +57,7 @@ def test_a_body_is_cut_straight_below_the_neck(tmp_path: Path) -> None:
     long[neck, 1] -= 8 * (np.median(long[:, 1]) - 60.0 - long[neck, 1])  # stretched to a body
     character = read_gltf_character(write_character_file(tmp_path / "body.glb", face=replace(head, vertices=long)))
     mesh = build_head_mesh(character, propose_mapping(character), 0.0)
-    low, high = moved_box(mesh)
+    low, _ = moved_box(mesh)
     height = mesh.vertices[:, 1].max() - low[1]
     lowest = low[1] - BUST_SHARE * height
     assert abs(mesh.vertices[:, 1].min() - lowest) < 1e-6  # metres; single precision in the file
