@@ -1,4 +1,4 @@
-"""Decoding of KHR_meshopt_compression: streams of version 1, by hand and by meshoptimizer; its filter of colours."""
+"""Decoding of KHR_meshopt_compression: streams of version 1 and filters, by hand and by meshoptimizer."""
 
 import base64
 import json
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from tests.interchange.characters.made import glb
 from tests.interchange.exports import programs
-from tts2face.interchange.gltf.meshopt import apply_color_filter, decode_buffer
+from tts2face.interchange.gltf.meshopt import decode_buffer
+from tts2face.interchange.gltf.meshopt_filters import apply_filter
 from tts2face.interchange.gltf.reader import read_gltf
 
 COUNT, STRIDE = 20, 8
@@ -20,11 +21,12 @@ BYTES, PAIRS, WORDS = 0, 1, 2  # kinds of four bytes
 ENCODE = """
 const {MeshoptEncoder: encoder} = require('meshoptimizer/encoder'), fs = require('fs');
 encoder.ready.then(() => {
-  const found = JSON.parse(fs.readFileSync(process.argv[1])).map(({rows, count, size, level, version, colours}) => {
+  const found = JSON.parse(fs.readFileSync(process.argv[1])).map((asked) => {
+    const {rows, count, size, level, version, filter, bits} = asked;
     let bytes = Buffer.from(rows, 'base64');
-    if (colours) {
+    if (filter) {
       const values = new Float32Array(new Uint8Array(bytes).buffer);
-      bytes = encoder.encodeFilterColor(values, count, size, 2 * size);
+      bytes = encoder[`encodeFilter${filter}`](values, count, size, bits);
     }
     const made = encoder.encodeVertexBufferLevel(new Uint8Array(bytes), count, size, level, version);
     return Buffer.from(made).toString('base64');
@@ -68,6 +70,11 @@ def made_rows(seed: int = 1) -> NDArray[np.uint8]:
 
 def decoded(content: bytes, count: int = COUNT, stride: int = STRIDE) -> NDArray[np.uint8]:
     return decode_buffer(np.frombuffer(content, np.uint8), "ATTRIBUTES", count, stride).reshape(count, stride)
+
+
+def filtered(content: bytes, name: str, stride: int, kind: type[np.generic], width: int = 4) -> NDArray[np.int64]:
+    read = apply_filter(np.frombuffer(content, np.uint8), name, stride)
+    return np.frombuffer(read.tobytes(), kind).reshape(-1, width).astype(np.int64)
 
 
 @pytest.mark.parametrize("kinds", [[BYTES, BYTES], [PAIRS, BYTES], [WORDS, PAIRS], [PAIRS, PAIRS], [WORDS, WORDS]])
@@ -115,7 +122,7 @@ def test_positions_of_a_file(tmp_path: Path) -> None:
 def test_colours_of_eight_bits() -> None:
     # white, and red of half alpha: luma, orange, green; the highest bit of the fourth says that all have 8
     packed = struct.pack("BbbBBbbB", 255, 0, 0, 0xFF, 64, 127, -64, 0xC0)
-    found = np.frombuffer(apply_color_filter(np.frombuffer(packed, np.uint8), 4).tobytes(), np.uint8).reshape(-1, 4)
+    found = filtered(packed, "COLOR", 4, np.uint8)
     assert np.abs(found.astype(int) - [[255, 255, 255, 255], [255, 0, 1, 128]]).max() <= 1
 
 
@@ -135,17 +142,78 @@ def test_streams_of_meshoptimizer(tmp_path: Path) -> None:
          "version": version}
         for rows in made.values() for level, version in ((2, 0), (0, 1), (2, 1), (3, 1))
     ]  # fmt: skip
-    colours = random.random((50, 4)).astype("<f4")
-    plain = {"rows": base64.b64encode(colours.tobytes()).decode(), "count": 50, "level": 2, "version": 1}
-    asked += [plain | {"size": size, "colours": True} for size in (4, 8)]
     (tmp_path / "asked.json").write_text(json.dumps(asked))
     answer = json.loads(programs.run_node(ENCODE, packages, str(tmp_path / "asked.json")))
     for one, content in zip(asked, map(base64.b64decode, answer), strict=True):
         assert content[0] == 0xA0 + one["version"]
         found = decoded(content, one["count"], one["size"]).reshape(-1)
-        if "colours" not in one:
-            np.testing.assert_array_equal(found, np.frombuffer(base64.b64decode(one["rows"]), np.uint8))
+        np.testing.assert_array_equal(found, np.frombuffer(base64.b64decode(one["rows"]), np.uint8))
+
+
+def unit_rows(n: int) -> NDArray[np.float32]:
+    rows = np.random.default_rng(n).normal(size=(n, 4)).astype("<f4")
+    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
+
+
+def test_filters_of_meshoptimizer(tmp_path: Path) -> None:
+    """Values come back within the bits that they were written with, at both sizes of elements and of any sign."""
+    packages = programs.node_package("meshoptimizer")
+    normals = unit_rows(301)
+    normals[:, :3] /= np.linalg.norm(normals[:, :3], axis=1, keepdims=True)
+    normals[:3, :3] = np.eye(3)
+    normals[3:6, :3] = -np.eye(3)
+    normals[:, 3] = 1.0
+    floats = (unit_rows(77) * [1e-3, 1.0, 40.0, 1e4]).astype("<f4")
+    cases = [
+        ("Color", "COLOR", abs(unit_rows(50)), 4, 8, np.uint8, 2 / 255),
+        ("Color", "COLOR", abs(unit_rows(50)), 8, 16, np.uint16, 1e-4),
+        ("Oct", "OCTAHEDRAL", normals, 4, 8, np.int8, 0.02),
+        ("Oct", "OCTAHEDRAL", normals, 8, 12, np.int16, 0.001),
+        ("Quat", "QUATERNION", unit_rows(200), 8, 16, np.int16, 1e-4),
+        ("Quat", "QUATERNION", unit_rows(200), 8, 10, np.int16, 4e-3),
+        ("Exp", "EXPONENTIAL", floats, 16, 20, np.float32, 1e-5),
+    ]
+    asked = [
+        {"rows": base64.b64encode(np.ascontiguousarray(rows, "<f4").tobytes()).decode(), "count": len(rows),
+         "size": size, "level": 2, "version": 1, "filter": function, "bits": bits}
+        for function, _, rows, size, bits, *_ in cases
+    ]  # fmt: skip
+    (tmp_path / "asked.json").write_text(json.dumps(asked))
+    answer = json.loads(programs.run_node(ENCODE, packages, str(tmp_path / "asked.json")))
+    for (_, name, rows, size, _, kind, most), content in zip(cases, map(base64.b64decode, answer), strict=True):
+        read = apply_filter(decoded(content, len(rows), size).reshape(-1), name, size)
+        values = np.frombuffer(read.tobytes(), kind).reshape(-1, 4).astype(np.float64)
+        if name == "EXPONENTIAL":
+            # the values of a row share an exponent
+            assert (np.abs(values - rows) <= most * np.abs(rows).max(axis=1, keepdims=True)).all()
             continue
-        kind = np.uint8 if one["size"] == 4 else np.uint16
-        shown = np.frombuffer(apply_color_filter(found, one["size"]).tobytes(), kind).reshape(-1, 4)
-        np.testing.assert_allclose(shown / np.iinfo(kind).max, colours, atol=2 / 255 if one["size"] == 4 else 1e-4)
+        values /= np.iinfo(kind).max
+        # q and -q are the same turn
+        sign = np.sign((values * rows).sum(axis=1, keepdims=True)) if name == "QUATERNION" else 1.0
+        np.testing.assert_allclose(sign * values, rows, atol=most)
+
+
+@pytest.mark.parametrize(
+    ("packed", "expected"),
+    [
+        ((0, 0, 127, 5), (0, 0, 127, 5)),
+        ((127, 0, 127, 0), (127, 0, 0, 0)),
+        ((127, 127, 127, 1), (0, 0, -127, 1)),
+        ((0, -32, 63, 0), (0, -91, 88, 0)),
+    ],
+)
+def test_directions_on_an_octahedron(packed: tuple[int, ...], expected: tuple[int, ...]) -> None:
+    found = filtered(struct.pack("4b", *packed), "OCTAHEDRAL", 4, np.int8)[0]
+    assert np.abs(found - expected).max() <= 1
+
+
+@pytest.mark.parametrize("largest", range(4))
+def test_rotations_leave_out_their_largest_value(largest: int) -> None:
+    found = filtered(struct.pack("<4h", 0, 0, 0, 0x7FFC | largest), "QUATERNION", 8, np.int16)[0]
+    assert found.tolist() == [32767 * (place == largest) for place in range(4)]
+
+
+@pytest.mark.parametrize(("name", "stride"), [("SPHERICAL", 4), ("QUATERNION", 4), ("OCTAHEDRAL", 12)])
+def test_a_filter_that_does_not_exist_is_named(name: str, stride: int) -> None:
+    with pytest.raises(DataError, match=f"has the filter '{name}' of elements of {stride} bytes"):
+        apply_filter(np.zeros(24, np.uint8), name, stride)

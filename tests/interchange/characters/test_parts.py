@@ -16,7 +16,8 @@ from tts2face.interchange.characters.surface_points import (
     nearest_points,
     points_under_pixels,
 )
-from tts2face.interchange.gltf.meshopt import apply_exponential_filter, decode_buffer
+from tts2face.interchange.gltf.meshopt import decode_buffer
+from tts2face.interchange.gltf.meshopt_filters import apply_filter
 from tts2face.models.face_loading import load_face
 from tts2face.numeric.arrays import matrix_quaternion, quaternion_matrix
 from tts2face.picture.camera import CameraMatrices
@@ -90,7 +91,7 @@ def test_compressed_attributes() -> None:
 
 def test_the_exponential_filter() -> None:
     packed = np.array([(-3 & 0xFF) << 24 | 20, (2 & 0xFF) << 24 | (-5 & 0xFFFFFF)], np.uint32).view(np.uint8)
-    np.testing.assert_array_equal(np.frombuffer(apply_exponential_filter(packed).tobytes(), "<f4"), [2.5, -20.0])
+    np.testing.assert_array_equal(np.frombuffer(apply_filter(packed, "EXPONENTIAL", 4).tobytes(), "<f4"), [2.5, -20.0])
 
 
 @pytest.mark.skipif(find_spec("meshoptimizer") is None, reason="the reference encoder is not installed")

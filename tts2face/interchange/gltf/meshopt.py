@@ -1,7 +1,6 @@
-"""Decoder of EXT_meshopt_compression and KHR_meshopt_compression: attributes, triangles, indices, and two filters.
+"""Decoder of EXT_meshopt_compression and KHR_meshopt_compression: attributes, triangles and indices.
 
-Source: the Khronos glTF extensions of these names, bitstreams of versions 0 and 1. Their filters OCTAHEDRAL and
-QUATERNION are of normals and rotations over time, which are not read.
+Source: the Khronos glTF extensions of these names, bitstreams of versions 0 and 1.
 """
 
 from typing import Any
@@ -15,8 +14,6 @@ from tts2face.numeric.kernels import kernel
 ATTRIBUTES = "ATTRIBUTES"
 TRIANGLES = "TRIANGLES"
 INDICES = "INDICES"
-NO_FILTER, EXPONENTIAL = "NONE", "EXPONENTIAL"
-COLOR = "COLOR"
 GROUP = 16  # elements whose deltas share one width
 # bytes and elements of a block (EXT_meshopt_compression, appendix A)
 MAX_BLOCK_BYTES, MAX_BLOCK = 8192, 256
@@ -40,31 +37,6 @@ def decode_buffer(content: Bytes, mode: str, count: int, stride: int) -> Bytes:
             raise _damaged()
         return np.frombuffer(np.array(indices, np.uint32 if stride == 4 else np.uint16).tobytes(), np.uint8)
     raise DataError(f"a meshopt stream has the mode {mode!r:.20} with elements of {stride} bytes; export it again")
-
-
-def apply_exponential_filter(content: Bytes) -> Bytes:
-    """Bytes of the 32-bit floats that pairs of exponent (8 bits) and mantissa (24 bits) stand for."""
-    packed = np.frombuffer(content.tobytes(), np.int32)
-    values = np.ldexp(((packed << 8) >> 8).astype(np.float64), packed >> 24).astype(np.float32)
-    return np.frombuffer(values.tobytes(), np.uint8)
-
-
-def apply_color_filter(content: Bytes, stride: int) -> Bytes:
-    """Bytes of red, green, blue and alpha, of 8 or 16 bits, that luma and two differences of colours stand for.
-
-    The highest bit of the fourth value says how many bits all have, and the others are alpha without its lowest bit.
-    """
-    unsigned, signed = (np.uint8, np.int8) if stride == 4 else (np.uint16, np.int16)
-    packed = np.frombuffer(content.tobytes(), unsigned).reshape(-1, 4)
-    orange, green = np.frombuffer(content.tobytes(), signed).reshape(-1, 4)[:, 1:3].astype(np.float64).T
-    luma, stated = packed[:, 0].astype(np.float64), packed[:, 3].astype(np.int64)
-    n_bits = np.frexp(np.maximum(stated, 1).astype(np.float64))[1]
-    full = (1 << n_bits.astype(np.int64)) - 1
-    alpha = stated & (full >> 1)
-    alpha = (alpha << 1) | (alpha & 1)
-    colours = np.column_stack([luma + orange - green, luma + green, luma - orange - green, alpha])
-    scaled = np.rint(colours * (np.iinfo(unsigned).max / full)[:, None])
-    return np.frombuffer(np.clip(scaled, 0, np.iinfo(unsigned).max).astype(unsigned).tobytes(), np.uint8)
 
 
 def _damaged() -> DataError:

@@ -20,14 +20,8 @@ from lexicon.values.files import check_regular_file, decode_utf8
 from lexicon.values.json_text import parse_json
 from tts2face.interchange.gltf.container import ALIGNMENT, BINARY_CHUNK, JSON_CHUNK, MAGIC
 from tts2face.interchange.gltf.fields import MISSING, Fields
-from tts2face.interchange.gltf.meshopt import (
-    COLOR,
-    EXPONENTIAL,
-    NO_FILTER,
-    apply_color_filter,
-    apply_exponential_filter,
-    decode_buffer,
-)
+from tts2face.interchange.gltf.meshopt import decode_buffer
+from tts2face.interchange.gltf.meshopt_filters import NO_FILTER, apply_filter
 from tts2face.numeric.arrays import FloatArray
 
 MAX_FILE_BYTES = 512_000_000  # a film character with 4k textures has about 100 MB
@@ -204,11 +198,8 @@ class GltfFile:
     def _decode(self, fields: Fields) -> NDArray[np.uint8]:
         count, stride = fields.integer("count", low=1, high=MAX_COUNT), fields.integer("byteStride", low=1, high=256)
         self._reserve(count * stride, fields)
-        kept = fields.text("filter", NO_FILTER)
         content = decode_buffer(self._slice(fields), fields.text("mode"), count, stride)
-        if kept == COLOR and stride in (4, 8):
-            return apply_color_filter(content, stride)
-        return apply_exponential_filter(content) if kept == EXPONENTIAL else content
+        return apply_filter(content, fields.text("filter", NO_FILTER), stride)
 
     def buffer(self, number: int) -> NDArray[np.uint8]:
         """Bytes of a buffer, from the binary chunk, a data URI or a file beside this one."""
