@@ -4,12 +4,17 @@ import csv
 from collections.abc import Iterable
 from importlib.resources import files
 
+import numpy as np
 import pytest
 
 from tts2face.face.expressions import OWN_EXPRESSIONS
+from tts2face.interchange.characters.character import Character, Material, MaterialPiece, MorphTarget
 from tts2face.interchange.characters.families import FOLDER, general_family, program_families, recognised_families
 from tts2face.interchange.characters.shape_names import ARKIT_SHAPES, combinations_of_shapes, guess_mapping
 from tts2face.interchange.characters.shapes import HEADER, ShapeSource
+from tts2face.interchange.characters.two_way import with_directions
+
+JAW = MorphTarget(0, 0)
 
 VISEMES = tuple(f"mouthViseme_{at}" for at in ("aa", "ee", "ih", "oh", "ou", "pp", "ff", "th", "dd", "kk", "ch", "ss"))
 VISEMES += ("mouthViseme_nn", "mouthViseme_rr")
@@ -25,8 +30,18 @@ FAMILIES = {  # names of a file, and how many of them are understood
                   "CTRL_expressions_browRaiseInL CTRL_expressions_eyeLookLeftR", 8),
     "facs": ("AU12_L AU12_R AU1 AU02 AU_4 AU26 AU45_L AU45_R AU9 AU17 AU20_L", 11),
     "daz": ("Genesis8Female__eCTRLMouthOpen Genesis8Female__eCTRLEyesClosedL Genesis8Female__eCTRLvF "
-            "Genesis8Female__eCTRLMouthSmileSimpleR Genesis8Female__eCTRLLipBottomUp-DownL", 5),
-    "genesis9": ("facs_jnt_JawOpen facs_bs_MouthFunnelUpperLeft facs_bs_MouthSmileLeft_div2 facs_ctrl_CheekPuff", 4),
+            "Genesis8Female__eCTRLMouthSmileSimpleR Genesis8Female__eCTRLLipBottomUp-DownL "
+            "Genesis8Female__eCTRLJawSide-Side Genesis8Female__eCTRLTongueIn-Out "
+            "Genesis8Female__eCTRLTongueUp-Down", 8),
+    "genesis9": ("facs_jnt_JawOpen facs_bs_MouthFunnelUpperLeft facs_bs_MouthSmileLeft_div2 facs_ctrl_CheekPuff "
+                 "facs_jnt_EyesWideLeft facs_bs_MouthPressLowerRight facs_jnt_TongueUp facs_ctrl_vF", 8),
+    "mixamo": ("Blink_Left BrowsUp_Right EyesWide_Left JawForeward MouthNarrow_Left MouthOpen LowerLipIn "
+               "UpperLipUp_Left MouthWhistle_NarrowAdjust_Right NoseScrunch_Left Midmouth_Left Smile_Right "
+               "LowerLipOut", 12),
+    "makehuman": ("JawDrop LipsKiss LeftUpperLidClosed RightEyeturnLeft MouthLeftPullUp MouthRightPlatysma "
+                  "lowerLipBackward UpperLipForward CheeksPump ChinLeft TonguePointUp TongueUshape", 11),
+    "mblab": ("Expressions_mouthOpen_max Expressions_mouthSmileL_max Expressions_eyeClosedR_max "
+              "Expressions_jawHoriz_min Expressions_browsMidVert_max Expressions_tongueOut_max", 6),
     "sranipal": ("Jaw_Open Mouth_Ape_Shape Mouth_Pout Mouth_Upper_Overturn Mouth_Lower_Inside Eye_Left_Squeeze "
                  "Eye_Left_Right Mouth_Sad_Left Mouth_Upper_UpRight Tongue_LongStep2", 10),
     "unified_expressions": ("JawOpen MouthClosed LipPuckerUpperLeft LipPuckerLowerRight LipSuckUpper EyeClosedLeft "
@@ -143,6 +158,41 @@ def test_sums_and_alternatives() -> None:
     )
     mapping = guess_mapping(["CTRL_expressions_jawOpen", *(f"CTRL_expressions_mouthFunnel{at}" for at in ("UL", "DR"))])
     assert [source.name[-2:] for source in mapping["mouthFunnel"]] == ["UL", "DR"]
+
+
+def with_side_to_side(name: str, step: tuple[float, float, float], *, faces_back: bool = False) -> Character:
+    """A character of three vertices that one shape moves by `step`."""
+    moved = np.tile(np.array(step, np.float32), (3, 1))
+    piece = MaterialPiece("skin", np.eye(3), np.arange(3)[None], None, None, 0, {JAW: moved}, np.zeros(3, np.int64))
+    return Character((piece,), (Material("skin"),), {JAW: name}, {}, {}, {}, {}, faces_back, "")
+
+
+@pytest.mark.parametrize("faces_back", [False, True])
+@pytest.mark.parametrize("along", [1.0, -1.0])
+def test_which_side_a_side_to_side_moves_to_is_read_from_the_mesh(along: float, faces_back: bool) -> None:
+    character = with_side_to_side("eCTRLJawSide-Side", (along, 0.1, 0.2), faces_back=faces_back)
+    mapping = guess_mapping(["eCTRLJawSide-Side", "eCTRLMouthOpen"])
+    assert [mapping[shape][0].side for shape in ("jawLeft", "jawRight")] == ["", ""]
+    turned = with_directions(mapping, character)
+    to_left = -along if faces_back else along
+    assert (turned["jawLeft"][0].gain, turned["jawRight"][0].gain) == (to_left, -to_left)
+    assert turned["jawOpen"] == mapping["jawOpen"]
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "step", "gain"),
+    [
+        ("eCTRLTongueIn-Out", "tongueOut", (0.0, 0.0, -1.0), -1.0),
+        ("eCTRLTongueIn-Out", "tongueOut", (0.0, 0.0, 1.0), 1.0),
+        ("eCTRLLipTopIn-Out", "mouthRollUpper", (0.0, 0.0, 1.0), -1.0),
+        ("facs_bs_JawLeft", "jawLeft", (-1.0, 0.0, 0.0), 1.0),
+    ],
+)
+def test_only_names_of_two_directions_are_turned(
+    name: str, shape: str, step: tuple[float, float, float], gain: float
+) -> None:
+    mapping = {shape: (ShapeSource(name),)}
+    assert with_directions(mapping, with_side_to_side(name, step))[shape] == (ShapeSource(name, gain),)
 
 
 def test_visemes_of_contacts_stand_beside_a_jaw() -> None:

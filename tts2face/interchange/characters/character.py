@@ -1,6 +1,6 @@
 """Character: meshes, materials, named shapes and bones of an imported file, in the file's own units."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -130,15 +130,21 @@ class Character:
 
     def reach(self, name: str) -> float:
         """Largest displacement of a vertex by the morph targets of a name, or by an expression, in the file's units."""
-        targets = {target: 1.0 for target, own in self.target_names.items() if own == name}
-        weights = targets or self.expressions.get(name, {})
-        moved = (
-            abs(weight) * float(np.linalg.norm(piece.morphs[target], axis=1).max(initial=0.0))
-            for piece in self.pieces
-            for target, weight in weights.items()
-            if target in piece.morphs
-        )
+        moved = (float(np.linalg.norm(morph, axis=1).max(initial=0.0)) for morph in self._displacements(name))
         return max(moved, default=0.0)
+
+    def drift(self, name: str) -> FloatArray:
+        """Sum (3,) of all displacements: to the character's left, up and ahead."""
+        turn = np.array([-1.0, 1.0, -1.0]) if self.faces_back else np.ones(3)
+        return turn * sum((morph.sum(axis=0, dtype=np.float64) for morph in self._displacements(name)), np.zeros(3))
+
+    def _displacements(self, name: str) -> Iterator[NDArray[np.float32]]:
+        """Displacements (N, 3) of the pieces by the morph targets of a name, or by those of an expression."""
+        targets = {target: 1.0 for target, own in self.target_names.items() if own == name}
+        for piece in self.pieces:
+            for target, weight in (targets or self.expressions.get(name, {})).items():
+                if target in piece.morphs:
+                    yield np.float32(weight) * piece.morphs[target]
 
     @property
     def still_names(self) -> tuple[str, ...]:

@@ -46,6 +46,7 @@ from tts2face.interchange.characters.surface_points import SurfacePoints, neares
 from tts2face.interchange.characters.transfer.first_look import find_head, placed_head
 from tts2face.interchange.characters.transfer.tracked import locate_bare_landmarks
 from tts2face.interchange.characters.transfer.transfer import transfer_shapes
+from tts2face.interchange.characters.two_way import with_directions
 from tts2face.interchange.gltf.reader import SUFFIXES
 from tts2face.models.face import WIDE_OPEN, Face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
@@ -131,6 +132,10 @@ def propose_mapping(character: Character) -> ShapeMapping:
 
     A jaw that moves next to nothing beside the visemes is none: the character speaks by these.
     """
+    return with_directions(_named_mapping(character), character)
+
+
+def _named_mapping(character: Character) -> ShapeMapping:
     names = character.moving_names
     mapping = guess_mapping(names)
     jaw = {source.name for source in mapping.get(WIDE_OPEN, ())}

@@ -15,6 +15,7 @@ MAX_MAPPING_BYTES = 1_000_000
 NOTHING = "-"  # source of a shape that is left out
 TRANSFER = "transfer"  # shapes of a shipped head, in place of the character's own
 SIDES = ("Left", "Right")
+WHOLE = ("jaw", "mouth")  # what moves as a whole to the left or right
 HEADER = ("shape", "source", "gain")
 
 
@@ -38,7 +39,7 @@ def with_sides(mapping: ShapeMapping) -> ShapeMapping:
             users.setdefault(source.name, set()).add(shape)
 
     def sided(shape: str, source: ShapeSource) -> ShapeSource:
-        side = next((side for side in SIDES if shape.endswith(side)), "")
+        side = next((side for side in SIDES if shape.endswith(side) and shape.removesuffix(side) not in WHOLE), "")
         both = side and users[source.name] & opposites(shape, side)
         return replace(source, side=side if both else "")
 
