@@ -16,7 +16,7 @@ from tts2face.numeric.arrays import FloatArray, IntArray, ordered_product, smoot
 MOVED_SHARE = 0.1  # of a shape's largest displacement: vertices that it clearly moves
 # Of the height from the face's lowest point to the top of the head, by which pictures are framed: what is kept below,
 # and on each side of the middle. Upright pictures show as much of the bust, and wide ones of the shoulders.
-BUST_SHARE, WIDTH_SHARE = 0.8, 1.2
+BUST_SHARE, WIDTH_SHARE = 0.8, 1.8
 BLEND_SHARE = 0.03  # of the height of the moved face: half width of the blend between two halves of a divided shape
 LEFT_EYE, RIGHT_EYE = 1, 2  # values of `HeadMesh.eye_of`
 
