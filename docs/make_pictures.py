@@ -4,9 +4,12 @@
 """
 
 import argparse
+import csv
+import re
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -19,17 +22,27 @@ from corpus_tools.studies.gestures.write import write_gestures
 from corpus_tools.studies.similarity.analysis import SimilarityOptions
 from corpus_tools.studies.similarity.write import write_similarity
 from lexicon.phones import ipa_to_arpabet
-from lexicon.sequence import SILENCE
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face import export
+from tts2face.face.expressions import add_expression_shapes
+from tts2face.face.landmarks import landmark_positions
+from tts2face.face.stand_in import VISEME_PREFIX, viseme_table
+from tts2face.interchange.characters.families import FOLDER, general_family, program_families
+from tts2face.interchange.characters.importing import import_face
+from tts2face.interchange.characters.landmark_table import landmark_table
+from tts2face.interchange.characters.shapes import HEADER
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.palette_file import load_palette
 from tts2face.models.talker_file import load_talker
+from tts2face.numeric.arrays import Float32Array
 from tts2face.photo.face_from_photo import face_from_photo
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import MeshRenderer, draw, mesh_renderer
 from tts2face.request import Request
 from tts2face.session.catalogue import haircuts, identities
 from tts2face.session.session import Session
+from tts2face.types import Clip, Speech, Trajectory, Waveform, resting_head
 
 HERE = Path(__file__).parent / "pictures"
 SENTENCE = "We were away a year ago, but Bob may move five big maps."
@@ -74,6 +87,11 @@ PHOTO_KINDS: Sequence[tuple[str, str, str]] = (
 )  # kinds of pictures, the face that is photographed, and the background of the clip
 AVATAR_OF = "noor"
 BOOKS = ("#7a3b2e", "#c9b48a", "#3f5a6b", "#52683f", "#8f7a55", "#d8d2c4", "#6b4a63")
+FAMILY_TEXT, FAMILY_PHONES = "Father may move five beads.", ("f", "ɑ", "m", "u", "i")
+FAMILY_POSE = {"mouthSmileLeft": 0.9, "mouthSmileRight": 0.9, "eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0}
+FAMILY_CELL, FAMILY_WORD_PIXELS = 128, 13  # px
+FAMILIES_A_ROW = 2
+FAMILY_CAMERA = "0,0,480"
 SIDE = 320
 PHOTO_PICTURE = Picture(size=f"{SIDE}x{SIDE}", camera="0,0,760")
 WORD_PIXELS = 18
@@ -302,12 +320,89 @@ def own_face_sheet(talker: Path) -> Image.Image:
     return sheet(pictures, 6)
 
 
+def families_sheet() -> Image.Image:
+    """The shipped head under the names of each family, imported: five phones of a sentence, a smile with a blink."""
+    names = [family.name for family in (*program_families(), general_family())]
+    rows = [family_row(name) for name in names]
+    n_rows, width = -(-len(rows) // FAMILIES_A_ROW), len(rows[0]) * FAMILY_CELL
+    whole = Image.new("RGB", (FAMILIES_A_ROW * width, n_rows * FAMILY_CELL), "#39424e")
+    for number, row in enumerate(rows):
+        column, line = divmod(number, n_rows)
+        for at, picture in enumerate(row):
+            whole.paste(picture, (column * width + at * FAMILY_CELL, line * FAMILY_CELL))
+    return whole
+
+
+def family_row(name: str) -> list[Image.Image]:
+    """Pictures of the head whose shapes have the first names of a family, written as .glb and imported."""
+    head = load_face("head")
+    own = family_shapes(head, name)
+    limits = np.tile(np.array([0.0, 1.0], np.float32), (len(own), 1))
+    named = replace(
+        head, shape_names=tuple(own), shapes=np.stack(list(own.values())), limits=limits, scores=None, occlusion=None,
+        eyes=tuple(replace(eye, turns={}) for eye in head.eyes),
+    )  # fmt: skip
+    with tempfile.TemporaryDirectory() as folder:
+        file, table = Path(folder) / "named.glb", Path(folder) / "landmarks.tsv"
+        export(silent_clip(named), file, face=named)
+        places = zip(head.landmarks.tolist(), landmark_positions(head).astype(np.float64) / 1000.0, strict=True)
+        table.write_text(landmark_table(dict(places)), encoding="utf-8")
+        face = import_face(file, landmarks=table).face
+    picture = Picture(size=f"{FAMILY_CELL}x{FAMILY_CELL}", camera=FAMILY_CAMERA)
+    spoken = frames_of_phones(Session(face=face), FAMILY_TEXT, FAMILY_PHONES, picture)
+    cells = [pixels for pixels, *_ in spoken]
+    posed = add_expression_shapes(face)
+    cells.append(draw(posed, np.array([FAMILY_POSE.get(one, 0.0) for one in posed.shape_names]), picture=picture))
+    words = (name.replace("_", " "), *map(ipa_to_arpabet, FAMILY_PHONES[1:]), "smile, blink")
+    return [labelled(pixels, word, FAMILY_WORD_PIXELS) for pixels, word in zip(cells, words, strict=True)]
+
+
+def family_shapes(head: Face, family: str) -> Mapping[str, Float32Array]:
+    """Displacements (N, 3) of the head by the first names of a family's table, whose sums are ARKit's shapes."""
+    lines = files(FOLDER).joinpath(f"{family}.tsv").read_text("utf-8").splitlines()
+    table = list(csv.DictReader((line for line in lines if not line.startswith("#")), delimiter="\t"))
+    sums: dict[str, list[tuple[str, float]]] = {}
+    for row in table:
+        shape, first, gain = (row[column] for column in HEADER)
+        sides = ("Left", "Right") if shape.endswith("*") else ("",)
+        for number, side in enumerate(sides):
+            named = [re.sub(r"\{([^/}]*)/([^}]*)\}", rf"\{at + 1}", first.split("|")[0]) for at in range(2)]
+            added = [named[number]] if side else list(dict.fromkeys(named))
+            sums.setdefault(shape.removesuffix("*") + side, []).extend((one, float(gain)) for one in added)
+    own: dict[str, Float32Array] = {}
+    for shape, sources in sums.items():
+        moved = displaced(head, shape)
+        for name, gain in sources:
+            # a name of two directions has been moved by the shape of the other one
+            if gain > 0 or name not in own:
+                own[name] = own.get(name, np.zeros_like(moved)) + moved / np.float32(gain * len(sources))
+    return {name: moved for name, moved in own.items() if moved.any()}
+
+
+def displaced(head: Face, shape: str) -> Float32Array:
+    """Displacement (N, 3) by a shape of the head, or by the sum that is a viseme."""
+    weights = viseme_table().get(shape.removeprefix(VISEME_PREFIX), {shape: 1.0})
+    moved = np.zeros(head.vertices.shape, np.float32)
+    for name, weight in weights.items():
+        if name in head.shape_names:
+            moved += np.float32(weight) * head.shapes[head.shape_names.index(name)]
+    return moved
+
+
+def silent_clip(face: Face) -> Clip:
+    """A clip of one frame of a face at rest."""
+    motion = Trajectory(face.shape_names, np.zeros((1, len(face.shape_names)), np.float32), 30.0)
+    waveform = Waveform(np.zeros(800, np.float32), 24000)
+    return Clip(motion, resting_head(1, 30.0), Speech(waveform, PhoneSequence((SILENCE,), np.array([0.0, 1 / 30])), ()))
+
+
 SHEETS = {
     "cast": cast_sheet,
     "photo": photo_sheet,
     "drawn-hair": drawn_hair_sheet,
     "clip": clip_sheet,
     "faces": faces_sheet,
+    "families": families_sheet,
     "hair": hair_sheet,
     "moods": moods_sheet,
     "shapes": shapes_sheet,

@@ -55,7 +55,10 @@ camera.location, camera.rotation_euler, camera.data.angle = (0, -1.4, 0), (math.
 scene.render.filepath = sys.argv[2]
 bpy.ops.render.render(write_still=True)
 """
-LOCK, LOCK_LAB = (slice(24, 52), slice(20, 28)), (34.6, 20.7, 20.3)  # rows and columns; CIELAB in the video
+LOCKS = {  # rows and columns; CIELAB in the video
+    "ada": ((slice(24, 52), slice(20, 28)), (34.6, 20.7, 20.3)),
+    "head": ((slice(46, 70), slice(20, 26)), (17.9, 7.7, 11.5)),
+}
 
 
 def test_blender_shows_the_vertices_of_the_renderer(tmp_path):
@@ -88,13 +91,18 @@ def _lab(rgb):
     return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
 
 
-def test_blender_shows_the_hair_of_the_default_face_as_the_video_does(tmp_path):
+@pytest.mark.parametrize("name", LOCKS)
+def test_blender_shows_hair_as_the_video_does(name, tmp_path):
     if importlib.util.find_spec("bpy") is None:
         pytest.skip("Blender's package bpy is not installed")
-    face = load_face("ada")
+    face = load_face(name)
     tts2face.export(silent_clip(1, channels=face.shape_names), tmp_path / "a.glb", face=face)
     command = [sys.executable, "-c", LOCK_SCRIPT, str(tmp_path / "a.glb"), str(tmp_path / "a.png")]
     subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
     with Image.open(tmp_path / "a.png") as picture:
         pixels = np.asarray(picture.convert("RGB"), np.float64)
-    assert np.linalg.norm(_lab(pixels[LOCK].mean(axis=(0, 1))) - LOCK_LAB) < 8
+    lock, expected = LOCKS[name]
+    shown = _lab(pixels[lock].mean(axis=(0, 1)))
+    assert np.linalg.norm(shown - expected) < 8
+    # no greyer than there
+    assert np.linalg.norm(shown[1:]) / shown[0] > 0.75 * np.linalg.norm(expected[1:]) / expected[0]

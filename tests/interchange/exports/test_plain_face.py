@@ -8,6 +8,7 @@ import pytest
 from tests.picture.film.lit_face import SKIN_LIGHT, lit_tiny_face
 from tests.picture.tiny_face import tiny_face
 from tts2face.interchange.exports.plain_face import plain_face
+from tts2face.interchange.exports.surfaces import reflection
 from tts2face.models.face import FacePart
 from tts2face.models.face_loading import load_face
 from tts2face.models.light import Lamps
@@ -53,6 +54,19 @@ def test_faces_without_baked_light_or_hair_stay_as_they_are():
     face, _ = lit_hair()
     for still in (tiny_face(textured=True), lit_tiny_face(), replace(face, light=Lamps())):
         assert plain_face(still) is still
+
+
+def test_a_haircut_before_lamps_is_brighter_and_reflects_no_white():
+    face = load_face("head")
+    plain = plain_face(face)
+    hair, own = (next(part for part in shown.parts if part.name == "hair") for shown in (plain, face))
+    assert (reflection(hair), reflection(own)) == (0.0, 0.25)
+    before, after = (decode_srgb(shown.textures[own.texture].pixels / 255) for shown in (face, plain))
+    np.testing.assert_allclose(after.mean(), 1.25 * before.mean(), rtol=0.01)
+    for part in plain.parts:
+        if part.name != "hair" and part.is_textured:
+            assert plain.textures[part.texture] is face.textures[part.texture]
+            assert reflection(part) == 1.0
 
 
 def dressed(heights):

@@ -15,12 +15,25 @@ LINEAR = decode_srgb(np.arange(256) / 255)
 FORWARD = 0.3  # least share of a triangle's normal that points forward where its light counts
 SHADE = (0.4, 1.8)  # least and largest light of a strand, of the mean: the lamps of others shade it again
 USUAL_HUE = 0.75  # share of the hair's usual hue in each place: highlights have that of the lamp
+LAMP_HAIR = 1.25  # light of strands before lamps over that of their colour alone; the means of `head` and of blond hair
 INWARD = 0.2  # weight of the other two corners of the place at which a corner's light is read, off the texture's seams
 
 
 def plain_face(face: Face) -> Face:
     """The face with hair as it looks in its baked light, and clothes that end level; others stay as they are."""
-    return _level_clothes(_film_hair(face) if isinstance(face.light, Baked) else face)
+    return _level_clothes(_film_hair(face) if isinstance(face.light, Baked) else _lamp_hair(face))
+
+
+def _lamp_hair(face: Face) -> Face:
+    """Strands before lamps shine in their own colour: the texture of a haircut brighter, without white reflections."""
+    hair = next((part for part in face.parts if part.name == HAIR_PART), None)
+    if hair is None or face.hairdo is None or not hair.is_textured:
+        return face
+    textures = list(face.textures)
+    own = textures[hair.texture]
+    textures[hair.texture] = replace(own, pixels=encode_srgb(LAMP_HAIR * LINEAR[own.pixels]))
+    parts = tuple(replace(part, specular=0.0) if part is hair else part for part in face.parts)
+    return replace(face, textures=tuple(textures), parts=parts)
 
 
 def _film_hair(face: Face) -> Face:

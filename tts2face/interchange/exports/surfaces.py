@@ -133,7 +133,7 @@ def roughness(part: FacePart) -> float:
 
 def reflection(part: FacePart) -> float:
     """Share of the white light that a smooth surface of glass reflects."""
-    return HAIR_REFLECTION if part.name == HAIR_PART else 1.0
+    return 0.0 if not part.specular else HAIR_REFLECTION if part.name == HAIR_PART else 1.0
 
 
 def texture_jpeg(texture: NDArray[np.uint8]) -> bytes:
