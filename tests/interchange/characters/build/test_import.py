@@ -74,7 +74,7 @@ def motion_of(face: Face, name: str) -> np.ndarray:
 @pytest.mark.parametrize("name", VARIANTS)
 def test_shapes_and_landmarks_come_back(name: str, shared: Callable[[str], ImportedFace]) -> None:
     face, head = shared(name).face, shipped_head()
-    assert set(face.shape_names) == set(head.shape_names) - {"tongueUp"}  # not one of ARKit's
+    assert set(face.shape_names) == set(head.shape_names)
     here, there = (scatter_landmarks(one, landmark_positions(one)) for one in (face, head))
     shift = np.median(here - there, axis=0)
     assert np.linalg.norm(shift) < ORIGIN_MM

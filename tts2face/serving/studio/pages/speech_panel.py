@@ -6,6 +6,7 @@ from typing import Any
 from nicegui import ui
 
 from tts2face.request import GESTURES, OWN_FACE, Recorded
+from tts2face.serving.studio.pages import character_dialog
 from tts2face.serving.studio.pages.choices import appearance, languages, models, voices
 from tts2face.serving.studio.pages.frame import heading
 from tts2face.serving.studio.pages.open_page import OpenPage
@@ -44,6 +45,9 @@ class SpeechPanel:
         found = await self._models()
         for kind in (TALKER, FACE):
             self._select("models", kind, kind.capitalize(), found[kind])
+        if character_dialog.may_add_faces(page):
+            characters = character_dialog.CharacterDialog(page, self._show_made)
+            ui.button(character_dialog.TITLE, on_click=characters.open).props("outline dense")
         if may_make_faces(page):
             dialog = PhotoDialog(page, self._show_made)
             ui.button(TITLE, on_click=dialog.open).props("outline dense")
