@@ -40,6 +40,7 @@ from tts2face.models.mesh_coding import (
 from tts2face.models.photo_view import PhotoView
 from tts2face.models.score_map import SCORES, score_map_of
 from tts2face.models.shape_coding import pack_shapes, quantise, unpack_shapes
+from tts2face.numeric.arrays import FloatArray
 from tts2face.storage.model_pictures import (
     decode_colours,
     decode_coverage,
@@ -154,6 +155,13 @@ def read_face(path: Path, identity: str | None = None, *, checks_pictures: bool 
         if not isinstance(face.light, Lamps):
             _ = face.light.baked
     return face if identity is None else _apply_identity(face, arrays, header, names.index(identity))
+
+
+def read_identities(path: Path) -> FloatArray:
+    """Displacements (P, V, 3) of the identity presets of a shipped ``.face`` file, mm."""
+    arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
+    presets = [arrays[f"identity{n}"] * arrays[f"identity{n}_step"][0] for n in range(len(header["identities"]))]
+    return np.array(presets, np.float64).reshape(len(presets), len(arrays["vertices"]), 3)
 
 
 def _pose_fields(face: Face) -> dict[str, Any]:

@@ -213,7 +213,7 @@ def import_face(  # noqa: PLR0913 - one parameter an option
     step()
     if is_transferred:
         carried = transfer_shapes(face, is_tracked=table is None, on_step=step)
-        face, made_of = carried.face, {"shapes_from": carried.source}
+        face, made_of = calibrate_on_mesh(carried.face), {"shapes_from": carried.source}
         notes = [f"its shapes are those of the shipped face {carried.source}, carried over", *carried.notes]
     else:
         notes = [WITHOUT_LANDMARKS]

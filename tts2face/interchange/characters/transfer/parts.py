@@ -160,9 +160,7 @@ def move_cards(face: Face, shapes: FloatArray, skin: Skin) -> None:
         return
     used = np.unique(corners)
     places = face.vertices.astype(np.float64)
-    first = np.zeros(len(skin.vertices), np.int64)
-    on_skin = np.flatnonzero(skin.of_face >= 0)
-    first[skin.of_face[on_skin]] = on_skin
+    first = skin.rows()
     candidates = np.flatnonzero(skin.is_seen)
     far, near = (np.asarray(found) for found in cKDTree(skin.vertices[candidates]).query(places[used]))
     near = candidates[near]

@@ -10,7 +10,7 @@ from scipy.sparse.linalg import SuperLU, splu
 from scipy.spatial import cKDTree
 
 from tts2face.interchange.characters.transfer.skin import Skin
-from tts2face.models.landmarks import LEFT_LIDS, LIP_LANDMARKS, RIGHT_LIDS
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LEFT_LIDS, LIP_LANDMARKS, RIGHT_LIDS
 from tts2face.numeric.arrays import FloatArray, IntArray, Mask, nearest_rotation
 
 # Nose, chin and middle of the brow: on skin without texture the tracker guesses the others (decision 244).
@@ -19,9 +19,15 @@ MIDDLE_LANDMARKS = (
     10, 151,
 )  # fmt: skip
 FEATURES = np.unique([*MIDDLE_LANDMARKS, *LIP_LANDMARKS, *np.ravel(RIGHT_LIDS), *np.ravel(LEFT_LIDS)])
-STAGES = ((1000.0, 3.0), (300.0, 1.0), (100.0, 0.2))  # smoothness, weight of a landmark
+# Lines that are seen on the mesh itself, as edges of eyeballs and lips; the others are read in pictures, 1 to 2 mm off.
+LINES = np.unique([*INNER_LIP_UPPER, *INNER_LIP_LOWER, *np.ravel(RIGHT_LIDS), *np.ravel(LEFT_LIDS)])
+READ_TRUST = 0.15  # weight of a landmark that is read, beside one of these lines
+STAGES = ((1000.0, 1.0), (300.0, 0.3), (100.0, 0.06))  # smoothness, weight of a landmark beside that of a sample
 N_ITERATIONS = 5  # of closest points in each stage
-WARP_SMOOTHING = 3.0  # of the landmarks' remainder after the similarity
+WARP_SMOOTHING = 10.0  # of the landmarks' remainder after identities
+MARKS_RIDGE = 100.0  # mm2, of the weight of an identity that is fitted to landmarks
+SURFACE_RIDGE = 30000.0  # and to all vertices around them: less exaggerated broad faces (decision 244)
+AFFINE_RIDGE = 1e-3  # of shifts and shears
 NORMAL_MM = 10.0  # distance that counts as much as a right angle between normals over root two: lips meet lips
 N_SAMPLES = 8  # nearest samples among which one with a fitting normal is sought
 MIN_COSINE = 0.5  # normals within 60 degrees
@@ -31,6 +37,7 @@ N_TRIANGLES = 24  # of the source around a vertex of the target, among which the
 HIDDEN_MM = 20.0  # cost of a hidden triangle for a vertex that is seen
 OPPOSED_MM, OTHER_SIDE_MM = 8.0, 50.0  # costs of a triangle that faces away, and of one of the other lip or lid
 FACE_MM = 30.0  # from a landmark of a feature
+SCALED_MM = 15.0  # from one: skin whose size is the scale of the motion; cheeks slide
 FADE_MM = (10.0, 35.0)  # distance from the source between which shapes fade out
 
 
@@ -87,35 +94,64 @@ class Registration:
         return carried
 
 
-def register(source: Skin, target: Skin, on_stage: Callable[[], object]) -> Registration:
-    """Registration by landmarks of features, then closest points of visible skin; what is hidden follows smoothly."""
+def register(source: Skin, target: Skin, modes: FloatArray, on_stage: Callable[[], object]) -> Registration:
+    """Registration by landmarks of features, then closest points of visible skin; what is hidden follows smoothly.
+
+    `modes` (P, S, 3) are displacements of the source by which heads differ: they fill what few landmarks leave open on
+    smooth cheeks, where closest points slide.
+    """
     # tables of landmarks need not have all
     known = FEATURES[np.isfinite(target.landmarks[FEATURES, 0]) & np.isfinite(source.landmarks[FEATURES, 0])]
     similarity = fit_similarity(source.landmarks[known], target.landmarks[known])
-    marks, wanted = similarity.places(source.landmarks[known]), target.landmarks[known]
-    even = similarity.places(source.vertices)
-    warp = RBFInterpolator(marks, wanted - marks, kernel="linear", smoothing=WARP_SMOOTHING, degree=1)
-    start = even + warp(even)
-    held = source.nearest(source.landmarks[known])
-    goal = wanted + start[held] - marks - warp(marks)
+    even, held = similarity.places(source.vertices), source.nearest(source.landmarks[known])
+    wanted = target.landmarks[known] + even[held] - similarity.places(source.landmarks[known])
+    far = np.asarray(cKDTree(source.landmarks[known]).query(source.vertices)[0])
+    face_rows = np.flatnonzero(source.is_seen & (far < FACE_MM))
+    basis = np.concatenate([similarity.moves(modes), _affine_moves(even)])
+    trust = np.where(np.isin(known, LINES), 1.0, READ_TRUST)
+    like = even + _fitted(basis, held, wanted - even[held], trust, MARKS_RIDGE)
     laplacian, samples = source.laplacian(), _Samples(target)
     bending = (laplacian.T @ laplacian).tocsc()
-    n, placed = len(start), start
+    placed: FloatArray | None = None
     for smoothness, mark in STAGES:
         on_stage()
-        held_weights = np.bincount(held, minlength=n) * mark
-        pulled_marks = np.zeros((n, 3))
-        np.add.at(pulled_marks, held, mark * (goal - start[held]))
+        smoothing = WARP_SMOOTHING / trust
+        warp = RBFInterpolator(like[held], wanted - like[held], kernel="linear", smoothing=smoothing, degree=1)
+        start = like + warp(like)
+        placed = start if placed is None else placed
+        held_weights = np.bincount(held, mark * trust, len(even))
+        pulled_marks = np.zeros_like(even)
+        np.add.at(pulled_marks, held, mark * trust[:, None] * (wanted - start[held]))
         for _ in range(N_ITERATIONS):
             there, found = samples.nearest(placed, source.normals(placed), source.side)
             found &= source.is_seen & (np.linalg.norm(there - placed, axis=1) < MAX_PULL_MM)
             system = smoothness * bending + sp.diags(found + held_weights + 1e-6)
             placed = start + factorise(system).solve(found[:, None] * (there - start) + pulled_marks)
+        like = even + _fitted(basis, face_rows, placed[face_rows] - even[face_rows], np.ones(1), SURFACE_RIDGE)
     on_stage()
-    # the size of the face is that of the whole surface around its features; landmarks are single places
-    is_face = source.is_seen & (np.asarray(cKDTree(source.landmarks[known]).query(source.vertices)[0]) < FACE_MM)
-    similarity = fit_similarity(source.vertices[is_face], placed[is_face])
+    # the size of the face is that of the surface around its features; landmarks are single places
+    assert placed is not None
+    is_scaled = source.is_seen & (far < SCALED_MM)
+    similarity = fit_similarity(source.vertices[is_scaled], placed[is_scaled])
     return Registration(similarity, *_bind(source, placed, target))
+
+
+def _affine_moves(places: FloatArray) -> FloatArray:
+    """Displacements (12, S, 3) that shift and shear places (S, 3) by 1 mm, and by 1 mm in 30."""
+    spans = np.column_stack([np.ones(len(places)), (places - places.mean(axis=0)) / FACE_MM])
+    moves: FloatArray = np.einsum("sk,cd->kcsd", spans, np.eye(3)).reshape(12, len(places), 3)
+    return moves
+
+
+def _fitted(basis: FloatArray, rows: IntArray, wanted: FloatArray, trust: FloatArray, ridge: float) -> FloatArray:
+    """Displacements (S, 3) in the basis (P, S, 3), of which the last twelve are affine, nearest to (N, 3) at `rows`."""
+    table = (basis[:, rows] * np.sqrt(trust)[:, None]).reshape(len(basis), -1)
+    ridges = np.full(len(basis), ridge)
+    ridges[-12:] = AFFINE_RIDGE
+    target = (wanted * np.sqrt(trust)[:, None]).ravel()
+    weights = np.linalg.solve(table @ table.T + np.diag(ridges), table @ target)
+    moved: FloatArray = np.tensordot(weights, basis, 1)
+    return moved
 
 
 def factorise(matrix: sp.spmatrix) -> SuperLU:

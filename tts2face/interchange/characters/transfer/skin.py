@@ -54,6 +54,13 @@ class Skin:
         """Unit normals (S, 3), of the skin at rest or with its vertices at other places."""
         return vertex_normals(self.vertices if places is None else places, self.triangles)
 
+    def rows(self) -> IntArray:
+        """(S,) a vertex of the face for each of the skin."""
+        rows = np.zeros(len(self.vertices), np.int64)
+        used = np.flatnonzero(self.of_face >= 0)
+        rows[self.of_face[used]] = used
+        return rows
+
     def laplacian(self) -> sp.csr_matrix:
         """(S, S) difference of each vertex from the mean of its neighbours."""
         graph = self.graph(is_weighted=False)

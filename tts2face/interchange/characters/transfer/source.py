@@ -10,14 +10,17 @@ from tts2face.face.landmarks import landmark_positions, scatter_landmarks
 from tts2face.interchange.characters.shape_names import ARKIT_SHAPES
 from tts2face.interchange.characters.surface_points import SurfacePoints
 from tts2face.interchange.characters.transfer.lids import lids_in_sight
+from tts2face.interchange.characters.transfer.lip_sight import lips_in_sight
 from tts2face.interchange.characters.transfer.parts import is_kind
 from tts2face.interchange.characters.transfer.skin import Skin, build_skin
 from tts2face.interchange.characters.transfer.tracked import locate_bare_landmarks, without_colours
 from tts2face.models.face import Face, keep_parts
+from tts2face.models.face_file import KIND, read_identities
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, EYELID_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.numeric.arrays import FloatArray
 from tts2face.storage.array_cache import computed_once
+from tts2face.storage.shipped import find_file
 
 REALISTIC, DRAWN = "head", "ada"
 DRAWN_EYES = 0.16  # height of the eyes over the distance of their outer corners from which a head is a drawn one
@@ -26,19 +29,24 @@ CACHE_KIND, CACHE_VERSION = "source_landmarks", 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Source:
-    """A shipped head: its skin, with landmarks found as those of targets are, and displacements (K, S, 3) of it."""
+    """A shipped head: its skin, with landmarks found as those of targets are, and displacements of it.
+
+    `identities` (P, V, 3) are those of its presets of age, sex and ancestry, mm: how heads differ.
+    """
 
     name: str
     face: Face
     skin: Skin
     shape_names: tuple[str, ...]
+    identities: FloatArray
 
     def moves(self) -> FloatArray:
         """Displacements (K, S, 3) of the skin by the shapes, mm."""
-        rows = np.zeros(len(self.skin.vertices), np.int64)
-        used = np.flatnonzero(self.skin.of_face >= 0)
-        rows[self.skin.of_face[used]] = used
-        return self.shapes(rows)
+        return self.shapes(self.skin.rows())
+
+    def modes(self) -> FloatArray:
+        """Displacements (P, S, 3) of the skin by the identities, mm."""
+        return self.identities[:, self.skin.rows()]
 
     def shapes(self, rows: Sequence[int] | np.ndarray) -> FloatArray:
         """Displacements (K, N, 3) of vertices of the face by the shapes, mm."""
@@ -71,7 +79,8 @@ def load_source(name: str, *, is_tracked: bool = True) -> Source:
 
     landmarks = _tracked_landmarks(name, face) if is_tracked else own_landmarks(face)
     names = tuple(name for name in ARKIT_SHAPES if name in face.shape_names)
-    return Source(name, face, build_skin(face, lids_in_sight(face, landmarks)), names)
+    skin = lips_in_sight(build_skin(face, lids_in_sight(face, landmarks)))
+    return Source(name, face, skin, names, read_identities(find_file(name, KIND)))
 
 
 def _tracked_landmarks(name: str, face: Face) -> FloatArray:

@@ -20,6 +20,7 @@ from tts2face.interchange.characters.transfer.lids import (
     seen_eyeball,
     shut_lids,
 )
+from tts2face.interchange.characters.transfer.lip_sight import lips_in_sight
 from tts2face.interchange.characters.transfer.mouth_cut import (
     RELIEF,
     OpenedMouth,
@@ -74,7 +75,8 @@ def transfer_shapes(
     head = load_source(source or choose_source(landmarks), is_tracked=is_tracked)
     on_step()
     face, skin, opened = _with_parted_lips(face, landmarks, head)
-    registration = register(head.skin, skin, on_step)
+    skin = lips_in_sight(skin)
+    registration = register(head.skin, skin, head.modes(), on_step)
     carried = registration.carry(head.moves())
     if opened is not None:
         carried = _smoothed(skin, carried)
