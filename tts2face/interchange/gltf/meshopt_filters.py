@@ -21,13 +21,7 @@ OF_FOUR: Mapping[int, tuple[Any, Any]] = {
 
 
 def apply_filter(content: Bytes, name: str, stride: int) -> Bytes:
-    """Bytes of the elements, of `stride` bytes each, that the bytes of a decoded stream stand for.
-
-    Raises
-    ------
-    DataError
-        There is no such filter, or it is not of elements of this size.
-    """
+    """Bytes of the elements, of `stride` bytes each, that the bytes of a decoded stream stand for."""
     if name == NO_FILTER:
         return content
     sizes, read = _FILTERS.get(name, ((), _exponential))
@@ -59,8 +53,8 @@ def _octahedral(content: Bytes, stride: int) -> NDArray[Any]:
 def _quaternion(content: Bytes, _: int) -> NDArray[Any]:
     """Unit quaternions (n, 4) of their three smaller values; two bits of the fourth say which one is left out."""
     packed = np.frombuffer(content.tobytes(), np.int16).reshape(-1, 4).astype(np.int64)
-    largest, one = packed[:, 3] & 3, packed[:, 3] | 3
-    smaller = packed[:, :3] / (np.sqrt(2.0) * one[:, None])
+    largest, unit = packed[:, 3] & 3, packed[:, 3] | 3
+    smaller = packed[:, :3] / (np.sqrt(2.0) * unit[:, None])
     left_out = np.sqrt(np.maximum(1.0 - (smaller**2).sum(axis=1), 0.0))
     places = (largest[:, None] + [1, 2, 3, 0]) % 4
     turned = np.zeros(packed.shape)

@@ -57,7 +57,7 @@ def test_a_head_without_shapes_is_refused_with_what_helps_and_then_made(
     faces = httpx.get(f"{service.url}/v1/faces/bare-head").json()
     assert faces["about"]["summary"].startswith("mesh with 5")
     browser.click("Close")
-    project = httpx.get(f"{service.url}/studio/api/projects/{number}").json()
+    project = httpx.get(f"{service.url}/studio/api/projects/{number}/project.json").json()
     assert project["models"]["face"] == "bare-head"
 
 
