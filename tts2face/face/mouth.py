@@ -6,11 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
+from tts2face.face.landmarks import landmark_motion, scatter_landmarks
 from tts2face.models.face import Face
 from tts2face.models.landmarks import (
     INNER_LIP_LOWER,
     INNER_LIP_UPPER,
     LIP_LANDMARKS,
+    MOUTH_REGION,
     OUTER_LIP_LOWER,
     OUTER_LIP_UPPER,
 )
@@ -22,6 +24,9 @@ LIP_WEIGHT = 10.0  # of a lip landmark, relative to one of the jaw or cheek
 DEPTH_WEIGHT = 0.1  # of z, relative to x and y: a single camera measures depth with about ten times their error
 WIDTH_WEIGHT = 60.0  # of the mouth's width, relative to a landmark: viewers read rounding from it
 CHIN_WEIGHT = 600.0  # of the drop of the chin, relative to a landmark: it sets the distance of the teeth
+# Not what visemes do: they would make up for differences between the shapes of two faces.
+NO_VISEME = ("jawForward", "jawLeft", "jawRight", "mouthLeft", "mouthRight")
+LIP_GAP_WEIGHT = 3.0  # of a lip gap, relative to a landmark of the cheek; 300 fits gaps beside the middle by any shape
 REGULARISATION = 0.005  # ridge term as a share of the mean curvature: makes the solution unique and smooth
 
 
@@ -55,6 +60,18 @@ def mouth_curvature(moved: FloatArray, common: list[int], weights: MouthWeights 
     dropped = moved[[at[landmark] for landmark in CHIN_LANDMARKS if landmark in at], 1].mean(axis=0)
     curvature += weights.chin * np.outer(dropped, dropped)
     return curvature
+
+
+def mouth_products(face: Face, shapes: NDArray[np.int64]) -> FloatArray:
+    """Inner products (n, n) of the visible motion of the mouth by some shapes (n,) of a face."""
+    return motion_products(scatter_landmarks(face, landmark_motion(face, shapes)))
+
+
+def motion_products(motion: FloatArray) -> FloatArray:
+    """Inner products (n, n) of the visible motion of a mouth, of motions (478, 3, n) of all landmarks."""
+    common = [landmark for landmark in MOUTH_REGION if np.isfinite(motion[landmark]).all()]
+    opened = motion[list(INNER_LIP_UPPER), 1] - motion[list(INNER_LIP_LOWER), 1]
+    return mouth_curvature(motion[common], common) + LIP_GAP_WEIGHT * ordered_product(opened.T, opened)
 
 
 def require_lips(face: Face, moving: NDArray[np.int64]) -> None:

@@ -1,12 +1,17 @@
 """Retargeting of a performer to a face: lips, lids and brows by landmarks, gaze by blendshape scores."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.face.lip_constraints import MIDDLE_PAIR
+from tts2face.face.landmarks import landmark_motion, scatter_landmarks
+from tts2face.face.lip_constraints import MIDDLE_PAIR, SPEECH_SHAPE_PREFIXES
+from tts2face.face.mouth import NO_VISEME, motion_products
+from tts2face.face.shape_transfer import default_head, eye_distance
+from tts2face.face.stand_in import stand_in
 from tts2face.lips.retargeting import MAX_CONTACT_MM, Retargeter, build_retargeter
 from tts2face.lips.score_matching import scaled_scores
 from tts2face.lips.upper_face import READ_SHAPES, read_upper_face
@@ -15,11 +20,13 @@ from tts2face.models.landmarks import EYELID_LANDMARKS, MOUTH_REGION, N_LANDMARK
 from tts2face.models.score_map import SCORE_SHAPES, mouth_scores
 from tts2face.models.talker import ShapeModel, Talker, speech_channels
 from tts2face.numeric.arrays import FloatArray, principal_axes
+from tts2face.numeric.least_squares import bounded_least_squares
 from tts2face.types import Trajectory
 
 # as a talker has (decisions 012 and 035)
 N_MOUTH_MODES = 20
 SMILE = "mouthSmile"
+CARRIED_RIDGE = 0.02  # of each shape's own curvature: shapes that do nearly the same share what they carry
 CLOSED_FRAME_SHARE = 0.15  # share of the frames that count as having closed lips
 SCORE_DRIVEN_SHAPES = ("eye", "brow", "nose", "cheek")  # name prefixes of the shapes that follow scores
 SCORE_DEAD_ZONE = 0.04  # amplitude of the noise of scores
@@ -164,7 +171,8 @@ def _closed_frames(gaps: NDArray[np.floating]) -> NDArray[np.int64]:
 def match_shapes(captured: Trajectory, face: Face, *, gain: float = 1.0) -> Trajectory:
     """Weights (T, K) of a face's shapes from captured weights of the same names, clipped to their limits.
 
-    The gain does not apply to eye shapes; shapes that were not captured have weight 0.
+    The gain does not apply to eye shapes; shapes that were not captured have weight 0. Of jaw and lips, what the face
+    lacks is carried by its own shapes, as by the visemes of a character that has nothing else.
     """
     weights = np.zeros((len(captured), len(face.shape_names)), np.float32)
     for column, name in enumerate(face.shape_names):
@@ -172,7 +180,31 @@ def match_shapes(captured: Trajectory, face: Face, *, gain: float = 1.0) -> Traj
             size = 1.0 if name.startswith("eye") else gain
             weight = captured.values[:, captured.channels.index(name)]
             weights[:, column] = np.clip(size * weight, *face.limits[column])
+    moved = [name for name, track in zip(captured.channels, captured.values.T, strict=True) if track.any()]
+    head = default_head()
+    lacking = [name for name in _of_mouth(moved) if name not in face.shape_names and name in head.shape_names]
+    own = np.array([face.shape_names.index(name) for name in _of_mouth(face.shape_names)], np.int64)
+    if lacking and len(own):
+        curvature, cross = _carrying_products(stand_in(face), own, lacking)
+        linear = weights[:, own].astype(np.float64) @ curvature + gain * captured.columns(lacking) @ cross.T
+        weights[:, own] = bounded_least_squares(curvature, linear, face.limits[own].astype(np.float64))
     return Trajectory(face.shape_names, weights, captured.fps)
+
+
+def _carrying_products(face: Face, own: NDArray[np.int64], lacking: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+    """Inner products of a face's shapes (n,) with themselves, with a ridge, and with shapes of the default head."""
+    head = default_head()
+    others = np.array([head.shape_names.index(name) for name in lacking])
+    motions = [scatter_landmarks(model, landmark_motion(model, at)) for model, at in ((face, own), (head, others))]
+    motions[1] *= eye_distance(face) / eye_distance(head)
+    products = motion_products(np.concatenate(motions, axis=-1))
+    n = len(own)
+    return products[:n, :n] * (1.0 + CARRIED_RIDGE * np.eye(n)), products[:n, n:]
+
+
+def _of_mouth(names: Sequence[str]) -> list[str]:
+    """Those of jaw and lips that visemes, too, may move."""
+    return [name for name in names if name.startswith(SPEECH_SHAPE_PREFIXES) and name not in NO_VISEME]
 
 
 def lip_model(landmarks: NDArray[np.floating]) -> ShapeModel:

@@ -7,15 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.face.landmarks import landmark_motion, scatter_landmarks
 from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES
-from tts2face.face.mouth import mouth_curvature
+from tts2face.face.mouth import NO_VISEME, mouth_products
 from tts2face.face.shape_transfer import add_missing_shapes
 from tts2face.face.stand_in import stand_in
 from tts2face.interchange.exports.parts import Target
 from tts2face.models.face import Face
-from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, MOUTH_REGION
-from tts2face.numeric.arrays import Float32Array, FloatArray, ordered_product
+from tts2face.numeric.arrays import Float32Array, FloatArray
 from tts2face.numeric.least_squares import bounded_least_squares
 
 # ARFaceAnchor.BlendShapeLocation, in the order of the columns of Live Link Face.
@@ -32,11 +30,8 @@ ARKIT_SHAPES = (
 )  # fmt: skip
 # Shapes that express other channels, which are gestures of brows and cheeks; lips, jaw, lids and gaze keep their own.
 HELPER_PREFIXES = ("brow", "cheek", "noseSneer", "eyeSquint", "eyeWide")
-RIDGE = 1e-3  # of the mean curvature: prefers small changes where several shapes do the same
-# Not what visemes do: they would make up for differences between the shapes of two faces.
-NO_VISEME = ("jawForward", "jawLeft", "jawRight", "mouthLeft", "mouthRight")
 SPREAD = 0.02  # ridge of the mouth, over the median curvature: jaw and pucker alone, not ten small shapes together
-LIP_GAP_WEIGHT = 3.0  # of a lip gap, relative to a landmark of the cheek; 300 fits gaps beside the middle by any shape
+RIDGE = 1e-3  # of the mean curvature: prefers small changes where several shapes do the same
 # By face and channels: they take a tenth of a second, and every clip of lines needs them.
 _PARTS: "WeakKeyDictionary[Face, dict[tuple[str, ...], tuple[Expressed, ...]]]" = WeakKeyDictionary()
 
@@ -155,14 +150,6 @@ def _by_vertices(face: Face, columns: NDArray[np.int64], others: NDArray[np.int6
     curvature += RIDGE * float(np.trace(curvature)) / len(curvature) * np.eye(len(curvature))
     cross = own @ face.shapes[others].reshape(len(others), -1).astype(np.float64).T
     return Expressed(others, helpers, curvature, cross)
-
-
-def mouth_products(face: Face, shapes: NDArray[np.int64]) -> FloatArray:
-    """Inner products (n, n) of the visible motion of the mouth by some shapes (n,) of a face."""
-    motion = scatter_landmarks(face, landmark_motion(face, shapes))
-    common = [landmark for landmark in MOUTH_REGION if np.isfinite(motion[landmark]).all()]
-    opened = motion[list(INNER_LIP_UPPER), 1] - motion[list(INNER_LIP_LOWER), 1]
-    return mouth_curvature(motion[common], common) + LIP_GAP_WEIGHT * ordered_product(opened.T, opened)
 
 
 def _by_mouth(face: Face, channels: tuple[str, ...], others: NDArray[np.int64]) -> Expressed | None:

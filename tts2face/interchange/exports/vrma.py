@@ -11,14 +11,14 @@ import numpy as np
 from tts2face.face.deformation import rotation_matrix
 from tts2face.face.landmarks import landmark_motion, scatter_landmarks
 from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES
-from tts2face.face.mouth import CORNERS_LEFT, CORNERS_RIGHT
+from tts2face.face.mouth import CORNERS_LEFT, CORNERS_RIGHT, mouth_products
 from tts2face.face.shape_transfer import default_head
 from tts2face.face.stand_in import viseme_table
 from tts2face.interchange.characters.animation import ANIMATION, expression_motion, held
 from tts2face.interchange.characters.binding import has_binding
 from tts2face.interchange.characters.bone_tracks import quaternions
 from tts2face.interchange.characters.vrm_motion import gaze_turns, head_turns
-from tts2face.interchange.exports.arkit import ARKIT_SHAPES, build_arkit_projection, mouth_products
+from tts2face.interchange.exports.arkit import ARKIT_SHAPES, build_arkit_projection
 from tts2face.interchange.exports.livelink import eye_angles
 from tts2face.interchange.exports.parts import Part, Target
 from tts2face.interchange.exports.spooled_frames import SpooledFrames
