@@ -7,8 +7,9 @@ import pytest
 
 from tests.interchange.characters.made import Variant, head_without_mouth, write_character_file, write_landmarks
 from tests.interchange.characters.test_transfer import shapeless_head
+from tts2face.face.landmarks import landmark_positions, scatter_landmarks
 from tts2face.interchange.characters.importing import import_face
-from tts2face.models.landmarks import LEFT_LIDS, LIP_LANDMARKS, RIGHT_LIDS
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LEFT_LIDS, LIP_LANDMARKS, RIGHT_LIDS
 
 
 @pytest.mark.usefixtures("face_model")
@@ -24,6 +25,10 @@ def test_the_shapes_of_a_head_come_back(tmp_path: Path) -> None:
     assert steps[-1][0] == len(steps) <= steps[-1][1]
     jaw = face.shapes[face.shape_names.index("jawOpen")]
     assert np.abs(jaw).max() == pytest.approx(np.abs(head.shapes[head.shape_names.index("jawOpen")]).max(), rel=0.1)
+    assert face.scores is not None  # it speaks as its own mouth needs
+    places = scatter_landmarks(face, landmark_positions(face))
+    lips = places[list(INNER_LIP_UPPER[1:-1])] - places[list(INNER_LIP_LOWER[1:-1])]
+    assert np.linalg.norm(lips, axis=1).max() < 0.3  # mm; as read in pictures they lie 2 mm apart
 
 
 def test_a_table_of_lips_and_lids_is_enough(tmp_path: Path) -> None:

@@ -9,7 +9,8 @@ import scipy.sparse as sp
 from lexicon.errors import DataError
 from tts2face.face.eyelids import BLINK_SHAPES, SIDES
 from tts2face.interchange.characters.landmarks import SKIN, part_triangles
-from tts2face.interchange.characters.surface_points import nearest_points
+from tts2face.interchange.characters.lip_line import find_lip_line
+from tts2face.interchange.characters.surface_points import SurfacePoints, nearest_points
 from tts2face.interchange.characters.transfer.lids import (
     LID_SHAPES,
     MAX_CROSSING,
@@ -32,13 +33,14 @@ from tts2face.interchange.characters.transfer.parts import add_teeth, jaw_shares
 from tts2face.interchange.characters.transfer.registration import Registration, Similarity, register
 from tts2face.interchange.characters.transfer.skin import Skin, build_skin
 from tts2face.interchange.characters.transfer.source import Source, choose_source, load_source, own_landmarks
-from tts2face.models.face import Face
+from tts2face.models.face import WIDE_OPEN, Face
 from tts2face.models.landmarks import (
     EYE_OUTER_LEFT,
     EYE_OUTER_RIGHT,
     INNER_LIP_LOWER,
     INNER_LIP_UPPER,
     LOWER_LIP_INNER_MID,
+    N_LANDMARKS,
     UPPER_LIP_INNER_MID,
 )
 from tts2face.numeric.arrays import FloatArray
@@ -107,7 +109,7 @@ def transfer_shapes(
         limits=np.tile(np.array([0.0, 1.0], np.float32), (len(head.shape_names), 1)),
         eyes=given.eyes,
     )
-    return Transferred(made, head.name, tuple(notes))
+    return Transferred(_with_lip_line(made), head.name, tuple(notes))
 
 
 def _without_shapes(face: Face) -> Face:
@@ -150,6 +152,18 @@ def _with_landmarks(face: Face, landmarks: FloatArray) -> Face:
     vertices, weights = face.landmark_vertices.copy(), face.landmark_weights.copy()
     vertices[on_skin], weights[on_skin] = points.vertices, points.weights
     return replace(face, landmark_vertices=vertices, landmark_weights=weights)
+
+
+def _with_lip_line(face: Face) -> Face:
+    """Face whose inner lips lie where its lips touch, told apart by its open mouth."""
+    vertices, weights = np.zeros((N_LANDMARKS, 3), np.int64), np.zeros((N_LANDMARKS, 3))
+    vertices[face.landmarks], weights[face.landmarks] = face.landmark_vertices, face.landmark_weights
+    opened = face.shapes[face.shape_names.index(WIDE_OPEN)]
+    found = find_lip_line(SurfacePoints(vertices, weights), face.vertices, part_triangles(face, SKIN), opened)
+    return replace(
+        face, landmark_vertices=found.vertices[face.landmarks].astype(np.int32),
+        landmark_weights=found.weights[face.landmarks].astype(np.float32),
+    )  # fmt: skip
 
 
 def _lids(
