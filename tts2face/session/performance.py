@@ -10,6 +10,7 @@ from lexicon.errors import InputError
 from lexicon.values.checks import check_limits
 from lexicon.values.fields import check_fields
 from tts2face.face.body import Body
+from tts2face.face.combinations import with_combinations
 from tts2face.interchange.exports.table import all_formats
 from tts2face.numeric.arrays import interpolate_rows
 from tts2face.picture.options import Picture
@@ -182,7 +183,7 @@ def take_clips(motion: FaceMotion, sound: Waveform) -> Iterator[Clip]:
     for first, last, start, end in clip_bounds(len(motion.face), exact_rate(motion.face.fps), sound.rate):
         speech = Speech.without_phones(sound.part(start, end).padded(end - start))
         face, head = motion.face.part(first, last), motion.head.part(first, last)
-        yield Clip(body.move(face, head, speech.phones), head, speech)
+        yield Clip(with_combinations(body.move(face, head, speech.phones)), head, speech)
 
 
 def write_take(

@@ -1,11 +1,13 @@
 """A clip as a column of steps: each piece gains speech, then lip motion, gestures, edits and the motion of the body.
 
 The first step makes the pieces: `spoken_pieces` those of a text and of idle animation, `recorded_pieces` those of a
-recording. Gestures are drawn in a thread from the step before the lips on.
+recording. Gestures are drawn in a thread from the step before the lips on. Shapes of combinations come last.
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
+from tts2face.face.combinations import with_combinations
 from tts2face.request import Recorded
 from tts2face.session.gesture_layer import GestureLayer
 from tts2face.session.lip_steps import Lips, RecordedLips, SynthesisModels
@@ -61,8 +63,14 @@ def pieces_from(
         if gestures is not None:
             started = spoken_ahead(started, prepared.timeline, speech.yield_turn)
     steps: list[Step] = [lips] if gestures is None else [gestures.draw, lips, gestures, gestures.edits, gestures.body]
+    steps.append(_combine_shapes)
     for piece in started:
         for step in steps:
             speech.yield_turn()
             piece = step(piece)  # noqa: PLW2901 - it gains from step to step
         yield piece
+
+
+def _combine_shapes(piece: Piece) -> Piece:
+    motion = with_combinations(piece.clip.motion)
+    return piece if motion is piece.clip.motion else replace(piece, clip=replace(piece.clip, motion=motion))

@@ -10,7 +10,12 @@ import pytest
 from tts2face.face.expressions import OWN_EXPRESSIONS
 from tts2face.interchange.characters.character import Character, Material, MaterialPiece, MorphTarget
 from tts2face.interchange.characters.families import FOLDER, general_family, program_families, recognised_families
-from tts2face.interchange.characters.shape_names import ARKIT_SHAPES, combinations_of_shapes, guess_mapping
+from tts2face.interchange.characters.shape_names import (
+    ARKIT_SHAPES,
+    combinations_of_shapes,
+    guess_mapping,
+    with_combinations,
+)
 from tts2face.interchange.characters.shapes import HEADER, ShapeSource
 from tts2face.interchange.characters.two_way import with_directions
 
@@ -143,8 +148,28 @@ def test_a_gaze_of_both_eyes_is_divided() -> None:
 )
 def test_combinations_are_none_of_their_parts(combination: str, others: list[str]) -> None:
     names = [combination, *others]
-    assert combinations_of_shapes(names) == [combination]
+    assert list(combinations_of_shapes(names)) == [combination]
     assert combination not in understood(names)
+
+
+@pytest.mark.parametrize(
+    ("combination", "others", "shapes"),
+    [
+        ("jawOpen_mouthClose", ["mouthClose", "jawOpen"], "jawOpen*mouthClose"),
+        ("JawOpenMouthClose", ["JawOpen", "MouthClose"], "jawOpen*mouthClose"),
+        ("mouthSmile_L-browDown_L", ["mouthSmile_L", "browDown_L"], "browDownLeft*mouthSmileLeft"),
+        ("combo_jawOpen_mouthPucker", ["jawOpen", "mouthPucker"], "jawOpen*mouthPucker"),
+        ("AU12_L_AU26", ["AU12_L", "AU26"], "jawOpen*mouthSmileLeft"),
+        ("corrective_jawOpen", ["jawOpen"], ""),
+        ("jawOpen_mouthClose", ["jawOpen"], ""),
+        ("jawOpen_mouthSmile", ["jawOpen", "mouthSmile"], ""),
+    ],
+)
+def test_combinations_are_driven_where_their_parts_are(combination: str, others: list[str], shapes: str) -> None:
+    """A part that the file lacks, or that is divided at the middle of the face, leaves its combination alone."""
+    mapping = guess_mapping([combination, *others])
+    added = set(with_combinations(mapping, [combination, *others])) - set(mapping)
+    assert added == ({f"combination*{shapes}"} if shapes else set())
 
 
 def test_a_prefix_is_no_part_of_a_combination() -> None:

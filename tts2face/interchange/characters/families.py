@@ -110,31 +110,36 @@ def recognised_families(names: Sequence[str]) -> list[tuple[Family, Mapping[str,
     return [pair for pair in ordered if pair[0].name not in numbered]
 
 
-def combinations(names: Iterable[str], known: frozenset[str]) -> list[str]:
-    """Names that consist of the names of two or more shapes, of `known` keys or of the file: correctives of those.
+def combinations(names: Iterable[str], known: frozenset[str]) -> dict[str, tuple[str, ...]]:
+    """Names that consist of the names of two or more shapes, of `known` keys or of the file, with the keys of these.
 
     A word as "corrective" before one name does, too.
     """
     given = list(names)
     own = {key(name_words(name)) for name in given}
     parts = {part for part in known | own if len(part) >= LEAST_PART} - {"left", "right"}
-    return [name for name in given if _is_combination(name, known, parts)]
+    found = {name: _parts_of(name, known, parts) for name in given}
+    return {name: of for name, of in found.items() if of}
 
 
-def _is_combination(name: str, known: frozenset[str], parts: set[str]) -> bool:
+def _parts_of(name: str, known: frozenset[str], parts: set[str]) -> tuple[str, ...]:
+    """Keys of the most shapes of whose names a name consists; none where it is the name of one."""
     words = all_words(name)
     # a name of one shape; what stands before a full stop may be another one
     if key(name_words(name)) in known and len(words) == len(name_words(name)):
-        return False
+        return ()
     marked = bool(words) and words[0] in MARKERS
     rest, least = (words[1:], 1) if marked else (words, 2)
-    # most: names of which the first words can consist; -1 where they cannot
-    most = [0] + [-1] * len(rest)
+    # names of which the first words can consist; None where they cannot
+    most: list[tuple[str, ...] | None] = [(), *[None] * len(rest)]
     for end in range(1, len(rest) + 1):
-        spans = ((first, rest[first:end]) for first in range(end) if most[first] >= 0)
-        before = [first for first, span in spans if span != words and _is_part(span, parts)]
-        most[end] = max((most[first] + 1 for first in before), default=-1)
-    return most[-1] >= least
+        spans = ((before, rest[first:end]) for first, before in enumerate(most[:end]) if before is not None)
+        most[end] = max(
+            ((*before, key(span)) for before, span in spans if span != words and _is_part(span, parts)),
+            key=len, default=None,
+        )  # fmt: skip
+    found = most[-1] or ()
+    return found if len(found) >= least else ()
 
 
 def _is_part(span: Words, parts: set[str]) -> bool:

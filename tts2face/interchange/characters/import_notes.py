@@ -20,11 +20,15 @@ def some_of(names: Sequence[str], most: int = MAX_NAMES) -> str:
     return shown + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
-def name_notes(character: Character) -> list[str]:
+def name_notes(character: Character, mapping: ShapeMapping) -> list[str]:
     """Notes about shapes that move nothing, and about combinations of shapes."""
-    empty, combined = character.still_names, combinations_of_shapes(character.moving_names)
+    empty, driven = character.still_names, {source.name for sources in mapping.values() for source in sources}
     notes = [f"shapes that move no vertex are as good as missing: {some_of(empty)}"] if empty else []
-    return notes + ([f"shapes that combine others are left alone: {some_of(combined)}"] if combined else [])
+    combined = list(combinations_of_shapes(character.moving_names))
+    for is_driven, what in ((True, "get the products of their weights"), (False, "are left alone")):
+        some = [name for name in combined if (name in driven) == is_driven]
+        notes += [f"shapes that combine others {what}: {some_of(some)}"] if some else []
+    return notes
 
 
 def pose_notes(character: Character, mapping: ShapeMapping) -> list[str]:

@@ -34,7 +34,7 @@ from tts2face.interchange.characters.landmarks import (
     part_triangles,
 )
 from tts2face.interchange.characters.obj_reader import read_obj_folder
-from tts2face.interchange.characters.shape_names import guess_mapping
+from tts2face.interchange.characters.shape_names import guess_mapping, with_combinations
 from tts2face.interchange.characters.shapes import TRANSFER, ShapeMapping, read_mapping
 from tts2face.interchange.characters.surface import (
     Placement,
@@ -132,7 +132,7 @@ def propose_mapping(character: Character) -> ShapeMapping:
 
     A jaw that moves next to nothing beside the visemes is none: the character speaks by these.
     """
-    return with_directions(_named_mapping(character), character)
+    return with_combinations(with_directions(_named_mapping(character), character), character.moving_names)
 
 
 def _named_mapping(character: Character) -> ShapeMapping:
@@ -235,7 +235,7 @@ def import_face(  # noqa: PLR0913 - one parameter an option
         n_eyeballs=len(face.eyes),
         notes=(
             *character.notes,
-            *name_notes(character),
+            *name_notes(character, chosen),
             *pose_notes(character, chosen),
             *colour_notes(character, head),
             *notes,

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.face.combinations import PREFIX
 from tts2face.face.landmarks import landmark_motion
 from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES
 from tts2face.face.stand_in import stand_in
@@ -31,9 +32,11 @@ def own_weights(motion: Trajectory, face: Face, mapping: ShapeMapping) -> dict[s
     mapping
         Morph targets and expressions of each shape.
     """
-    own = [name for name in motion.channels if name in mapping]
+    combined = [name for name in motion.channels if name in mapping and name.startswith(PREFIX)]
+    own = [name for name in motion.channels if name in mapping and name not in combined]
+    values = np.hstack([_own_values(motion, face, own), motion.columns(combined).astype(np.float64)])
     found: dict[str, FloatArray] = {}
-    for name, track in zip(own, _own_values(motion, face, own).T, strict=True):
+    for name, track in zip((*own, *combined), values.T, strict=True):
         for source in mapping[name]:
             share = BOTH_SIDES_SHARE if source.side else 1.0
             found[source.name] = found.get(source.name, np.zeros(len(track))) + share * source.gain * track
@@ -46,7 +49,8 @@ def _own_values(motion: Trajectory, face: Face, own: list[str]) -> FloatArray:
     values = motion.values.astype(np.float64)
     kept = motion.columns(own).astype(np.float64)
     turned = {name for eye in face.eyes for name in eye.turns}
-    others = [k for k, name in enumerate(channels) if name not in own and name not in turned and values[:, k].any()]
+    carried = [k for k, name in enumerate(channels) if name not in own and not name.startswith(PREFIX)]
+    others = [k for k in carried if channels[k] not in turned and values[:, k].any()]
     for is_mouth in (True, False):
         group = [k for k in others if channels[k].startswith(SPEECH_SHAPE_PREFIXES) == is_mouth]
         columns = [

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 
+from tts2face.face.combinations import combination_name
 from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES
 from tts2face.face.stand_in import VISEME_PREFIX
 from tts2face.interchange.characters.families import (
@@ -12,7 +13,7 @@ from tts2face.interchange.characters.families import (
     recognised_families,
 )
 from tts2face.interchange.characters.name_words import key, name_words
-from tts2face.interchange.characters.shapes import SIDES, ShapeMapping, with_sides
+from tts2face.interchange.characters.shapes import SIDES, ShapeMapping, ShapeSource, with_sides
 
 SIDED = (
     "browDown", "browOuterUp", "cheekSquint", "eyeBlink", "eyeLookDown", "eyeLookIn", "eyeLookOut", "eyeLookUp",
@@ -24,6 +25,7 @@ UNSIDED = (
     "mouthRollUpper", "mouthShrugLower", "mouthShrugUpper", "tongueOut",
 )  # fmt: skip
 ARKIT_SHAPES = tuple(sorted([*(stem + side for stem in SIDED for side in SIDES), *UNSIDED]))
+MAX_COMBINATIONS = 64  # that are driven: each costs as much memory as a shape
 # Visemes of lips that touch serve beside ARKit's jaw where the shapes are missing that roll or press the lips.
 CONTACT_VISEMES = {"mouthViseme_ff": ("mouthRollLower",), "mouthViseme_pp": ("mouthPressLeft", "mouthRollUpper")}
 
@@ -65,7 +67,25 @@ def _speaks_by_jaw(found: Mapping[str, object]) -> bool:
     return "jawOpen" in found and len(visemes) <= len(spoken) - len(visemes)
 
 
-def combinations_of_shapes(names: Iterable[str]) -> list[str]:
-    """Names of shapes that correct or combine others of the file, such as ``browDown_jawOpen``."""
+def combinations_of_shapes(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    """Names of shapes that correct or combine others, such as ``browDown_jawOpen``, and the keys of these."""
     families = (arkit_family(SIDED, UNSIDED), general_family(), *program_families())
     return combinations(names, frozenset().union(*(family.keys for family in families)))
+
+
+def with_combinations(mapping: ShapeMapping, names: Iterable[str]) -> ShapeMapping:
+    """Mapping with shapes for combinations of two or more others, all of which it drives as they are."""
+    given = list(names)
+    plain = {key(name_words(name)): name for name in given}
+    driven = {
+        source.name: shape
+        for shape, sources in mapping.items()
+        for source in sources
+        if source.gain == 1.0 and not source.side
+    }
+    added: dict[str, tuple[ShapeSource, ...]] = {}
+    for name, parts in combinations_of_shapes(given).items():
+        shapes = [driven.get(plain.get(part, "")) for part in parts]
+        if len(shapes) > 1 and all(shapes) and len(added) < MAX_COMBINATIONS:
+            added[combination_name(filter(None, shapes))] = (ShapeSource(name),)
+    return {**mapping, **added}

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
+from tts2face.face.combinations import PREFIX
 from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES
 from tts2face.face.mouth import NO_VISEME, mouth_products
 from tts2face.face.shape_transfer import add_missing_shapes
@@ -112,7 +113,9 @@ def arkit_projection(channels: tuple[str, ...], face: Face | None, name: str) ->
         No channel is an ARKit shape, or there are other channels and no face whose shapes they are.
     """
     columns = np.array([channels.index(name) if name in channels else -1 for name in ARKIT_SHAPES])
-    others = np.array([at for at, name in enumerate(channels) if name not in ARKIT_SHAPES], np.int64)
+    # combinations correct what ARKit's weights say already
+    added = [at for at, name in enumerate(channels) if name not in ARKIT_SHAPES and not name.startswith(PREFIX)]
+    others = np.array(added, np.int64)
     spoken = np.array([channels[at].startswith(SPEECH_SHAPE_PREFIXES) for at in others], bool)
     if (columns < 0).all() and (face is None or not spoken.any()):
         raise InputError(

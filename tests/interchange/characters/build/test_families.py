@@ -7,9 +7,17 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError
-from tests.interchange.characters.made import Variant, head_without_mouth, write_character_file, write_landmarks
+from tests.interchange.characters.made import (
+    Variant,
+    head_without_mouth,
+    split_glb,
+    write_character_file,
+    write_landmarks,
+)
+from tts2face import Session, export
 from tts2face.face.landmarks import landmark_motion
 from tts2face.interchange.characters.importing import import_face
+from tts2face.interchange.exports.arkit import ARKIT_SHAPES, arkit_projection
 from tts2face.models.face import Face
 
 FAMILIES = {  # name of a shape -> that of the family
@@ -106,3 +114,40 @@ def test_a_head_of_no_person_has_no_landmarks_and_keeps_its_shapes(tmp_path: Pat
     assert any("no face is recognised in its pictures" in note for note in imported.report.notes)
     assert {"jawOpen", "mouthSmileLeft", "eyeLookUpLeft"} <= {*imported.face.shape_names}
     assert len(imported.face.eyes) == 2
+
+
+def test_a_combination_corrects_in_pictures_and_in_its_own_file(tmp_path: Path) -> None:
+    """The head with a corrective of open jaw and pucker, which moves the chin by 5 mm."""
+    head = head_without_mouth()
+    names = ("jawOpen", "mouthPucker", "mouthFunnel", "eyeBlinkLeft", "eyeBlinkRight")
+    rows = [head.shape_names.index(name) for name in names]
+    moved = np.where(head.vertices[:, 1:2] < -60.0, np.float32([0.0, 0.0, 5.0]), np.float32(0.0))
+    own = replace(
+        head, shape_names=(*names, "jawOpen_mouthPucker"), shapes=np.concatenate([head.shapes[rows], moved[None]]),
+        limits=np.tile(np.float32([0, 1]), (6, 1)), scores=None,
+        eyes=tuple(replace(eye, turns={}) for eye in head.eyes),
+    )  # fmt: skip
+    path = write_character_file(tmp_path / "a.glb", Variant(), face=own)
+    imported = import_face(path, landmarks=write_landmarks(tmp_path / "l.tsv"))
+    combination = "combination*jawOpen*mouthPucker"
+    assert combination in imported.face.shape_names
+    assert "shapes that combine others get the products of their weights: jawOpen_mouthPucker" in imported.report.notes
+    session = Session(face=imported.face)
+    clip = session.clip("Who would use two old roads?")
+    jaw, pucker, product = clip.motion.columns(["jawOpen", "mouthPucker", combination]).T
+    assert product.max() > 0.05
+    np.testing.assert_allclose(product, np.clip(jaw, 0, 1) * np.clip(pucker, 0, 1), atol=1e-6)
+    export(clip, tmp_path / "b.glb", face=session.mesh)
+    root, binary = split_glb((tmp_path / "b.glb").read_bytes())
+    animation = root["animations"][0]
+    sampler = next(
+        animation["samplers"][channel["sampler"]]
+        for channel in animation["channels"]
+        if channel["target"]["path"] == "weights"
+    )
+    accessor = root["accessors"][sampler["output"]]
+    at = root["bufferViews"][accessor["bufferView"]].get("byteOffset", 0)
+    weights = np.frombuffer(binary, "<f4", accessor["count"], at).reshape(-1, 6)
+    assert weights[: len(product), 5] == pytest.approx(product, abs=1e-4)
+    arkit = arkit_projection(clip.motion.channels, session.mesh, "a.csv").weights(clip.motion.values)
+    assert arkit[:, ARKIT_SHAPES.index("jawOpen")] == pytest.approx(np.clip(jaw, 0, 1), abs=1e-5)
