@@ -31,7 +31,8 @@ face = App(name="face", help="Import characters as faces, show faces.")
 @face.command(name="import")
 def import_character(  # noqa: PLR0913 - one parameter a flag
     character: Annotated[
-        Path, Parameter(help="Character: .glb, .gltf or .vrm, or a folder of neutral.obj and one .obj for each shape.")
+        Path,
+        Parameter(help="Character: .glb, .gltf, .vrm, .obj, or a folder of neutral.obj and one .obj a shape."),
     ],
     /,
     *,

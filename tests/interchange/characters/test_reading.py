@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lexicon.errors import DataError
+from lexicon.errors import DataError, InputError
 from tests.interchange.characters.made import Variant, write_character_file
 from tests.interchange.characters.test_gltf_mutations import small_head
 from tts2face.interchange.characters.character import BLEND, Character, Material, MaterialPiece, MorphTarget
 from tts2face.interchange.characters.eyeballs import mark_eyeballs
 from tts2face.interchange.characters.gltf_reader import read_gltf_character
 from tts2face.interchange.characters.head_mesh import LEFT_EYE, RIGHT_EYE, HeadMesh
-from tts2face.interchange.characters.importing import import_face, propose_mapping
+from tts2face.interchange.characters.importing import import_face, propose_mapping, read_character
 from tts2face.interchange.characters.obj_reader import read_obj_folder
 from tts2face.interchange.characters.surface import shells_before_eyes
 
@@ -56,6 +56,46 @@ def test_the_face_at_rest_of_a_folder_is_found(names: tuple[str, ...], tmp_path:
 def test_a_folder_without_one_face_at_rest_is_refused(names: tuple[str, ...], reason: str, tmp_path: Path) -> None:
     with pytest.raises(DataError, match=reason):
         read_obj_folder(write_objs(tmp_path, *names))
+
+
+SQUARE = "v 0 0 0 {0}\nv 1 0 0 {0}\nv 1 1 0 {1}\nv 0 1 0 {1}\nf 1 2 3 4\n"
+
+
+@pytest.mark.parametrize(("dark", "light"), [("0 0 0", "1 0.5 0"), ("0 0 0", "255 127.5 0")])
+def test_one_obj_file_is_a_character_without_shapes(dark: str, light: str, tmp_path: Path) -> None:
+    path = tmp_path / "Bust.OBJ"
+    path.write_text(SQUARE.format(dark, light))
+    character = read_character(path)
+    (piece,) = character.pieces
+    assert piece.triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
+    assert not character.target_names
+    assert piece.colours is not None
+    np.testing.assert_allclose(piece.colours[[0, 2]], [[0, 0, 0], [1.0, 0.216, 0]], atol=2e-3)  # linear light
+
+
+def test_colours_that_only_some_vertices_have_are_left_out(tmp_path: Path) -> None:
+    (tmp_path / "bust.obj").write_text(SQUARE.format("", "1 0.5 0"))
+    assert read_character(tmp_path / "bust.obj").pieces[0].colours is None
+
+
+def test_materials_lie_beside_an_obj_file(tmp_path: Path) -> None:
+    (tmp_path / "bust.obj").write_text("mtllib bust.mtl\n" + SQUARE.format("", "").replace("f ", "usemtl clay\nf "))
+    (tmp_path / "bust.mtl").write_text("newmtl clay\nKd 1 0 0\n")
+    assert read_character(tmp_path / "bust.obj").materials[0].colour == (1.0, 0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("scan.ply", r"not scan\.ply; export it as \.glb \(.*Blender opens \.ply and \.stl"),
+        ("bust.STL", r"not bust\.STL; export it as \.glb"),
+        ("empty.obj", r"has no faces; export the mesh, not only its points"),
+    ],
+)
+def test_other_files_of_meshes_are_refused(name: str, reason: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(b"v 0 0 0\n")
+    with pytest.raises((DataError, InputError), match=reason):
+        read_character(tmp_path / name)
 
 
 def made_character(shapes: dict[str, float], **changes: object) -> Character:

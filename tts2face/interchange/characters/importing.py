@@ -33,7 +33,8 @@ from tts2face.interchange.characters.landmarks import (
     locate_landmarks,
     part_triangles,
 )
-from tts2face.interchange.characters.obj_reader import read_obj_folder
+from tts2face.interchange.characters.obj_reader import SUFFIX as OBJ
+from tts2face.interchange.characters.obj_reader import read_obj, read_obj_folder
 from tts2face.interchange.characters.shape_names import guess_mapping, with_combinations
 from tts2face.interchange.characters.shapes import TRANSFER, ShapeMapping, read_mapping
 from tts2face.interchange.characters.surface import (
@@ -114,15 +115,17 @@ class ImportedFace:
 
 
 def read_character(path: Path) -> Character:
-    """Character of a .glb, .gltf or .vrm file, or of a folder of .obj files."""
+    """Character of a .glb, .gltf or .vrm file, of an .obj file, or of a folder of .obj files."""
     if path.is_dir():
         return read_obj_folder(path)
     if not path.exists():
         raise InputError(f"there is no character {path}; check the path")
+    if path.suffix.lower() == OBJ:
+        return read_obj(path)
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(
-            f"a character is a {', '.join(SUFFIXES)} file or a folder of .obj files, not {path.name}; export "
-            "it as .glb (docs/examples.md has a program that makes one of an .fbx file)"
+            f"a character is a {', '.join((*SUFFIXES, OBJ))} file or a folder of .obj files, not {path.name}; export "
+            "it as .glb (docs/examples.md has a program that makes one of an .fbx file; Blender opens .ply and .stl)"
         )
     return read_gltf_character(path)
 
@@ -160,7 +163,8 @@ def import_face(  # noqa: PLR0913 - one parameter an option
     Parameters
     ----------
     path
-        .glb, .gltf or .vrm file, or a folder with ``neutral.obj`` and one .obj file for each shape.
+        .glb, .gltf or .vrm file, a folder with ``neutral.obj`` and one .obj file for each shape, or an .obj file, which
+        has none.
     mapping
         Mapping or its file (.tsv or .toml), which replaces the guess for the shapes that it names.
     landmarks

@@ -1,5 +1,7 @@
-"""Reading of a character from a folder of .obj files: one at rest, such as ``neutral.obj``, and one for each shape."""
+"""Reading of a character from an .obj file, or a folder: one at rest, as ``neutral.obj``, and one for each shape."""
 
+from collections.abc import Mapping
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,6 +14,7 @@ from tts2face.interchange.characters.landmark_table import MAX_COORDINATE
 from tts2face.interchange.characters.name_words import all_words
 from tts2face.interchange.characters.obj_materials import read_libraries, read_lines
 from tts2face.numeric.arrays import FloatArray
+from tts2face.picture.kernels.tones import linear_light
 
 NEUTRAL, OTHER_NEUTRALS = "neutral", ("basis", "base", "rest", "default")
 SUFFIX = ".obj"
@@ -28,22 +31,20 @@ def read_obj_folder(folder: Path) -> Character:
     if len(shapes) > MAX_SHAPES:
         raise DataError(f"{folder} has {len(shapes)} shapes; reduce them to at most {MAX_SHAPES}")
     mesh = _ObjFile(neutral)
-    names = {MorphTarget(0, number): path.stem for number, path in enumerate(shapes)}
     moved: dict[MorphTarget, NDArray[np.float32]] = {}
-    for target, path in zip(names, shapes, strict=True):
+    for number, path in enumerate(shapes):
         places = read_vertices(path)
         if len(places) != len(mesh.vertices):
             raise DataError(
                 f"{path} has {len(places)} vertices, but {neutral.name} has {len(mesh.vertices)}; export it again"
             )
-        moved[target] = (places - mesh.vertices).astype(np.float32)
-    known = read_libraries(folder, mesh.libraries)
-    materials = [known.get(name, Material(name, (1.0, 1.0, 1.0, 1.0))) for name in mesh.materials]
-    pieces = tuple(mesh.piece(number, moved) for number in range(len(materials)))
-    pieces = tuple(piece for piece in pieces if len(piece.triangles))
-    if not pieces:
-        raise DataError(f"{neutral} has no faces; export the mesh, not only its points")
-    return Character(pieces, tuple(materials), names, {}, {}, {}, {}, faces_back=False, licence="")
+        moved[MorphTarget(0, number)] = (places - mesh.vertices).astype(np.float32)
+    return replace(mesh.character(moved), target_names=dict(zip(moved, (path.stem for path in shapes), strict=True)))
+
+
+def read_obj(path: Path) -> Character:
+    """Character of one .obj file, which has no shapes; its materials lie beside it."""
+    return _ObjFile(path).character({})
 
 
 def _find_neutral(folder: Path, paths: list[Path]) -> Path:
@@ -67,11 +68,12 @@ def read_vertices(path: Path) -> FloatArray:
 
 
 class _ObjFile:
-    """Vertices, texture coordinates, faces and names of materials of an .obj file."""
+    """Vertices, their colours, texture coordinates, faces and names of materials of an .obj file."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self.vertices = read_vertices(path)
+        self._colours = _read_colours(path)
         coordinates: list[list[str]] = []
         self.materials: list[str] = []
         self.libraries: list[str] = []
@@ -92,7 +94,17 @@ class _ObjFile:
         if not self.materials:
             self._use("plain")
 
-    def piece(self, material: int, shapes: dict[MorphTarget, NDArray[np.float32]]) -> MaterialPiece:
+    def character(self, moved: Mapping[MorphTarget, NDArray[np.float32]]) -> Character:
+        """Character of the file, with unnamed shapes that move its vertices (V, 3)."""
+        known = read_libraries(self._path.parent, self.libraries)
+        materials = [known.get(name, Material(name, (1.0, 1.0, 1.0, 1.0))) for name in self.materials]
+        pieces = tuple(self.piece(number, moved) for number in range(len(materials)))
+        pieces = tuple(piece for piece in pieces if len(piece.triangles))
+        if not pieces:
+            raise DataError(f"{self._path} has no faces; export the mesh, not only its points")
+        return Character(pieces, tuple(materials), {}, {}, {}, {}, {}, faces_back=False, licence="")
+
+    def piece(self, material: int, shapes: Mapping[MorphTarget, NDArray[np.float32]]) -> MaterialPiece:
         """Triangles of one material; vertices are divided at seams of the texture."""
         rows = np.array([n for n, used in enumerate(self._of) if used == material], np.int64)
         table = np.array(self._corners, np.int64).reshape(-1, 3, 2)[rows].reshape(-1, 2)
@@ -106,7 +118,7 @@ class _ObjFile:
             vertices=self.vertices[unique[:, 0]],
             triangles=places.reshape(-1, 3),
             uv=uv,
-            colours=None,
+            colours=None if self._colours is None else self._colours[unique[:, 0]],
             material=material,
             morphs={target: moved[unique[:, 0]] for target, moved in shapes.items()},
             bones=np.zeros(len(unique), np.int64),
@@ -141,6 +153,17 @@ class _ObjFile:
         if not 0 <= vertex < len(self.vertices) or coordinate < -1:
             raise DataError(f"{self._path}: a face uses vertex {vertex + 1} of {len(self.vertices)}; export it again")
         return vertex, coordinate
+
+
+def _read_colours(path: Path) -> FloatArray | None:
+    """Colours (V, 3) in linear light that scanners and MeshLab write behind the places of vertices; None without."""
+    rows = [line.split()[4:7] for line in read_lines(path) if line.startswith(("v ", "v\t"))]
+    if not rows or any(len(row) < 3 for row in rows):
+        return None
+    values = _numbers(rows, 3, path)
+    # some programs count colours to 1, some to 255
+    srgb = np.rint(np.clip(values if values.max() > 1.0 else 255.0 * values, 0.0, 255.0)).astype(np.uint8)
+    return linear_light(srgb).astype(np.float64)
 
 
 def _numbers(rows: list[list[str]], width: int, path: Path) -> FloatArray:
