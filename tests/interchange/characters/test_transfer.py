@@ -108,7 +108,7 @@ def test_a_head_without_shapes_is_offered_the_transfer(tmp_path: Path) -> None:
 
 
 def test_lips_in_one_piece_are_cut_apart_and_a_mouth_lies_behind_them() -> None:
-    face, landmarks = _plate()
+    face, landmarks = plate()
     skin = build_skin(face, landmarks)
     assert is_closed(skin)
     assert lip_relief(face, landmarks) < RELIEF  # a plate is a painted mouth
@@ -126,14 +126,14 @@ def test_lips_in_one_piece_are_cut_apart_and_a_mouth_lies_behind_them() -> None:
     skin_part = opened.face.parts[0]
     assert (flat[: skin_part.first + skin_part.count, 2] > -1e-6).sum() > 0.9 * skin_part.count  # none is turned over
     assert opened.face.parts[-1].name == MOUTH
-    assert (places[opened.rows, 2] < 0).all()
+    assert (places[opened.rows.ravel(), 2] < 0).all()
     parted = build_skin(opened.face, landmarks, opened.sides)
     assert not is_closed(parted)
 
 
-def _plate() -> tuple[Face, np.ndarray]:
+def plate(n: int = 49) -> tuple[Face, np.ndarray]:
     """A plate of 120 x 120 mm as a face, and landmarks of a mouth in its middle and of eyes above it."""
-    x, y = np.meshgrid(np.linspace(-60, 60, 49), np.linspace(-59, 61, 49))
+    x, y = np.meshgrid(np.linspace(-60, 60, n), np.linspace(-59, 61, n))
     places = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
     at = np.arange(x.size).reshape(x.shape)
     a, b, c, d = at[:-1, :-1].ravel(), at[:-1, 1:].ravel(), at[1:, 1:].ravel(), at[1:, :-1].ravel()

@@ -1,6 +1,6 @@
 """Sentences of an import about what was changed, replaced or left out of a character."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -10,7 +10,10 @@ from tts2face.interchange.characters.part_names import shells_before_eyes
 from tts2face.interchange.characters.shape_names import combinations_of_shapes
 from tts2face.interchange.characters.shapes import ShapeMapping
 from tts2face.interchange.characters.surface import is_plain
+from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT
+from tts2face.numeric.arrays import FloatArray
 
+ASIDE_DEG = 10.0  # from an axis, at which a head looks along it
 MAX_NAMES, MAX_LETTERS = 12, 40  # names in a sentence, and letters of each
 
 
@@ -42,6 +45,35 @@ def pose_notes(character: Character, mapping: ShapeMapping) -> list[str]:
         if posed
         else []
     )
+
+
+def place_notes(turn: FloatArray, landmarks: Mapping[int, FloatArray], eyes_apart_mm: float) -> list[str]:
+    """Notes about what was guessed of a head that was found in pictures: axes and unit of its file.
+
+    `turn` (3, 3) leads from the file's axes to a head that looks along z; `landmarks` are places (3,) in units of the
+    file, and `eyes_apart_mm` is the distance of the outer corners of the face's eyes.
+    """
+    eyes_apart = float(np.linalg.norm(landmarks[EYE_OUTER_LEFT] - landmarks[EYE_OUTER_RIGHT]))
+    ahead, up = turn[2], turn[1]
+    (front, aside), (high, tilted) = _nearest_axis(ahead), _nearest_axis(up)
+    notes = []
+    if (front, high) != ("+z", "+y") or max(aside, tilted) > ASIDE_DEG:
+        off = f", {max(aside, tilted):.0f} degrees off" if max(aside, tilted) > ASIDE_DEG else ""
+        option = "--front sets its axis" if high == "+y" else "a table of --landmarks sets its place"
+        notes.append(f"by its pictures the head looks along {front} with {high} up{off}, and is turned; {option}")
+    if not np.isclose(eyes_apart * 1000.0, eyes_apart_mm, rtol=0.15):
+        notes.append(
+            f"its unit is not the metre (the eyes' outer corners are {eyes_apart:.3g} units apart): it is scaled to "
+            f"{eyes_apart_mm:.0f} mm, as the shipped head; scale the file to metres to keep its size"
+        )
+    return notes
+
+
+def _nearest_axis(direction: FloatArray) -> tuple[str, float]:
+    """Name of the axis nearest to a unit vector (3,), and the angle between them in degrees."""
+    number = int(np.abs(direction).argmax())
+    angle = float(np.degrees(np.arccos(np.clip(abs(direction[number]), 0.0, 1.0))))
+    return ("+" if direction[number] > 0 else "-") + "xyz"[number], angle
 
 
 def colour_notes(character: Character, head: HeadMesh) -> list[str]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.face.mesh_calibration import calibrate_on_mesh, strengths
+from tts2face.face.shape_transfer import eye_distance
 from tts2face.face.stand_in import VISEME_PREFIX
 from tts2face.interchange.characters.binding import KEY, CharacterBinding
 from tts2face.interchange.characters.character import Character
@@ -24,7 +25,7 @@ from tts2face.interchange.characters.head_mesh import (
     moved_box,
     source_weights,
 )
-from tts2face.interchange.characters.import_notes import colour_notes, name_notes, pose_notes, some_of
+from tts2face.interchange.characters.import_notes import colour_notes, name_notes, place_notes, pose_notes, some_of
 from tts2face.interchange.characters.landmark_table import read_landmark_table
 from tts2face.interchange.characters.landmarks import (
     SKIN,
@@ -65,6 +66,7 @@ WITHOUT_LANDMARKS = (
     "name; if it has a human face, give `tts2face face import` the axis that it looks along with --front, or its "
     "landmarks with --landmarks"
 )
+CARRIED_KEY = "shapes_from"  # of the metadata: shipped face whose shapes were carried over
 N_STEPS = 10  # of a transfer's progress
 PROVISIONAL_HEIGHT_MM = 150.0  # of the moved part of a face, until the distance of its eyes is known
 
@@ -93,6 +95,8 @@ class ImportReport:
         What the file says about its licence and author.
     strengths
         Weight of the default head's shape of the same name that moves its mouth as weight 1 of a shape does.
+    carried_from, n_carried
+        Shipped face whose shapes were carried over, and how many of them move something; "" and 0 without.
     """
 
     mapping: ShapeMapping
@@ -104,6 +108,8 @@ class ImportReport:
     notes: tuple[str, ...]
     licence: str
     strengths: Mapping[str, float]
+    carried_from: str = ""
+    n_carried: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -217,8 +223,8 @@ def import_face(  # noqa: PLR0913 - one parameter an option
     step()
     if is_transferred:
         carried = transfer_shapes(face, is_tracked=table is None, on_step=step)
-        face, made_of = calibrate_on_mesh(carried.face), {"shapes_from": carried.source}
-        notes = [f"its shapes are those of the shipped face {carried.source}, carried over", *carried.notes]
+        face, made_of = calibrate_on_mesh(carried.face), {CARRIED_KEY: carried.source}
+        notes = list(carried.notes)
     else:
         notes = [WITHOUT_LANDMARKS]
         if located is not NO_LANDMARKS:
@@ -243,9 +249,12 @@ def import_face(  # noqa: PLR0913 - one parameter an option
             *pose_notes(character, chosen),
             *colour_notes(character, head),
             *notes,
+            *(place_notes(head.turn, places, eye_distance(face)) if is_transferred and table is None else ()),
         ),
         licence=character.licence,
         strengths=strengths(face) if located is not NO_LANDMARKS else {},
+        carried_from=made_of.get(CARRIED_KEY, ""),
+        n_carried=int(face.shapes.any(axis=(1, 2)).sum()) if is_transferred else 0,
     )
     return ImportedFace(face, report)
 

@@ -41,8 +41,11 @@ def summary(report: "ImportReport") -> list[tuple[str, str]]:
     missing = replaced.pop(NOTHING, [])
     beside = f", visemes {some_of(visemes, ROW_NAMES)}" if visemes else ""
     rows = [("found", f"{len(found)} of ARKit's {len(ARKIT_SHAPES)}{beside}")]
+    if report.carried_from:
+        of = f"{report.n_carried} of ARKit's {len(ARKIT_SHAPES)} shapes"
+        rows = [("carried", f"{of}, of the shipped face {report.carried_from}")]
     turned = [name for name in GAZE_SHAPES if name not in report.mapping and name not in report.missing]
-    rows += [("added", f"gaze ({len(turned)} shapes): the eyeballs turn")] if turned else []
+    rows += [("added", f"gaze ({len(turned)} shapes): the eyeballs turn")] if turned and report.n_eyeballs else []
     mouth = [
         f"{name} {report.strengths[name]:.2f} ({' + '.join(source.name for source in report.mapping[name])})"
         for name in SHOWN

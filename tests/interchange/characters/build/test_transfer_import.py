@@ -1,14 +1,17 @@
 """Shapes carried over by a whole import, which the tracker reads."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from lexicon.errors import DataError
 from tests.interchange.characters.made import Variant, head_without_mouth, write_character_file, write_landmarks
 from tests.interchange.characters.test_transfer import shapeless_head
 from tts2face.face.landmarks import landmark_positions, scatter_landmarks
 from tts2face.interchange.characters.importing import import_face
+from tts2face.interchange.characters.transfer.walls import keep_triangles
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LEFT_LIDS, LIP_LANDMARKS, RIGHT_LIDS
 
 
@@ -19,7 +22,9 @@ def test_the_shapes_of_a_head_come_back(tmp_path: Path) -> None:
     steps: list[tuple[int, int]] = []
     imported = import_face(path, shapes="transfer", on_progress=lambda done, of: steps.append((done, of)))
     face, head = imported.face, head_without_mouth()
-    assert face.metadata["shapes_from"] == "head"
+    assert face.metadata["shapes_from"] == imported.report.carried_from == "head"
+    assert 45 < imported.report.n_carried < 52  # gaze turns the eyeballs, and tongueOut moves nothing of skin and eyes
+    assert any("is turned; --front sets its axis" in note for note in imported.report.notes)
     assert "character" not in face.metadata
     assert len(face.eyes) == 2
     assert steps[-1][0] == len(steps) <= steps[-1][1]
@@ -43,3 +48,22 @@ def test_a_table_of_lips_and_lids_is_enough(tmp_path: Path) -> None:
     jaw = imported.face.shapes[imported.face.shape_names.index("jawOpen")]
     head = head_without_mouth()
     assert np.abs(jaw).max() == pytest.approx(np.abs(head.shapes[head.shape_names.index("jawOpen")]).max(), rel=0.1)
+
+
+@pytest.mark.usefixtures("face_model")
+def test_two_heads_and_half_a_head_are_refused(tmp_path: Path) -> None:
+    head = shapeless_head()
+    n, n_triangles = len(head.vertices), len(head.triangles)
+    empty = np.zeros((0, 2 * n, 3), np.float32)
+    two = replace(
+        head, vertices=np.concatenate([head.vertices, head.vertices + np.float32([350, 0, 0])]),
+        triangles=np.concatenate([head.triangles, head.triangles + n]), colours=np.tile(head.colours, (2, 1)),
+        uv=None if head.uv is None else np.tile(head.uv, (2, 1)), shapes=empty, tangents=None,
+        parts=(*head.parts, *(replace(part, first=part.first + n_triangles) for part in head.parts)),
+    )  # fmt: skip
+    with pytest.raises(DataError, match=r"two faces are recognised, 0\.3\d+ units of the file apart; leave one head"):
+        import_face(write_character_file(tmp_path / "two.glb", face=two), shapes="transfer")
+    half = keep_triangles(head, (head.vertices[head.triangles][..., 0] < 0).all(axis=1))
+    with pytest.raises(DataError, match="only one side of a face is there"):
+        import_face(write_character_file(tmp_path / "half.glb", face=half), shapes="transfer")
+    assert not list(tmp_path.glob("*.face"))

@@ -17,8 +17,16 @@ from tts2face.interchange.characters.surface import Placement, add_gaze_shapes, 
 from tts2face.interchange.characters.transfer.kinds import drop_shells, sort_kinds
 from tts2face.interchange.characters.transfer.registration import FEATURES
 from tts2face.interchange.characters.transfer.source import own_landmarks
+from tts2face.interchange.characters.transfer.winding import facing_outwards
 from tts2face.models.face import Face
-from tts2face.models.landmarks import CHIN, LEFT_LIDS, N_MESH_LANDMARKS, RIGHT_LIDS
+from tts2face.models.landmarks import (
+    CHIN,
+    EYE_OUTER_LEFT,
+    EYE_OUTER_RIGHT,
+    LEFT_LIDS,
+    N_MESH_LANDMARKS,
+    RIGHT_LIDS,
+)
 from tts2face.numeric.arrays import FloatArray, Mask
 from tts2face.picture.occlusion import N_DIRECTIONS
 from tts2face.video.tracking import MIN_SCORE
@@ -31,6 +39,9 @@ CROPS = (1.0, 0.5, 0.3, 0.2, 0.14)
 TALL = 2.0  # height over width or depth from which the mesh is no head alone, and crops are tried first
 BESIDE_DEG = (0.0, 40.0, -40.0)  # turns from an axis at which a head that looks aside is seen
 LEVEL_DEG = 3.0  # a head that is turned less is not turned back
+NOSE = (168, 6, 197, 1, 2)  # landmarks of its line
+HALF = 0.5  # of the distance from the nose to an eye's outer corner: the other side has less where it is missing
+BESIDE_HEIGHTS, BESIDE_SHARE = 1.1, 0.3  # of a face's height and triangles: another head beside it
 N_PICTURES = 3  # pictures after which the turn of a head is final
 
 
@@ -45,17 +56,26 @@ class FoundHead:
 
 def find_head(character: Character, fronts: Sequence[float], model: Path | None) -> FoundHead:
     """Head of a character, sought along the axes with these turns in degrees, upright, then lying."""
-    whole = drop_shells(join_pieces(character, {}, np.eye(3)), character)
+    whole = facing_outwards(drop_shells(join_pieces(character, {}, np.eye(3)), character))
     best = 0.0
     n_pictures = 0
+    doubtful: tuple[HeadMesh, _Sighting] | None = None
     for turn in _turns(fronts):
         turned = replace(whole, vertices=whole.vertices @ turn.T, turn=turn)
         for crop in _crops(turned):
             seen = _sight(turned.keep(crop), character, model)
             n_pictures += 1
             best = max(best, seen.score)
-            if seen.score >= MIN_SCORE:
-                return _settled(turned, seen, character, model)
+            if seen.score < MIN_SCORE:
+                continue
+            # a part of a bald scalp may look like a face, and the whole head around it does not
+            if not _is_confirmed(turned, seen, character, model):
+                doubtful = doubtful or (turned, seen)
+                continue
+            _check_alone(turned, seen.landmarks, character, model)
+            return _settled(turned, seen, character, model)
+    if doubtful is not None:
+        return _settled(*doubtful, character, model)
     raise DataError(
         f"no face is recognised in {n_pictures} pictures of the mesh from its sides and of its upper parts (highest "
         f"score {best:.2f} of the {MIN_SCORE:g} that a face has); give the axis that it looks along with --front, or "
@@ -70,7 +90,7 @@ def placed_head(character: Character, front: float, table: Mapping[int, FloatArr
     for number, place in table.items():
         if number < N_MESH_LANDMARKS:
             landmarks[number] = turn @ place
-    whole = drop_shells(join_pieces(character, {}, turn), character)
+    whole = facing_outwards(drop_shells(join_pieces(character, {}, turn), character))
     back = _level_turn(landmarks)
     whole = replace(whole, vertices=whole.vertices @ back.T, turn=back @ turn)
     return _finish(whole, landmarks @ back.T, character)
@@ -106,6 +126,8 @@ def _crops(head: HeadMesh) -> Iterator[Mask]:
     is_tall = height > TALL * min(float(high[0] - low[0]), float(high[2] - low[2]))
     for share in CROPS[::-1] if is_tall else CROPS:
         above = places[:, 1] > high[1] - share * height
+        if not above.any():  # long triangles have their middles lower
+            continue
         middle = np.median(places[above, 0])
         kept = above & (np.abs(places[:, 0] - middle) < 0.6 * share * height) if share < 1.0 else above
         if kept.sum() > 100:
@@ -134,6 +156,14 @@ def unshaded(face: Face) -> Face:
     return replace(face, occlusion=np.zeros((1, len(face.vertices), N_DIRECTIONS // 8), np.uint8))
 
 
+def _is_confirmed(whole: HeadMesh, seen: _Sighting, character: Character, model: Path | None) -> bool:
+    """Whether a face is recognised in a picture of the whole head, turned to the front, that was seen."""
+    back = _level_turn(seen.landmarks)
+    turned = replace(whole, vertices=whole.vertices @ back.T, turn=back @ whole.turn)
+    head = crop_head(turned, *_face_box(seen.landmarks @ back.T))
+    return _sight(head, character, model).score >= MIN_SCORE
+
+
 def _settled(whole: HeadMesh, seen: _Sighting, character: Character, model: Path | None) -> FoundHead:
     """The head of a first look, turned until it looks along z."""
     for _ in range(N_PICTURES):
@@ -147,6 +177,37 @@ def _settled(whole: HeadMesh, seen: _Sighting, character: Character, model: Path
         # a picture of the turned head that shows less is not believed
         seen = again if again.score >= MIN_SCORE else turned
     return _finish(whole, seen.landmarks, character)
+
+
+def _check_alone(turned: HeadMesh, landmarks: FloatArray, character: Character, model: Path | None) -> None:
+    """Refuse a mesh in which another face stands beside that with these landmarks (468, 3)."""
+    low, high = _face_box(landmarks)
+    height, middle = float(high[1] - low[1]), (low + high) / 2
+    off = turned.vertices[turned.triangles].mean(axis=1) - middle
+    is_level = np.abs(off[:, 1]) < BESIDE_HEIGHTS * height
+    n_own = int((np.abs(off).max(axis=1) < height).sum())
+    for side in (off[:, 0], -off[:, 0]):
+        beside = is_level & (side > BESIDE_HEIGHTS * height)
+        if beside.sum() < BESIDE_SHARE * n_own:
+            continue
+        other = _sight(turned.keep(beside), character, model)
+        if other.score >= MIN_SCORE:
+            apart = float(np.linalg.norm(np.mean(_face_box(other.landmarks), axis=0) - middle))
+            raise DataError(
+                f"two faces are recognised, {apart:.3g} units of the file apart; leave one head in the file, or give "
+                "the positions of its landmarks with --landmarks"
+            )
+
+
+def _check_whole(landmarks: FloatArray) -> None:
+    """Refuse a face of which one side is missing: landmarks of what is not there lie at the rim of what is."""
+    middle = landmarks[list(NOSE), 0].mean()
+    sides = sorted(abs(float(landmarks[corner, 0] - middle)) for corner in (EYE_OUTER_LEFT, EYE_OUTER_RIGHT))
+    if sides[0] < HALF * sides[1]:
+        raise DataError(
+            f"only one side of a face is there: from the nose to the eyes' outer corners are {sides[0]:.2g} and "
+            f"{sides[1]:.2g} units of the file; mirror the half in its program, or take a whole head"
+        )
 
 
 def _level_turn(landmarks: FloatArray) -> FloatArray:
@@ -167,6 +228,7 @@ def _face_box(landmarks: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def _finish(whole: HeadMesh, landmarks: FloatArray, character: Character) -> FoundHead:
     """Cropped head with its parts distinguished by their places, and eyeballs marked."""
+    _check_whole(landmarks)
     low, high = _face_box(landmarks)
     head = unwrap(crop_head(whole, low, high), character)
     lids = {eye: landmarks[list({*ring[0], *ring[1]})].mean(axis=0) for eye, ring in EYE_RINGS.items()}

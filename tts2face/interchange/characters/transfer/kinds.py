@@ -23,7 +23,8 @@ from tts2face.numeric.arrays import FloatArray, IntArray
 
 # Relative to the distance of the outer eye corners, about 90 mm.
 NEAR_SKIN = 0.02  # of a landmark: the piece that it lies on is skin
-MOUTH_DEPTH, MOUTH_HEIGHT = 0.7, 0.45  # of the room behind the lips in which teeth and tongue lie
+MOUTH_WIDTH = 1.0  # of the mouth's own width: half side of that room
+MOUTH_DEPTH, MOUTH_HEIGHT = 1.3, 0.45  # of the room behind the lips in which teeth, tongue and throat lie
 LASH_REACH = 0.14  # from the lids within which most of a small loose piece is a lash
 MIN_HITS = 0.05  # of all landmarks that lie on an unnamed piece
 BEHIND = 0.01  # the foremost of the inner lips, for teeth
@@ -90,7 +91,7 @@ def _kind_by_place(places: FloatArray, landmarks: FloatArray, size: float, skin:
     middle = lips.mean(axis=0)
     low, high = places.min(axis=0), places.max(axis=0)
     width = float(abs(corners[0, 0] - corners[1, 0]))
-    is_within = max(high[0] - middle[0], middle[0] - low[0]) < 0.8 * width
+    is_within = max(high[0] - middle[0], middle[0] - low[0]) < MOUTH_WIDTH * width
     is_level = low[1] > middle[1] - MOUTH_HEIGHT * size and high[1] < middle[1] + MOUTH_HEIGHT * size
     is_inside = lips[:, 2].max() - BEHIND * size > high[2] and low[2] > middle[2] - MOUTH_DEPTH * size
     if is_within and is_level and is_inside:

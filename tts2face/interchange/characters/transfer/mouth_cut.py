@@ -10,6 +10,7 @@ from tts2face.interchange.characters.surface import SHADING
 from tts2face.interchange.characters.transfer.parts import triangles_of
 from tts2face.interchange.characters.transfer.sight import view_ahead
 from tts2face.interchange.characters.transfer.skin import Skin
+from tts2face.interchange.characters.transfer.walls import keep_triangles
 from tts2face.models.face import VERTEX_COLOURS, Face, FacePart
 from tts2face.models.landmarks import (
     EYE_OUTER_LEFT,
@@ -48,10 +49,14 @@ class OpenedMouth:
     ----------
     sides : (V,)
         1 for vertices of the upper and 2 for those of the lower lip at the cut, 0 elsewhere.
-    rows, lips, shares : (M,)
-        Vertices of the mouth, those of the lips that they follow, and the share of their motion.
+    rows : (2, R, N)
+        Vertices of the mouth behind the upper and the lower lip, by rows from the lip to the throat.
+    lips, shares : (M,)
+        Vertices of the lips that they follow, and the share of their motion.
     jaw : (M,)
         Share of the jaw's motion that they take.
+    scale
+        Size of the face over that of the shipped head.
     """
 
     face: Face
@@ -60,6 +65,12 @@ class OpenedMouth:
     lips: IntArray
     shares: FloatArray
     jaw: FloatArray
+    scale: float
+
+    def edges(self, skin: Skin) -> tuple[IntArray, IntArray]:
+        """Vertices of the skin at the cut, of the upper and of the lower lip."""
+        upper, lower = (np.unique(skin.of_face[(self.sides == side) & (skin.of_face >= 0)]) for side in (1, 2))
+        return upper, lower
 
 
 def is_closed(skin: Skin) -> bool:
@@ -113,14 +124,7 @@ def _without_buried(face: Face, skin: Skin, seam: FloatArray) -> Face:
     on_skin = skin.of_face >= 0
     is_buried[on_skin] = ~skin.is_seen[skin.of_face[on_skin]]
     gone = (is_buried & near)[face.triangles].all(axis=1)
-    if not gone.any():
-        return face
-    parts, first = [], 0
-    for part in face.parts:
-        count = int((~gone[part.first : part.first + part.count]).sum())
-        parts.append(replace(part, first=first, count=count))
-        first += count
-    return replace(face, parts=tuple(parts), triangles=face.triangles[~gone])
+    return keep_triangles(face, ~gone) if gone.any() else face
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -247,8 +251,8 @@ def _add_mouth(face: Face, slit: _Slit, landmarks: FloatArray, scale: float) -> 
     # the floor of the mouth sinks with the lower teeth
     jaw = (1 - share) * np.stack([0.0, 1.0])[:, None, None] * np.linspace(1.0, 0.3, len(ROLL))[None, :, None]
     return OpenedMouth(
-        _with_lip_landmarks(made, slit, landmarks), sides, numbers.reshape(-1), of.astype(np.int64), share.reshape(-1),
-        jaw.reshape(-1),
+        _with_lip_landmarks(made, slit, landmarks), sides, numbers, of.astype(np.int64), share.reshape(-1),
+        jaw.reshape(-1), scale,
     )  # fmt: skip
 
 

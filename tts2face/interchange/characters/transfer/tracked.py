@@ -27,8 +27,9 @@ def locate_bare_landmarks(face: Face, model: Path | None = None) -> LocatedLandm
     located = locate_landmarks(CharacterViews(bare, model))
     if located is None:
         raise DataError(
-            "the head's face is recognised in fewer than half of its pictures; give the axis that it looks along with "
-            "--front, or the positions of its landmarks with --landmarks"
+            "the head's face is recognised in fewer than half of its pictures, as an animal's is, to which shapes are "
+            "not carried over; if it is a human's, give the axis that it looks along with --front, or the positions of "
+            "its landmarks with --landmarks"
         )
     return replace(
         located, points=SurfacePoints(rows[located.points.vertices].astype(np.int64), located.points.weights)

@@ -11,6 +11,7 @@ from tts2face.face.eyelids import BLINK_SHAPES, SIDES
 from tts2face.interchange.characters.landmarks import SKIN, part_triangles
 from tts2face.interchange.characters.lip_line import find_lip_line
 from tts2face.interchange.characters.surface_points import SurfacePoints, nearest_points
+from tts2face.interchange.characters.transfer.cover import keep_covered
 from tts2face.interchange.characters.transfer.lids import (
     LID_SHAPES,
     MAX_CROSSING,
@@ -21,6 +22,7 @@ from tts2face.interchange.characters.transfer.lids import (
     seen_eyeball,
     shut_lids,
 )
+from tts2face.interchange.characters.transfer.lip_edges import smooth_edges
 from tts2face.interchange.characters.transfer.lip_sight import lips_in_sight
 from tts2face.interchange.characters.transfer.mouth_cut import (
     RELIEF,
@@ -29,10 +31,12 @@ from tts2face.interchange.characters.transfer.mouth_cut import (
     lip_relief,
     open_mouth,
 )
+from tts2face.interchange.characters.transfer.mouth_mesh import prepare_mouth
 from tts2face.interchange.characters.transfer.parts import add_teeth, jaw_shares, move_cards, move_jaw, vertices_of
 from tts2face.interchange.characters.transfer.registration import Registration, Similarity, register
 from tts2face.interchange.characters.transfer.skin import Skin, build_skin
 from tts2face.interchange.characters.transfer.source import Source, choose_source, load_source, own_landmarks
+from tts2face.interchange.characters.transfer.walls import without_inner_wall
 from tts2face.models.face import WIDE_OPEN, Face
 from tts2face.models.landmarks import (
     EYE_OUTER_LEFT,
@@ -40,12 +44,15 @@ from tts2face.models.landmarks import (
     INNER_LIP_LOWER,
     INNER_LIP_UPPER,
     LOWER_LIP_INNER_MID,
+    MOUTH_CORNER_LEFT,
+    MOUTH_CORNER_RIGHT,
     N_LANDMARKS,
     UPPER_LIP_INNER_MID,
 )
 from tts2face.numeric.arrays import FloatArray
 
 BLINK_GAINS = (1.0, 1.05, 1.1, 1.15)  # by which a blink that leaves a slit may grow before its lids are moved apart
+OPEN_SHARE = 0.06  # of the mouth's width: gap of lips that are not shut at rest
 N_SMOOTHED = 3  # rounds in which displacements of cut lips become smooth
 
 
@@ -76,31 +83,32 @@ def transfer_shapes(
     face = _with_landmarks(_without_shapes(face), landmarks)
     head = load_source(source or choose_source(landmarks), is_tracked=is_tracked)
     on_step()
+    face, is_hollow = without_inner_wall(face)
     face, skin, opened = _with_parted_lips(face, landmarks, head)
     skin = lips_in_sight(skin)
     registration = register(head.skin, skin, head.modes(), on_step)
     carried = registration.carry(head.moves())
     if opened is not None:
-        carried = _smoothed(skin, carried)
+        carried = smooth_edges(skin, _smoothed(skin, carried), opened.edges(skin))
     shapes, notes = _lids(face, skin, head, carried, registration)
+    if is_hollow:
+        notes = [*notes, "its skin has two sides, as a hollow statue's; the inner one is left out"]
     similarity = _at_lips(registration.similarity, head, skin.landmarks)
     shares = np.zeros(len(face.vertices))
     if opened is not None:
-        shares[opened.rows] = opened.jaw
-        notes = [
-            *notes,
-            "the mouth was closed: its lips are cut apart, and a mouth with teeth lies behind them",
-        ]
+        shares[opened.rows.ravel()] = opened.jaw
+        notes = [*notes, *_notes_of_lips(landmarks)]
     spread = skin.spread(shapes)
+    n_added = 0
     if opened is not None:
-        spread[:, opened.rows] = 0.0
+        spread[:, opened.rows.ravel()] = 0.0
     if opened is not None and not len(vertices_of(face, "teeth", "tongue")):
         face = add_teeth(face, head.face, similarity)
         n_added = len(face.vertices) - len(shares)
         shares, spread = np.pad(shares, (0, n_added)), np.pad(spread, ((0, 0), (0, n_added), (0, 0)))
     move_jaw(face, spread, np.maximum(shares, jaw_shares(face, skin.landmarks)), _lower_teeth(head, similarity))
     if opened is not None:
-        spread[:, opened.rows] += opened.shares[:, None] * spread[:, opened.lips]
+        spread[:, opened.rows.ravel()] += opened.shares[:, None] * spread[:, opened.lips]
     move_cards(face, spread, skin)
     made = replace(
         face,
@@ -109,7 +117,23 @@ def transfer_shapes(
         limits=np.tile(np.array([0.0, 1.0], np.float32), (len(head.shape_names), 1)),
         eyes=given.eyes,
     )
+    if opened is not None:
+        added = np.arange(len(made.vertices) - n_added, len(made.vertices))
+        made = keep_covered(made, opened.rows, added, opened.scale)
     return Transferred(_with_lip_line(made), head.name, tuple(notes))
+
+
+def _notes_of_lips(landmarks: FloatArray) -> list[str]:
+    """Notes about lips that were one surface: that they are cut, and whether they are open at rest."""
+    ends = [UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID, MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT]
+    gap, width = np.linalg.norm(landmarks[ends[::2]] - landmarks[ends[1::2]], axis=1).tolist()
+    notes = ["the mouth was closed: its lips are cut apart, and a mouth with teeth lies behind them"]
+    if gap > OPEN_SHARE * width:
+        notes.append(
+            f"its lips are open by {gap:.0f} mm, in one surface with what lies behind them, which shows as the mouth "
+            "opens; close them in its program"
+        )
+    return notes
 
 
 def _without_shapes(face: Face) -> Face:
@@ -132,7 +156,8 @@ def _with_parted_lips(face: Face, landmarks: FloatArray, head: Source) -> tuple[
         )
     corners = [EYE_OUTER_LEFT, EYE_OUTER_RIGHT]
     apart = [float(np.linalg.norm(np.subtract(*places[corners]))) for places in (landmarks, head.skin.landmarks)]
-    opened = open_mouth(face, skin, apart[0] / apart[1])
+    prepared = prepare_mouth(face, landmarks)
+    opened = open_mouth(prepared, build_skin(prepared, landmarks), apart[0] / apart[1])
     if opened is None:
         return face, skin, None
     found = landmarks.copy()
