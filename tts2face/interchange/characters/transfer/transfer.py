@@ -52,7 +52,7 @@ from tts2face.models.landmarks import (
 from tts2face.numeric.arrays import FloatArray
 
 BLINK_GAINS = (1.0, 1.05, 1.1, 1.15)  # by which a blink that leaves a slit may grow before its lids are moved apart
-OPEN_SHARE = 0.06  # of the mouth's width: gap of lips that are not shut at rest
+OPEN_SHARE = 0.09  # of the mouth's width: gap of lips that are not shut at rest
 N_SMOOTHED = 3  # rounds in which displacements of cut lips become smooth
 
 
