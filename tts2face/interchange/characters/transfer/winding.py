@@ -64,6 +64,6 @@ def _volume_shares(corners: FloatArray, piece: IntArray) -> tuple[FloatArray, Fl
     middle = np.stack([np.bincount(piece, corners[:, :, k].mean(axis=1), n) for k in range(3)], axis=1) / n_own[:, None]
     off = corners - middle[piece][:, None]
     flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.bincount(piece, np.linalg.norm(flat, axis=1) / 2, n)
+    area: FloatArray = np.bincount(piece, np.linalg.norm(flat, axis=1) / 2, n).astype(np.float64)
     six = np.bincount(piece, (np.cross(off[:, 0], off[:, 1]) * off[:, 2]).sum(axis=1), n)
     return six / np.maximum(area, 1e-30) ** 1.5, area
