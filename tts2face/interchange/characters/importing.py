@@ -34,8 +34,7 @@ from tts2face.interchange.characters.landmarks import (
     locate_landmarks,
     part_triangles,
 )
-from tts2face.interchange.characters.obj_reader import SUFFIX as OBJ
-from tts2face.interchange.characters.obj_reader import read_obj, read_obj_folder
+from tts2face.interchange.characters.obj_reader import OBJ, read_obj, read_obj_folder
 from tts2face.interchange.characters.shape_names import guess_mapping, with_combinations
 from tts2face.interchange.characters.shapes import TRANSFER, ShapeMapping, read_mapping
 from tts2face.interchange.characters.surface import (
@@ -66,7 +65,6 @@ WITHOUT_LANDMARKS = (
     "name; if it has a human face, give `tts2face face import` the axis that it looks along with --front, or its "
     "landmarks with --landmarks"
 )
-CARRIED_KEY = "shapes_from"  # of the metadata: shipped face whose shapes were carried over
 N_STEPS = 10  # of a transfer's progress
 PROVISIONAL_HEIGHT_MM = 150.0  # of the moved part of a face, until the distance of its eyes is known
 
@@ -169,8 +167,7 @@ def import_face(  # noqa: PLR0913 - one parameter an option
     Parameters
     ----------
     path
-        .glb, .gltf or .vrm file, a folder with ``neutral.obj`` and one .obj file for each shape, or an .obj file, which
-        has none.
+        .glb, .gltf, .vrm or .obj file, or a folder with ``neutral.obj`` and one .obj file for each shape.
     mapping
         Mapping or its file (.tsv or .toml), which replaces the guess for the shapes that it names.
     landmarks
@@ -223,7 +220,7 @@ def import_face(  # noqa: PLR0913 - one parameter an option
     step()
     if is_transferred:
         carried = transfer_shapes(face, is_tracked=table is None, on_step=step)
-        face, made_of = calibrate_on_mesh(carried.face), {CARRIED_KEY: carried.source}
+        face, made_of = calibrate_on_mesh(carried.face), {"shapes_from": carried.source}
         notes = list(carried.notes)
     else:
         notes = [WITHOUT_LANDMARKS]
@@ -253,7 +250,7 @@ def import_face(  # noqa: PLR0913 - one parameter an option
         ),
         licence=character.licence,
         strengths=strengths(face) if located is not NO_LANDMARKS else {},
-        carried_from=made_of.get(CARRIED_KEY, ""),
+        carried_from=made_of.get("shapes_from", ""),
         n_carried=int(face.shapes.any(axis=(1, 2)).sum()) if is_transferred else 0,
     )
     return ImportedFace(face, report)

@@ -17,7 +17,7 @@ from tts2face.numeric.arrays import FloatArray
 from tts2face.picture.kernels.tones import linear_light
 
 NEUTRAL, OTHER_NEUTRALS = "neutral", ("basis", "base", "rest", "default")
-SUFFIX = ".obj"
+OBJ = ".obj"
 MAX_OBJ_VERTICES = 500_000
 MAX_SHAPES = 500
 
@@ -25,7 +25,7 @@ MAX_SHAPES = 500
 def read_obj_folder(folder: Path) -> Character:
     """Character of a folder: faces, texture places and materials of the face at rest, and shapes of equal vertices."""
     # sorted: folders list their files in any order
-    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() == SUFFIX and path.is_file())
+    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() == OBJ and path.is_file())
     neutral = _find_neutral(folder, paths)
     shapes = [path for path in paths if path != neutral]
     if len(shapes) > MAX_SHAPES:
@@ -57,7 +57,7 @@ def _find_neutral(folder: Path, paths: list[Path]) -> Path:
         names = ", ".join(path.name[:60] for path in found[:4])
         raise DataError(f"{folder} has several faces at rest ({names}); leave one of them in it")
     if not found:
-        raise DataError(f"{folder} has no {NEUTRAL}{SUFFIX}; name the face at rest so")
+        raise DataError(f"{folder} has no {NEUTRAL}{OBJ}; name the face at rest so")
     return found[0]
 
 
