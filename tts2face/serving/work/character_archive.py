@@ -6,7 +6,7 @@ from pathlib import Path
 
 from lexicon.errors import DataError
 from tts2face.interchange.characters.import_notes import some_of
-from tts2face.interchange.characters.obj_reader import SUFFIX
+from tts2face.interchange.characters.obj_reader import OBJ
 from tts2face.interchange.gltf.reader import SUFFIXES
 
 MAGIC = b"PK\x03\x04"
@@ -36,11 +36,11 @@ def unpack_character(archive: Path, folder: Path) -> Path:
 def _character_in(folder: Path) -> Path:
     files = sorted(path for path in folder.rglob("*") if path.is_file())
     found = [path for path in files if path.suffix.lower() in SUFFIXES]
-    found = found or list(dict.fromkeys(path.parent for path in files if path.suffix.lower() == SUFFIX))
+    found = found or list(dict.fromkeys(path.parent for path in files if path.suffix.lower() == OBJ))
     if len(found) > 1:
         names = some_of([path.relative_to(folder).as_posix() for path in found])
         raise DataError(f"the archive holds several characters ({names}); pack one of them")
     if not found:
-        kinds = ", ".join((*SUFFIXES, SUFFIX))
+        kinds = ", ".join((*SUFFIXES, OBJ))
         raise DataError(f"the archive holds no character ({kinds}), but {some_of([path.name for path in files])}")
     return found[0]
