@@ -11,6 +11,7 @@ from lexicon.errors import DataError, InputError
 from tests.interchange.characters.made import head_without_mouth, shipped_head, write_character_file
 from tts2face.face.eyelids import build_eyelid_model
 from tts2face.interchange.characters.importing import import_face
+from tts2face.interchange.characters.transfer.kinds import card_triangles
 from tts2face.interchange.characters.transfer.mouth_cut import MOUTH, RELIEF, is_closed, lip_relief, open_mouth
 from tts2face.interchange.characters.transfer.parts import jaw_shares
 from tts2face.interchange.characters.transfer.registration import fit_similarity, nearest_on_triangles
@@ -129,6 +130,25 @@ def test_lips_in_one_piece_are_cut_apart_and_a_mouth_lies_behind_them() -> None:
     assert (places[opened.rows.ravel(), 2] < 0).all()
     parted = build_skin(opened.face, landmarks, opened.sides)
     assert not is_closed(parted)
+
+
+def test_a_card_shares_its_root_with_the_skin_and_a_patch_of_texture_its_border() -> None:
+    face, landmarks = plate()
+    places, corners = face.vertices.astype(np.float64), face.triangles.astype(np.int64)
+    lid = landmarks[list(RIGHT_LIDS[0])]
+    middles = places[corners].mean(axis=1)
+    is_patch = (np.abs(middles - lid.mean(axis=0)) < [8.0, 6.0, 1.0]).all(axis=1)
+    own = np.unique(corners[is_patch])
+    of = np.full(len(places), -1)
+    of[own] = len(places) + np.arange(len(own))
+    corners[is_patch] = of[corners[is_patch]]  # divided as by a seam of the texture
+    places = np.concatenate([places, places[own]])
+    root = places[own[np.argsort(np.abs(places[own] - lid[4]).sum(axis=1))[0]]]
+    card = root + np.array([[0.0, 0, 0], [2.5, 0, 0], [2.5, 4, 5], [0, 4, 5]])
+    n = len(places)
+    corners = np.concatenate([corners, n + np.array([[0, 1, 2], [0, 2, 3]])])
+    is_card = card_triangles(np.concatenate([places, card]), corners, lid, 15.0)
+    np.testing.assert_array_equal(np.flatnonzero(is_card), [len(corners) - 2, len(corners) - 1])
 
 
 def plate(n: int = 49) -> tuple[Face, np.ndarray]:

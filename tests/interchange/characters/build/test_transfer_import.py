@@ -9,9 +9,15 @@ import pytest
 from lexicon.errors import DataError
 from tests.interchange.characters.made import Variant, head_without_mouth, write_character_file, write_landmarks
 from tests.interchange.characters.test_transfer import shapeless_head
+from tts2face.face.eyelids import BLINK_SHAPES
 from tts2face.face.landmarks import landmark_positions, scatter_landmarks
 from tts2face.interchange.characters.importing import import_face
+from tts2face.interchange.characters.transfer.cards import move_cards
+from tts2face.interchange.characters.transfer.parts import triangles_of
+from tts2face.interchange.characters.transfer.skin import build_skin
+from tts2face.interchange.characters.transfer.source import own_landmarks
 from tts2face.interchange.characters.transfer.walls import keep_triangles
+from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LEFT_LIDS, LIP_LANDMARKS, RIGHT_LIDS
 
 
@@ -67,3 +73,15 @@ def test_two_heads_and_half_a_head_are_refused(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="only one side of a face is there"):
         import_face(write_character_file(tmp_path / "half.glb", face=half), shapes="transfer")
     assert not list(tmp_path.glob("*.face"))
+
+
+def test_lashes_turn_with_their_lids() -> None:
+    """The motion of a shipped face's lashes in a blink is found from that of its lids alone."""
+    face = load_face("mara")
+    lashes = np.unique(face.triangles[triangles_of(face, "lashes")])
+    blinks = [face.shape_names.index(name) for name in BLINK_SHAPES]
+    own, found = face.shapes[blinks].sum(axis=0)[lashes], face.shapes[blinks].astype(np.float64)
+    found[:, lashes] = 0.0
+    move_cards(face, found, build_skin(face, own_landmarks(face)))
+    apart = np.linalg.norm(found.sum(axis=0)[lashes] - own, axis=1).mean()
+    assert apart < 0.3 * np.linalg.norm(own, axis=1).mean()  # .22; cards that follow the skin beside them are torn

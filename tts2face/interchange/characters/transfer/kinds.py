@@ -19,7 +19,7 @@ from tts2face.models.landmarks import (
     MOUTH_CORNER_RIGHT,
     RIGHT_LIDS,
 )
-from tts2face.numeric.arrays import FloatArray, IntArray
+from tts2face.numeric.arrays import FloatArray, IntArray, Mask, connected_pieces
 
 # Relative to the distance of the outer eye corners, about 90 mm.
 NEAR_SKIN = 0.02  # of a landmark: the piece that it lies on is skin
@@ -28,6 +28,8 @@ MOUTH_DEPTH, MOUTH_HEIGHT = 1.3, 0.45  # of the room behind the lips in which te
 LASH_REACH = 0.14  # from the lids within which most of a small loose piece is a lash
 MIN_HITS = 0.05  # of all landmarks that lie on an unnamed piece
 BEHIND = 0.01  # the foremost of the inner lips, for teeth
+NEAR_LIDS = 0.9  # share of a card within that reach
+PLACES = 1e4  # parts of that reach, in which vertices at one place do not differ
 SMALL = 0.35  # of the triangles of the skin, below which a loose piece is a lash, a tooth, or gums
 
 
@@ -46,6 +48,9 @@ def sort_kinds(head: HeadMesh, character: Character, landmarks: FloatArray) -> H
     named = np.array([kind_by_name(piece, character) or "" for piece in character.pieces])[head.piece_of]
     component = mesh_components(head)[head.triangles[:, 0]].astype(np.int64)
     kinds = np.where(head.eye_of[head.triangles].min(axis=1) > 0, "eyes", named).astype("<U8")
+    lids = landmarks[list({*np.ravel(LEFT_LIDS), *np.ravel(RIGHT_LIDS)})]
+    is_card = card_triangles(head.vertices, head.triangles, lids, LASH_REACH * size)
+    kinds[(kinds == "") & is_card] = "lashes"
     skin = _skin_pieces(head, kinds, component, landmarks, size)
     is_skin = np.isin(component, skin) & (kinds == "")
     kinds[is_skin] = "skin"
@@ -76,6 +81,29 @@ def _skin_pieces(
     is_lash = [_is_lash(head.vertices[np.unique(head.triangles[component == number])], lids, size) for number in hit]
     skin: IntArray = hit[~np.array(is_lash, bool)]
     return skin
+
+
+def card_triangles(places: FloatArray, triangles: IntArray, lids: FloatArray, reach: float) -> Mask:
+    """(F,) triangles of cards at lids with landmarks (N, 3) that meet the skin at their roots without a common vertex.
+
+    A piece that a seam of the texture divides from the skin shares all of its border with it; a card shares its root.
+    """
+    piece = connected_pieces(triangles, len(places))[triangles[:, 0]]
+    is_near = np.asarray(cKDTree(lids).query(places)[0]) < reach
+    near = np.bincount(piece, is_near[triangles].mean(axis=1)) / np.maximum(np.bincount(piece), 1)
+    # edges by their places: those of a border are met once, those that two pieces share by both
+    place = np.unique(np.rint(places / reach * PLACES), axis=0, return_inverse=True)[1].reshape(-1)
+    edges = np.sort(np.concatenate([place[triangles[:, pair]] for pair in ([0, 1], [1, 2], [2, 0])]), axis=1)
+    number = np.unique(edges, axis=0, return_inverse=True)[1].reshape(-1)
+    of = np.tile(piece, 3)
+    counts = np.bincount(number)
+    owner = np.zeros(len(counts), np.int64)
+    owner[number] = of
+    is_shared = np.zeros(len(counts), bool)
+    is_shared[number[owner[number] != of]] = True
+    n_free, n_shared = (np.bincount(of[chosen[number]], minlength=len(near)) for chosen in (counts == 1, is_shared))
+    cards: Mask = ((near > NEAR_LIDS) & (n_free > n_shared))[piece]
+    return cards
 
 
 def _is_lash(places: FloatArray, lids: cKDTree, size: float) -> bool:

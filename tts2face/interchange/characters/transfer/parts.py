@@ -5,10 +5,8 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import cKDTree
 
 from tts2face.interchange.characters.transfer.registration import Similarity
-from tts2face.interchange.characters.transfer.skin import Skin
 from tts2face.models.face import Face
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.numeric.arrays import FloatArray, IntArray, Mask, connected_pieces, nearest_rotation, smoothstep
@@ -20,9 +18,9 @@ KINDS = {
     "eyes": ("eyes", "sclera", "iris"),
     "teeth": ("teeth", "gums"),
     "tongue": ("tongue",),
-    "soft": ("lash", "brow"),
+    "lashes": ("lash",),
+    "brows": ("brow",),
 }
-ROOT_SHARE = 0.3  # of a card's vertices: those nearest to the skin, on which it grows
 BITE = -0.02  # of the distance of the outer eye corners: height over the lips' line at which teeth meet
 BITE_RISES = (0.0, 0.08, 0.15, 0.22)  # of the plane in which they meet, in mm per mm towards the back
 BOTH_JAWS = 0.11  # of the distance of the outer eye corners, on both sides of the bite: gums of both jaws in one piece
@@ -151,26 +149,3 @@ def add_teeth(face: Face, source: Face, similarity: Similarity) -> Face:
         triangles=np.concatenate([face.triangles, len(face.vertices) + corners.reshape(-1, 3)]).astype(np.int32),
         parts=(*face.parts, *added), shapes=np.zeros((0, n, 3), np.float32),
     )  # fmt: skip
-
-
-def move_cards(face: Face, shapes: FloatArray, skin: Skin) -> None:
-    """Move lashes and brows in shapes (K, V, 3): each vertex with the root of its card, the root with its lid."""
-    corners = face.triangles[triangles_of(face, "soft")]
-    if not len(corners):
-        return
-    used = np.unique(corners)
-    places = face.vertices.astype(np.float64)
-    first = skin.rows()
-    candidates = np.flatnonzero(skin.is_seen)
-    far, near = (np.asarray(found) for found in cKDTree(skin.vertices[candidates]).query(places[used]))
-    near = candidates[near]
-    piece = connected_pieces(corners, len(places))[used]
-    for number in np.unique(piece).tolist():
-        rows = np.flatnonzero(piece == number)
-        roots = rows[far[rows] <= np.quantile(far[rows], ROOT_SHARE)]
-        side = int(np.bincount(skin.side[near[roots]]).argmax())
-        # a card grows on one lid: where lids nearly touch, the nearest skin is that of the other
-        grown = near[roots] if side == 0 else skin.nearest(places[used[roots]], side)
-        of = roots[np.asarray(cKDTree(places[used[roots]]).query(places[used[rows]])[1])]
-        at = dict(zip(roots.tolist(), first[grown].tolist(), strict=True))
-        shapes[:, used[rows]] = shapes[:, [at[int(root)] for root in of]]

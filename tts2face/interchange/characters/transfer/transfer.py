@@ -11,6 +11,7 @@ from tts2face.face.eyelids import BLINK_SHAPES, SIDES
 from tts2face.interchange.characters.landmarks import SKIN, part_triangles
 from tts2face.interchange.characters.lip_line import find_lip_line
 from tts2face.interchange.characters.surface_points import SurfacePoints, nearest_points
+from tts2face.interchange.characters.transfer.cards import move_cards
 from tts2face.interchange.characters.transfer.cover import keep_covered
 from tts2face.interchange.characters.transfer.lids import (
     LID_SHAPES,
@@ -32,7 +33,7 @@ from tts2face.interchange.characters.transfer.mouth_cut import (
     open_mouth,
 )
 from tts2face.interchange.characters.transfer.mouth_mesh import prepare_mouth
-from tts2face.interchange.characters.transfer.parts import add_teeth, jaw_shares, move_cards, move_jaw, vertices_of
+from tts2face.interchange.characters.transfer.parts import add_teeth, jaw_shares, move_jaw, vertices_of
 from tts2face.interchange.characters.transfer.registration import Registration, Similarity, register
 from tts2face.interchange.characters.transfer.skin import Skin, build_skin
 from tts2face.interchange.characters.transfer.source import Source, choose_source, load_source, own_landmarks
@@ -180,7 +181,7 @@ def _with_landmarks(face: Face, landmarks: FloatArray) -> Face:
 
 
 def _with_lip_line(face: Face) -> Face:
-    """Face whose inner lips lie where its lips touch, told apart by its open mouth."""
+    """Face whose inner lips lie where its lips touch; its open mouth separates the upper from the lower."""
     vertices, weights = np.zeros((N_LANDMARKS, 3), np.int64), np.zeros((N_LANDMARKS, 3))
     vertices[face.landmarks], weights[face.landmarks] = face.landmark_vertices, face.landmark_weights
     opened = face.shapes[face.shape_names.index(WIDE_OPEN)]
