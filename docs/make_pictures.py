@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
+from statue import write_statue
 
 from corpus_tools.dense.avatar import build_avatar
 from corpus_tools.studies.gestures.analysis import StudyOptions
@@ -92,6 +93,8 @@ FAMILY_POSE = {"mouthSmileLeft": 0.9, "mouthSmileRight": 0.9, "eyeBlinkLeft": 1.
 FAMILY_CELL, FAMILY_WORD_PIXELS = 128, 13  # px
 FAMILIES_A_ROW = 2
 FAMILY_CAMERA = "0,0,480"
+STATUES = ("mara", "tomas")
+STATUE_CAMERA = "16,2,520"
 SIDE = 320
 PHOTO_PICTURE = Picture(size=f"{SIDE}x{SIDE}", camera="0,0,760")
 WORD_PIXELS = 18
@@ -357,6 +360,22 @@ def family_row(name: str) -> list[Image.Image]:
     return [labelled(pixels, word, FAMILY_WORD_PIXELS) for pixels, word in zip(cells, words, strict=True)]
 
 
+def statues_sheet() -> Image.Image:
+    """Statues of shipped faces, imported with the shapes of the shipped head: at rest, and phones of a sentence."""
+    cells = []
+    for name in STATUES:
+        with tempfile.TemporaryDirectory() as folder:
+            write_statue(load_face(name), Path(folder) / "statue.obj")
+            face = import_face(Path(folder) / "statue.obj", shapes="transfer").face
+        picture = Picture(size=f"{SIDE}x{SIDE}", camera=STATUE_CAMERA)
+        cells.append(labelled(draw(face, np.zeros(len(face.shape_names)), picture=picture), f"statue of {name}"))
+        spoken = frames_of_phones(Session(face=face), FAMILY_TEXT, FAMILY_PHONES, picture)
+        cells += [
+            labelled(pixels, ipa_to_arpabet(phone)) for (pixels, *_), phone in zip(spoken, FAMILY_PHONES, strict=True)
+        ]
+    return sheet(cells, 1 + len(FAMILY_PHONES))
+
+
 def family_shapes(head: Face, family: str) -> Mapping[str, Float32Array]:
     """Displacements (N, 3) of the head by the first names of a family's table, whose sums are ARKit's shapes."""
     lines = files(FOLDER).joinpath(f"{family}.tsv").read_text("utf-8").splitlines()
@@ -406,6 +425,7 @@ SHEETS = {
     "hair": hair_sheet,
     "moods": moods_sheet,
     "shapes": shapes_sheet,
+    "statues": statues_sheet,
 }
 
 

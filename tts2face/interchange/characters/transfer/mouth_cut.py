@@ -132,7 +132,7 @@ class _Slit:
     """Cut skin: ends (E, 2) of the cut edges, shares of the way between them, vertices (E,) of both lips there.
 
     Vertices from the face's on are new. ``cut`` (F,) are the triangles that are divided, ``triangles`` (G, 3) and
-    ``source`` (G,) their parts; ``bridges`` are triangles that are left out.
+    ``source`` (G,) their parts.
     """
 
     ends: IntArray
@@ -142,7 +142,6 @@ class _Slit:
     triangles: IntArray
     source: IntArray
     places: FloatArray
-    bridges: IntArray
 
 
 def _cut(face: Face, skin: Skin, seam: FloatArray) -> _Slit | None:
@@ -161,11 +160,7 @@ def _cut(face: Face, skin: Skin, seam: FloatArray) -> _Slit | None:
     at = places[ends[:, 0]] + share[:, None] * (places[ends[:, 1]] - places[ends[:, 0]])
     inside = (at[:, 0] > seam[0, 0]) & (at[:, 0] < seam[-1, 0])
     whole = inside[to_after] & inside[to_before]
-    crossing, edges = whole, np.column_stack([to_after, to_before])
-    whole = whole & _in_long_stretches(edges, at, whole, float(np.ptp(seam[:, 0])))
-    # a bridge over a hole of a scan lies before the seam: a thread from lip to lip, if it stayed
-    before_seam = at[edges, 2].mean(axis=1) > np.interp(at[edges, 0].mean(axis=1), seam[:, 0], seam[:, 2]) + LEAST_MM
-    bridges = rows[crossing & ~whole & before_seam]
+    whole &= _in_long_stretches(np.column_stack([to_after, to_before]), at, whole, float(np.ptp(seam[:, 0])))
     if whole.sum() < 3:
         return None
     used = np.zeros(len(ends), bool)
@@ -200,7 +195,6 @@ def _cut(face: Face, skin: Skin, seam: FloatArray) -> _Slit | None:
         np.concatenate(triangles),
         np.concatenate(source),
         at[used],
-        bridges,
     )
 
 
@@ -304,7 +298,7 @@ def _joined(
     skin_colours, uv = extended(face.colours), None if face.uv is None else extended(face.uv)
     colours = np.where((row < N_LIP_ROWS)[:, None], skin_colours[lips], np.array(INSIDE, np.uint8))
     is_cut = np.zeros(len(face.triangles), bool)
-    is_cut[slit.source] = is_cut[slit.bridges] = True
+    is_cut[slit.source] = True
     home = int(np.bincount(_part_of(face)[slit.source]).argmax())
     parts: list[FacePart] = []
     corners: list[NDArray[np.integer]] = []
