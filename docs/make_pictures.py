@@ -6,6 +6,7 @@
 import argparse
 import csv
 import re
+import runpy
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -15,7 +16,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
-from statue import write_statue
 
 from corpus_tools.dense.avatar import build_avatar
 from corpus_tools.studies.gestures.analysis import StudyOptions
@@ -362,6 +362,7 @@ def family_row(name: str) -> list[Image.Image]:
 
 def statues_sheet() -> Image.Image:
     """Statues of shipped faces, imported with the shapes of the shipped head: at rest, and phones of a sentence."""
+    write_statue = runpy.run_path(str(HERE.with_name("statue.py")))["write_statue"]  # scripts of docs are no package
     cells = []
     for name in STATUES:
         with tempfile.TemporaryDirectory() as folder:
