@@ -16,7 +16,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from tests.interchange.characters.made import write_character_file
+from tests.interchange.characters.build.test_dense import dense_head
+from tests.interchange.characters.made import Variant, write_character_file
 from tts2face import Session
 from tts2face.face.eyelids import SIDES
 from tts2face.face.mesh_calibration import calibrate_on_mesh
@@ -197,6 +198,9 @@ def main() -> None:
         median = 100 * float(np.median(list(errors.values())))
         row(f"{name} from {source}", made, f"{median:.1f} ({worst} {100 * errors[worst]:.0f})")
     with tempfile.TemporaryDirectory() as folder:
+        dense = write_character_file(Path(folder) / "dense.glb", Variant(is_dense=True), face=dense_head())
+        face, seconds = timed_import(dense)
+        row(f"head of {len(face.vertices)} vertices", face, seconds)
         for seed in ICT_SEEDS if options.ict else ():
             path = write_character_file(Path(folder) / f"ict{seed}.glb", face=ict_head(options.ict, seed))
             row(f"ICT {seed}", *timed_import(path))

@@ -149,6 +149,8 @@ def test_a_card_shares_its_root_with_the_skin_and_a_patch_of_texture_its_border(
     corners = np.concatenate([corners, n + np.array([[0, 1, 2], [0, 2, 3]])])
     is_card = card_triangles(np.concatenate([places, card]), corners, lid, 15.0)
     np.testing.assert_array_equal(np.flatnonzero(is_card), [len(corners) - 2, len(corners) - 1])
+    behind = card * [1.0, 1.0, -1.0]  # as what lines a lid
+    assert not card_triangles(np.concatenate([places, behind]), corners, lid, 15.0).any()
 
 
 def plate(n: int = 49) -> tuple[Face, np.ndarray]:

@@ -89,20 +89,23 @@ def card_triangles(places: FloatArray, triangles: IntArray, lids: FloatArray, re
     A piece that a seam of the texture divides from the skin shares all of its border with it; a card shares its root.
     """
     piece = connected_pieces(triangles, len(places))[triangles[:, 0]]
-    is_near = np.asarray(cKDTree(lids).query(places)[0]) < reach
-    near = np.bincount(piece, is_near[triangles].mean(axis=1)) / np.maximum(np.bincount(piece), 1)
+    far, nearest = (np.asarray(found) for found in cKDTree(lids).query(places))
+    counts = np.maximum(np.bincount(piece), 1)
+    near = np.bincount(piece, (far < reach)[triangles].mean(axis=1)) / counts
+    # what lines the lids lies behind their edges
+    ahead = np.bincount(piece, (places[:, 2] - lids[nearest, 2])[triangles].mean(axis=1)) / counts
     # edges by their places: those of a border are met once, those that two pieces share by both
     place = np.unique(np.rint(places / reach * PLACES), axis=0, return_inverse=True)[1].reshape(-1)
     edges = np.sort(np.concatenate([place[triangles[:, pair]] for pair in ([0, 1], [1, 2], [2, 0])]), axis=1)
     number = np.unique(edges, axis=0, return_inverse=True)[1].reshape(-1)
     of = np.tile(piece, 3)
-    counts = np.bincount(number)
-    owner = np.zeros(len(counts), np.int64)
+    n_met = np.bincount(number)
+    owner = np.zeros(len(n_met), np.int64)
     owner[number] = of
-    is_shared = np.zeros(len(counts), bool)
+    is_shared = np.zeros(len(n_met), bool)
     is_shared[number[owner[number] != of]] = True
-    n_free, n_shared = (np.bincount(of[chosen[number]], minlength=len(near)) for chosen in (counts == 1, is_shared))
-    cards: Mask = ((near > NEAR_LIDS) & (n_free > n_shared))[piece]
+    n_free, n_shared = (np.bincount(of[chosen[number]], minlength=len(near)) for chosen in (n_met == 1, is_shared))
+    cards: Mask = ((near > NEAR_LIDS) & (ahead > 0) & (n_free > n_shared))[piece]
     return cards
 
 
