@@ -36,7 +36,9 @@ def unpack_character(archive: Path, folder: Path) -> Path:
 def _character_in(folder: Path) -> Path:
     files = sorted(path for path in folder.rglob("*") if path.is_file())
     found = [path for path in files if path.suffix.lower() in SUFFIXES]
-    found = found or list(dict.fromkeys(path.parent for path in files if path.suffix.lower() == OBJ))
+    meshes = [path for path in files if path.suffix.lower() == OBJ]
+    # one alone is a head without shapes, whatever its name; more are one at rest and its shapes
+    found = found or (meshes if len(meshes) == 1 else list(dict.fromkeys(path.parent for path in meshes)))
     if len(found) > 1:
         names = some_of([path.relative_to(folder).as_posix() for path in found])
         raise DataError(f"the archive holds several characters ({names}); pack one of them")
