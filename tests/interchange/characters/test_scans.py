@@ -12,7 +12,7 @@ from tts2face.interchange.characters.import_notes import place_notes
 from tts2face.interchange.characters.transfer.cover import keep_covered
 from tts2face.interchange.characters.transfer.first_look import _check_whole
 from tts2face.interchange.characters.transfer.lip_edges import smooth_edges
-from tts2face.interchange.characters.transfer.mouth_cut import open_mouth
+from tts2face.interchange.characters.transfer.mouth_cut import RELIEF, lip_relief, open_mouth
 from tts2face.interchange.characters.transfer.mouth_mesh import prepare_mouth
 from tts2face.interchange.characters.transfer.skin import build_skin
 from tts2face.interchange.characters.transfer.source import own_landmarks
@@ -204,3 +204,9 @@ def test_what_is_guessed_of_a_head_is_said() -> None:
     assert place_notes(turn, apart, 90.0) == [
         "by its pictures the head looks along +z with +y up, 23 degrees off, and is turned; --front sets its axis"
     ]
+
+
+@pytest.mark.parametrize("name", ["head", "ben"])
+def test_lips_of_shipped_faces_are_no_painted_ones(name: str) -> None:
+    face = load_face(name)
+    assert lip_relief(face, own_landmarks(face)) > 2 * RELIEF
