@@ -6,6 +6,7 @@ vertices is timed.
 """
 
 import argparse
+import runpy
 import sys
 import tempfile
 import time
@@ -35,8 +36,10 @@ from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LEFT_LIDS, LIP_LANDMARKS, RIGHT_LIDS
 from tts2face.numeric.arrays import FloatArray, IntArray
 
+ROOT = Path(__file__).parents[2]
 TEXT = "Bob made papa a map. My mum bought a big pebble, and Peter may swim."  # 17 p, b, m
 SHIPPED = (("head", "mara"), ("head", "tomas"), ("ada", "ben"), ("ada", "zuri"))
+STATUES = ("mara", "tomas", "noor")  # closed surfaces
 LIPS_MM, LIDS_MM = 15.0, 8.0  # from lips and lids: skin at which errors are measured
 LEAST_MM = 0.15  # mean motion there of a shape that counts
 ICT_SEEDS = (1, 2, 3, 4)
@@ -198,6 +201,10 @@ def main() -> None:
         median = 100 * float(np.median(list(errors.values())))
         row(f"{name} from {source}", made, f"{median:.1f} ({worst} {100 * errors[worst]:.0f})")
     with tempfile.TemporaryDirectory() as folder:
+        write_statue = runpy.run_path(str(ROOT / "docs/statue.py"))["write_statue"]
+        for name in STATUES:
+            write_statue(load_face(name), Path(folder) / "statue.obj")
+            row(f"statue of {name}", *timed_import(Path(folder) / "statue.obj"))
         dense = write_character_file(Path(folder) / "dense.glb", Variant(is_dense=True), face=dense_head())
         face, seconds = timed_import(dense)
         row(f"head of {len(face.vertices)} vertices", face, seconds)
