@@ -53,7 +53,7 @@ def test_a_head_without_shapes_is_refused_with_what_helps_and_then_made(
     browser.click("Make the face")
     browser.wait(status + ".startsWith('bare-head speaks')", seconds=240)
     notes = browser.run("return document.querySelector('.photo-dialog').innerText")
-    assert "carried over" in notes
+    assert "of the shipped face head" in notes
     faces = httpx.get(f"{service.url}/v1/faces/bare-head").json()
     assert faces["about"]["summary"].startswith("mesh with 5")
     browser.click("Close")
