@@ -16,7 +16,7 @@ from tts2face.models.consent import PHOTO_TOOL, states_consent
 from tts2face.photo.photograph import HEIC_BRANDS
 from tts2face.serving.work.character_archive import MAGIC as ARCHIVE_MAGIC
 from tts2face.serving.work.character_archive import unpack_character
-from tts2face.serving.work.resource_texts import UNPACKED, bounded, refusal, without_name
+from tts2face.serving.work.resource_texts import UNPACKED, bounded, of_command, refusal, without_name
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -209,7 +209,7 @@ def _check_character(source: Path, out: Path) -> dict[str, Any]:
     # clips as .glb are this file, written again from what was read of it, if its own shapes move it
     has_file = not named.is_dir() and not stated.get("shapes")
     content = GlbWriter(read_gltf(named)).content() if has_file else None
-    return _check_face(made, out, content) | {"notes": [*imported.report.notes, *rows]}
+    return _check_face(made, out, content) | {"notes": [of_command(note) for note in (*imported.report.notes, *rows)]}
 
 
 def _check_photo(source: Path, out: Path) -> dict[str, Any]:

@@ -24,10 +24,16 @@ def bounded(value: Any) -> Any:
     return value
 
 
+def of_command(text: str) -> str:
+    """Text that says where the options are that it names and uploads do not have."""
+    is_named = any(option in text for option in ("--front", "--landmarks"))
+    return f"{text} (of the command `tts2face face import`, whose face can be sent)" if is_named else text
+
+
 def refusal(error: Exception, source: Path, folder: Path, content: Path) -> str:
     """The message of an error in a check of `source`, without paths of this machine; `content` is what is kept."""
     text = " ".join(str(error).split()).replace("--mapping", "the part mapping")
-    text = text.replace("--shapes transfer", "the part shapes, transfer")
+    text = of_command(text.replace("--shapes transfer", "the part shapes, transfer"))
     for suffix in (".tsv", ".toml"):
         text = text.replace(str(source.with_name(f"mapping{suffix}")), "the mapping")
     faces = [folder / f"{made}.face" for made in ("imported", "photo")]

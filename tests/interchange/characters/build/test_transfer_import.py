@@ -11,8 +11,9 @@ from tests.interchange.characters.made import Variant, head_without_mouth, write
 from tests.interchange.characters.test_transfer import shapeless_head
 from tts2face.face.eyelids import BLINK_SHAPES
 from tts2face.face.landmarks import landmark_positions, scatter_landmarks
-from tts2face.interchange.characters.importing import import_face
+from tts2face.interchange.characters.importing import import_face, read_character
 from tts2face.interchange.characters.transfer.cards import move_cards
+from tts2face.interchange.characters.transfer.first_look import find_head
 from tts2face.interchange.characters.transfer.parts import triangles_of
 from tts2face.interchange.characters.transfer.skin import build_skin
 from tts2face.interchange.characters.transfer.source import own_landmarks
@@ -85,3 +86,11 @@ def test_lashes_turn_with_their_lids() -> None:
     move_cards(face, found, build_skin(face, own_landmarks(face)))
     apart = np.linalg.norm(found.sum(axis=0)[lashes] - own, axis=1).mean()
     assert apart < 0.3 * np.linalg.norm(own, axis=1).mean()  # .22; cards that follow the skin beside them are torn
+
+
+@pytest.mark.usefixtures("face_model")
+def test_a_bald_scalp_is_no_face(tmp_path: Path) -> None:
+    """A part of the back of the head was taken for a face, which the whole head around it is not."""
+    path = write_character_file(tmp_path / "back.glb", Variant(turn_deg=180.0), face=shapeless_head())
+    found = find_head(read_character(path), [0.0, 180.0], None)
+    np.testing.assert_allclose(found.mesh.turn[2], [0.0, 0.0, -1.0], atol=0.2)
