@@ -63,12 +63,12 @@ def pieces_from(
         if gestures is not None:
             started = spoken_ahead(started, prepared.timeline, speech.yield_turn)
     steps: list[Step] = [lips] if gestures is None else [gestures.draw, lips, gestures, gestures.edits, gestures.body]
-    steps.append(_combine_shapes)
     for piece in started:
         for step in steps:
             speech.yield_turn()
             piece = step(piece)  # noqa: PLW2901 - it gains from step to step
-        yield piece
+        # no turn is given before: gestures continue from a piece that is interrupted here
+        yield _combine_shapes(piece)
 
 
 def _combine_shapes(piece: Piece) -> Piece:
