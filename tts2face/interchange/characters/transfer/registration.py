@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from tts2face.interchange.characters.transfer.skin import Skin
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LEFT_LIDS, LIP_LANDMARKS, RIGHT_LIDS
 from tts2face.numeric.arrays import FloatArray, IntArray, Mask, nearest_rotation
+from tts2face.processes.threads import available_cores
 
 # Nose, chin and middle of the brow: on skin without texture the tracker guesses the others (decision 244).
 MIDDLE_LANDMARKS = (
@@ -32,6 +33,7 @@ NORMAL_MM = 10.0  # distance that counts as much as a right angle between normal
 N_SAMPLES = 8  # nearest samples among which one with a fitting normal is sought
 MIN_COSINE = 0.5  # normals within 60 degrees
 MAX_PULL_MM = 15.0  # farther samples are no correspondence
+SEARCHED_MM = 20.0  # with the distance of normals
 MAX_SLIDE_MM = 2.0  # along the tangent plane of a sample
 N_TRIANGLES = 24  # of the source around a vertex of the target, among which the nearest is sought
 HIDDEN_MM = 20.0  # cost of a hidden triangle for a vertex that is seen
@@ -123,8 +125,8 @@ def register(source: Skin, target: Skin, modes: FloatArray, on_stage: Callable[[
         pulled_marks = np.zeros_like(even)
         np.add.at(pulled_marks, held, mark * trust[:, None] * (wanted - start[held]))
         for _ in range(N_ITERATIONS):
-            there, found = samples.nearest(placed, source.normals(placed), source.side)
-            found &= source.is_seen & (np.linalg.norm(there - placed, axis=1) < MAX_PULL_MM)
+            there, found = samples.nearest(placed, source.normals(placed), np.where(source.is_seen, source.side, -1))
+            found &= np.linalg.norm(there - placed, axis=1) < MAX_PULL_MM
             system = smoothness * bending + sp.diags(found + held_weights + 1e-6)
             placed = start + factorise(system).solve(found[:, None] * (there - start) + pulled_marks)
         like = even + _fitted(basis, face_rows, placed[face_rows] - even[face_rows], np.ones(1), SURFACE_RIDGE)
@@ -174,12 +176,13 @@ class _Samples:
         self._trees: dict[int, tuple[cKDTree, IntArray]] = {}
 
     def nearest(self, places: FloatArray, normals: FloatArray, side: IntArray) -> tuple[FloatArray, Mask]:
-        """Places (N, 3) on the planes of the nearest fitting samples, and whether there is one."""
+        """Places (N, 3) on the planes of the nearest fitting samples, and whether there is one; none of side -1."""
         there, found = places.copy(), np.zeros(len(places), bool)
-        for number in np.unique(side).tolist():
+        for number in np.unique(side[side >= 0]).tolist():
             rows = np.flatnonzero(side == number)
             tree, members = self._tree(number)
-            far, near = tree.query(np.column_stack([places[rows], NORMAL_MM * normals[rows]]), k=N_SAMPLES)
+            at = np.column_stack([places[rows], NORMAL_MM * normals[rows]])
+            far, near = tree.query(at, N_SAMPLES, distance_upper_bound=SEARCHED_MM, workers=available_cores())
             near = members[np.minimum(near, len(members) - 1)]
             fits = ((self._normals[near] * normals[rows, None]).sum(axis=2) > MIN_COSINE) & np.isfinite(far)
             best = near[np.arange(len(rows)), np.where(fits, far, np.inf).argmin(axis=1)]
