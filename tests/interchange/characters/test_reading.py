@@ -17,6 +17,7 @@ from tts2face.interchange.characters.importing import import_face, propose_mappi
 from tts2face.interchange.characters.obj_reader import read_obj_folder
 from tts2face.interchange.characters.surface import shells_before_eyes
 
+SQUARE = "v 0 0 0 {0}\nv 1 0 0 {0}\nv 1 1 0 {1}\nv 0 1 0 {1}\nf 1 2 3 4\n"
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 RAISED = "v 0 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n"
 CORNERS = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
@@ -56,9 +57,6 @@ def test_the_face_at_rest_of_a_folder_is_found(names: tuple[str, ...], tmp_path:
 def test_a_folder_without_one_face_at_rest_is_refused(names: tuple[str, ...], reason: str, tmp_path: Path) -> None:
     with pytest.raises(DataError, match=reason):
         read_obj_folder(write_objs(tmp_path, *names))
-
-
-SQUARE = "v 0 0 0 {0}\nv 1 0 0 {0}\nv 1 1 0 {1}\nv 0 1 0 {1}\nf 1 2 3 4\n"
 
 
 @pytest.mark.parametrize(("dark", "light"), [("0 0 0", "1 0.5 0"), ("0 0 0", "255 127.5 0")])

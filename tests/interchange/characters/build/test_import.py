@@ -317,5 +317,5 @@ def test_a_source_that_does_not_exist_is_named(tmp_path: Path) -> None:
     (tmp_path / "map.tsv").write_text("jawOpen\tMouthWide\n")
     with pytest.raises(InputError, match="no shape 'MouthWide'; it has: browDownLeft"):
         import_face(character, mapping=tmp_path / "map.tsv", landmarks=write_landmarks(tmp_path / "l.tsv"))
-    with pytest.raises(InputError, match=r"a character is a .glb, .gltf, .vrm file or a folder"):
+    with pytest.raises(InputError, match=r"a character is a .glb, .gltf, .vrm, .obj file or a folder"):
         import_face(tmp_path / "map.tsv")
