@@ -25,11 +25,11 @@ from tts2face.serving.studio.styles import Styles
 from tts2face.serving.studio.takes import Takes
 from tts2face.serving.studio.work import WorkList
 from tts2face.serving.studio.workspace import Workspace
+from tts2face.serving.work.resources import MB
 from tts2face.session.project import Project
 from tts2face.storage.files import translate_disk_errors, write_atomically
 from tts2face.storage.memory import ResultMemory
 
-MB = 1_000_000
 MAX_IDLE = 10  # open projects that no page shows
 MAX_FACES = 40  # faces kept on disk for pages
 

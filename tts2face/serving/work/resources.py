@@ -29,7 +29,7 @@ _COLUMNS = "owner, kind, name, content, picture, n_bytes, created, description"
 _INSERT = f"""
 INSERT INTO tts2face_resources ({_COLUMNS})
 VALUES (:owner, :kind, :name, :content, :picture, :n_bytes, :created, :description)"""
-MB = 1e6
+MB = 1_000_000
 _CHOSEN = "owner = :owner AND kind = :kind AND name = :name"
 _DELETE = f"DELETE FROM tts2face_resources WHERE {_CHOSEN}"
 

@@ -9,7 +9,9 @@ import httpx
 import pytest
 
 from tests.interchange.characters.made import Variant, head_without_mouth, write_character_file
+from tests.interchange.exports.programs import node_package
 from tests.running import ServeProcess, serve_process
+from tests.serving.studio.browser.test_animate_page import AXE
 from tests.serving.studio.browser.test_photo_dialog import DROP
 from tests.serving.studio.chromium import Browser
 from tests.serving.studio.served import Page
@@ -40,6 +42,14 @@ def test_a_head_without_shapes_is_refused_with_what_helps_and_then_made(
     Page(browser, f"{service.url}/studio/animate/{number}")
     browser.click(TITLE)
     browser.wait("return document.querySelector('.q-uploader')")
+    axe = (node_package("axe-core") / "axe-core" / "axe.min.js").read_text()
+    browser.run(axe + "; window.axe = axe")
+    assert browser.run(AXE) == []
+    browser.run(
+        "window.asked = 0; document.querySelector('.q-uploader input').addEventListener('click', (one) => {"
+        " asked += 1; one.preventDefault(); }); document.querySelector('.q-uploader button').click()"
+    )
+    assert browser.run("return asked") == 1
     drop(browser, bare, "Bare Head.glb")
     browser.wait("return document.querySelector('[aria-label=\"Name of the face\"]').value === 'bare-head'", seconds=60)
     browser.click("Make the face")

@@ -9,10 +9,11 @@ from lexicon.errors import Tts2faceError
 from tts2face.interchange.characters.shapes import TRANSFER
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.sent_resources import MAX_MAPPING, MAX_NAME, Sent, store_resource
-from tts2face.serving.studio.pages.frame import heading, sentence
+from tts2face.serving.studio.pages.frame import file_field, heading, sentence
 from tts2face.serving.studio.pages.open_page import OpenPage
-from tts2face.serving.studio.pages.photo_dialog import MB, Made, face_name
+from tts2face.serving.studio.pages.photo_dialog import Made, face_name
 from tts2face.serving.work.resource_check import FACE
+from tts2face.serving.work.resources import MB
 
 TITLE = "A face from a character"
 FILES = ".glb,.vrm,.zip"
@@ -39,12 +40,7 @@ class CharacterDialog:
                 "A head or a figure of another program, .glb or .vrm; a folder of .obj files, or a .gltf file with its "
                 "images, as .zip. Making the face takes up to a minute."
             ).classes("quiet")
-            self._upload = ui.upload(
-                label="Choose a file, or drop it here", auto_upload=True, max_files=1, max_file_size=limit,
-                on_upload=self._uploaded,
-                on_rejected=lambda: ui.notify(f"The file is refused: give one of at most {limit / MB:g} MB.",
-                                              type="negative"),
-            ).props(f'accept="{FILES}" flat bordered').style("width: 100%")  # fmt: skip
+            self._upload = file_field("Choose a file, or drop it here", FILES, limit, self._uploaded)
             self._name = ui.input("Name of the face").props(f"dense outlined maxlength={MAX_NAME}")
             self._transfer = ui.checkbox(SHAPES)
             self._mapping = ui.textarea(MAPPING, placeholder="jawOpen MouthWide").props(

@@ -11,7 +11,7 @@ from nicegui import events, ui
 
 from tts2face.serving.studio.comparison import MAX_TAKE_BYTES
 from tts2face.serving.studio.pages.choices import models
-from tts2face.serving.studio.pages.frame import heading, shown_errors
+from tts2face.serving.studio.pages.frame import file_field, heading, shown_errors
 from tts2face.serving.studio.pages.open_page import OpenPage
 from tts2face.serving.studio.reference import RECORDING, SETTINGS, TAKE
 from tts2face.serving.work.resource_check import TALKER
@@ -132,10 +132,7 @@ class ComparePanel:
         comparison = self._page.workspace.comparison
         with self._details:
             ui.label("A .csv file of Live Link Face, recorded with the sound of this project.").classes("quiet")
-            upload = ui.upload(
-                label="Choose a take, or drop it here", auto_upload=True, max_file_size=MAX_TAKE_BYTES,
-                on_upload=self._imported,
-            ).props('accept=".csv" flat bordered').style("width: 100%")  # fmt: skip
+            upload = file_field("Choose a take, or drop it here", ".csv", MAX_TAKE_BYTES, self._imported)
             upload.on("finish", upload.reset)
             offset = _offset()
             ui.button("Set the offset", on_click=lambda: self._compare({

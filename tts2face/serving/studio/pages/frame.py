@@ -8,10 +8,12 @@ from pathlib import Path
 
 from fastapi import Request as HttpRequest
 from nicegui import ui
+from nicegui.events import Handler, UploadEventArguments
 
 from lexicon.errors import Tts2faceError
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.page_addresses import PAGES
+from tts2face.serving.work.resources import MB
 
 DARK_COOKIE = "tts2face_dark"
 RECORD_PAGE = "/record"  # for keys that may build talkers
@@ -24,6 +26,11 @@ TOP_PAGES = {  # names by address
 }
 _NEXT_DARK = {None: True, True: False, False: None}
 _DARK_NAMES = {None: "Colours of the system", True: "Dark", False: "Light"}
+_FIELD_HEADER = """<div class="row no-wrap items-center q-pa-xs">
+<div class="col q-uploader__title q-pl-sm">{label}</div>
+<q-btn v-if="props.canAddFiles" icon="add" flat dense aria-label="{label}" @click="props.pickFiles"></q-btn>
+<label style="position: relative; width: 0; overflow: hidden">{label}<q-uploader-add-trigger></q-uploader-add-trigger>
+</label></div>"""
 _ICONS = {None: "brightness_auto", True: "dark_mode", False: "light_mode"}
 
 
@@ -86,6 +93,17 @@ def icon_button(icon: str, name: str, on_click: Callable[[], object] | None = No
     with button:
         ui.tooltip(name)
     return button
+
+
+def file_field(label: str, kinds: str, max_bytes: int, on_upload: Handler[UploadEventArguments]) -> ui.upload:
+    """Field on which a file is dropped or chosen, whose button has a name; larger files are refused."""
+    field = ui.upload(
+        auto_upload=True, max_file_size=max_bytes, on_upload=on_upload,
+        on_rejected=lambda: ui.notify(f"The file is refused: give one of {kinds} of at most {max_bytes / MB:g} MB.",
+                                      type="negative"),
+    )  # fmt: skip
+    field.add_slot("header", _FIELD_HEADER.format(label=escape(label)))
+    return field.props(f'accept="{kinds}" flat bordered').style("width: 100%")
 
 
 def heading(level: int, text: str) -> None:

@@ -25,13 +25,12 @@ from tts2face.serving.service.sent_resources import (
 )
 from tts2face.serving.service.uploads import UPLOAD_PREFIX, UploadFolder
 from tts2face.serving.studio.components.photo_places import PhotoPlacesElement
-from tts2face.serving.studio.pages.frame import heading, shown_errors
+from tts2face.serving.studio.pages.frame import file_field, heading, shown_errors
 from tts2face.serving.studio.pages.open_page import OpenPage
 from tts2face.serving.work.resource_check import FACE
+from tts2face.serving.work.resources import MB
 
 PICTURES = ".jpg,.jpeg,.png,.webp,.heic,.heif,.tif,.tiff,.bmp,.gif"
-# as the settings count
-MB = 1_000_000
 TITLE = "A face from a photo"
 MAKES = {SPEAKING_PICTURE: "Speaks in the picture", AVATAR: "3D head of the person"}
 EYES = {"": "as in the photo"} | {name: name.replace("-", " ") for name in EYE_COLOURS}
@@ -66,12 +65,7 @@ class PhotoDialog:
                 "A picture of a person, a painting or a drawing, with the face from the front. The picture is deleted "
                 "when the dialog is closed; every clip of a face that speaks in it says that it is synthesised."
             ).classes("quiet")
-            self._upload = ui.upload(
-                label="Choose a picture, or drop it here", auto_upload=True, max_file_size=limit,
-                on_upload=self._uploaded,
-                on_rejected=lambda: ui.notify(f"The file is refused: give a picture of at most {limit / MB:g} MB.",
-                                              type="negative"),
-            ).props(f'accept="{PICTURES}" flat bordered').style("width: 100%")  # fmt: skip
+            self._upload = file_field("Choose a picture, or drop it here", PICTURES, limit, self._uploaded)
             with ui.element("div").classes("photo-found") as self._shown:
                 self._makes = ui.radio(MAKES, value=SPEAKING_PICTURE, on_change=self._show_choice).props("inline dense")
                 self._about = ui.label().classes("quiet")

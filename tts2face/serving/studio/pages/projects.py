@@ -17,13 +17,21 @@ from tts2face.serving.studio.importing import (
     import_sample,
     import_text,
 )
-from tts2face.serving.studio.pages.frame import begin_page, confirm, heading, icon_button, page_bar, shown_errors
+from tts2face.serving.studio.pages.frame import (
+    begin_page,
+    confirm,
+    file_field,
+    heading,
+    icon_button,
+    page_bar,
+    shown_errors,
+)
 from tts2face.serving.studio.pages.login import LOGOUT_PATH
 from tts2face.serving.studio.project_archive import has_files
 from tts2face.serving.studio.project_store import ProjectEntry
 from tts2face.serving.studio.studio import Studio
+from tts2face.serving.work.resources import MB
 
-MB = 1_000_000
 MAX_NOTES = 12  # of a file, that a dialog shows
 ANY_FILE = ",".join((*TEXT_SUFFIXES, *SUFFIXES, *SOUND_SUFFIXES, ".json"))
 
@@ -76,12 +84,7 @@ class ProjectsPage:
                     ui.textarea("Words of the recording (optional)").props("outlined autogrow").style("width: 100%")
                 )
                 limit = int(self._studio.state.settings.body_mb * MB)
-                upload = ui.upload(
-                    label="Choose a file, or drop it here", auto_upload=True, max_file_size=limit,
-                    on_upload=self._imported,
-                    on_rejected=lambda: ui.notify(f"The file is refused: give one of {ANY_FILE} of at most "
-                                                  f"{limit / MB:g} MB.", type="negative"),
-                ).props(f'accept="{ANY_FILE}" flat bordered').style("width: 100%")  # fmt: skip
+                upload = file_field("Choose a file, or drop it here", ANY_FILE, limit, self._imported)
                 upload.on("finish", upload.reset)
 
     async def _from_text(self, text: str) -> None:
