@@ -12,7 +12,14 @@ from tts2face.interchange.characters.import_notes import place_notes
 from tts2face.interchange.characters.transfer.cover import keep_covered
 from tts2face.interchange.characters.transfer.first_look import _check_whole
 from tts2face.interchange.characters.transfer.lip_edges import smooth_edges
-from tts2face.interchange.characters.transfer.mouth_cut import RELIEF, lip_relief, open_mouth
+from tts2face.interchange.characters.transfer.mouth_cut import (
+    LIP_EDGES,
+    MOUTH,
+    RELIEF,
+    lip_relief,
+    open_mouth,
+    with_edges_apart,
+)
 from tts2face.interchange.characters.transfer.mouth_mesh import prepare_mouth
 from tts2face.interchange.characters.transfer.skin import build_skin
 from tts2face.interchange.characters.transfer.source import own_landmarks
@@ -21,6 +28,7 @@ from tts2face.interchange.characters.transfer.winding import facing_outwards
 from tts2face.models.face import Face, FacePart
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT
+from tts2face.numeric.arrays import vertex_normals
 
 
 def ball(radius: float, n: int = 40) -> tuple[np.ndarray, np.ndarray]:
@@ -166,6 +174,44 @@ def test_a_mouth_and_its_teeth_stay_behind_the_skin_in_every_shape() -> None:
     np.testing.assert_array_equal(found.vertices[: len(face.vertices)], made.vertices[: len(face.vertices)])
     inner = found.vertices[opened.rows[0, 2:]]
     assert inner[..., 2].max() < -4.0
+
+
+def test_rolled_edges_have_vertices_of_their_own_which_leave_the_light_on_the_lips_alone() -> None:
+    face, landmarks = plate()
+    opened = open_mouth(face, build_skin(face, landmarks), 1.0)
+    assert opened is not None
+    made = replace(opened.face, shapes=np.zeros((0, len(opened.face.vertices), 3), np.float32))
+    found = with_edges_apart(made, opened.rolled)
+    names = [part.name for part in found.parts]
+    assert names == ["skin:plate", LIP_EDGES, MOUTH]
+    assert sum(part.count for part in found.parts) == len(found.triangles) == len(made.triangles)
+    np.testing.assert_array_equal(found.vertices[found.triangles], made.vertices[made.triangles])
+    skin, edges, _ = (np.unique(found.triangles[part.first : part.first + part.count]) for part in found.parts)
+    assert not np.intersect1d(skin, edges).size
+    flat = vertex_normals(found.vertices.astype(np.float64), found.triangles[: found.parts[0].count])
+    assert flat[skin, 2].min() > 0.99  # the rolled edges turned the normals of the lips
+
+
+def test_a_fold_that_touches_a_lip_in_one_vertex_does_not_hold_the_lips_together() -> None:
+    face, landmarks = plate()
+    below = int(np.abs(face.vertices - [2.5, -1.5, 0]).sum(axis=1).argmin())
+    assert face.vertices[below, 1] < 0
+    tips = face.vertices[below] + np.array([[-0.5, 2.5, 0.3], [0.5, 2.5, 0.3], [0.0, 3.0, 0.5]])
+    n = len(face.vertices)
+    fan = np.array([[below, n, n + 1], [below, n + 1, n + 2], [below, n + 2, n]])
+    held = replace(
+        face, vertices=np.concatenate([face.vertices, tips]).astype(np.float32),
+        colours=np.full((n + 3, 3), 200, np.uint8), shapes=np.zeros((0, n + 3, 3), np.float32),
+        triangles=np.concatenate([face.triangles, fan]).astype(np.int32),
+        parts=(replace(face.parts[0], count=len(face.triangles) + 3),),
+    )  # fmt: skip
+    opened = open_mouth(held, build_skin(held, landmarks), 1.0)
+    assert opened is not None
+    part = opened.face.parts[0]
+    corners = opened.face.triangles[part.first : part.first + part.count - len(opened.rolled)]
+    places = opened.face.vertices[corners]
+    crosses = (places[..., 1].max(axis=1) > 0.2) & (places[..., 1].min(axis=1) < -0.2)
+    assert not (crosses & (np.abs(places[..., 0]).max(axis=1) < 20)).any()
 
 
 def test_displacements_along_a_cut_become_smooth_and_lines_stay() -> None:

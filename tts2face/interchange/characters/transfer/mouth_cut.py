@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
 
 from tts2face.interchange.characters.surface import SHADING
 from tts2face.interchange.characters.transfer.parts import triangles_of
@@ -29,6 +30,7 @@ NEAR = 0.2  # of the mouth's width: height beside the seam, and depth behind it,
 LEAST_MM = 0.12  # from the seam: nearer vertices count as so far off it, so that no triangle is a sliver
 POCKET, POCKET_DEPTH = 0.7, 0.05  # of the mouth's width: half side of the room behind the lips, and where it begins
 LEAST_SPAN = 0.15  # of the mouth's width: shorter stretches of cut triangles belong to folds beside the seam
+LOOSE = 0.06  # of the mouth's width: stretches as short and so near the cut would hold the lips together, and go
 # Depth behind the lips and height beside the seam, mm on the shipped head, of the rows from a lip to the throat.
 ROLL = np.array([(0.8, 0.3), (2.2, 1.2), (4.0, 4.0), (6.0, 10.0), (14.0, 16.0), (30.0, 15.0), (42.0, 6.0)])
 N_LIP_ROWS = 2  # of these: the rolled edge of the lip, with its colours
@@ -36,7 +38,7 @@ CARRIED = np.array([1.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.0])  # share of a lip's mot
 COVER_MM = 5.0  # of skin before the mouth, on the shipped head
 WIDENED = 0.35  # by which the mouth is wider than the lips at its back
 INSIDE = (96, 34, 36)  # sRGB of a mouth that no light reaches
-MOUTH = "mouth:inside"  # name of its part
+MOUTH, LIP_EDGES = "mouth:inside", "mouth:lips"  # names of its part, and of that of the rolled edges
 # Least height of lips and groove over a smooth profile, of the distance of the outer eye corners: scans have .047 and
 # more, one of .6 mm noise too, and a head whose mouth was smoothed away .009.
 RELIEF = 0.018
@@ -57,6 +59,8 @@ class OpenedMouth:
         Vertices of the lips that they follow, and the share of their motion.
     jaw : (M,)
         Share of the jaw's motion that they take.
+    rolled : (E, 3)
+        Triangles of the rolled edges of the lips; they belong to the part that was cut.
     scale
         Size of the face over that of the shipped head.
     """
@@ -67,12 +71,40 @@ class OpenedMouth:
     lips: IntArray
     shares: FloatArray
     jaw: FloatArray
+    rolled: IntArray
     scale: float
 
     def edges(self, skin: Skin) -> tuple[IntArray, IntArray]:
         """Vertices of the skin at the cut, of the upper and of the lower lip."""
         upper, lower = (np.unique(skin.of_face[(self.sides == side) & (skin.of_face >= 0)]) for side in (1, 2))
         return upper, lower
+
+
+def with_edges_apart(face: Face, rolled: IntArray) -> Face:
+    """Face whose rolled edges of the lips (E, 3) are a part with own vertices: they leave the light on the lips alone.
+
+    Their triangles follow one another in the part that was cut.
+    """
+    first = int(np.flatnonzero((face.triangles == rolled[0]).all(axis=1))[0])
+    rows, corners = np.unique(rolled, return_inverse=True)
+    parts: list[FacePart] = []
+    for part in face.parts:
+        end = part.first + part.count
+        if part.first <= first < end:
+            rest = replace(part, name=LIP_EDGES, first=first, count=len(rolled))
+            parts += [replace(part, count=first - part.first), rest]
+            if end > first + len(rolled):
+                parts.append(replace(part, first=first + len(rolled), count=end - first - len(rolled)))
+        else:
+            parts.append(part)
+    triangles = face.triangles.copy()
+    triangles[first : first + len(rolled)] = len(face.vertices) + corners.reshape(-1, 3)
+    return replace(
+        face, vertices=np.concatenate([face.vertices, face.vertices[rows]]), triangles=triangles, parts=tuple(parts),
+        colours=np.concatenate([face.colours, face.colours[rows]]),
+        uv=None if face.uv is None else np.concatenate([face.uv, face.uv[rows]]),
+        shapes=np.concatenate([face.shapes, face.shapes[:, rows]], axis=1), occlusion=None,
+    )  # fmt: skip
 
 
 def is_closed(skin: Skin) -> bool:
@@ -133,8 +165,8 @@ def _without_buried(face: Face, skin: Skin, seam: FloatArray) -> Face:
 class _Slit:
     """Cut skin: ends (E, 2) of the cut edges, shares of the way between them, vertices (E,) of both lips there.
 
-    Vertices from the face's on are new. ``cut`` (F,) are the triangles that are divided, ``triangles`` (G, 3) and
-    ``source`` (G,) their parts.
+    Vertices from the face's on are new. ``triangles`` (G, 3) are the parts of the divided triangles ``source`` (G,);
+    the triangles ``loose`` (L,) go without any.
     """
 
     ends: IntArray
@@ -143,6 +175,7 @@ class _Slit:
     lower: IntArray
     triangles: IntArray
     source: IntArray
+    loose: IntArray
     places: FloatArray
 
 
@@ -161,15 +194,19 @@ def _cut(face: Face, skin: Skin, seam: FloatArray) -> _Slit | None:
     share = heights[ends[:, 0]] / (heights[ends[:, 0]] - heights[ends[:, 1]])
     at = places[ends[:, 0]] + share[:, None] * (places[ends[:, 1]] - places[ends[:, 0]])
     inside = (at[:, 0] > seam[0, 0]) & (at[:, 0] < seam[-1, 0])
-    whole = inside[to_after] & inside[to_before]
-    whole &= _in_long_stretches(np.column_stack([to_after, to_before]), at, whole, float(np.ptp(seam[:, 0])))
+    across = inside[to_after] & inside[to_before]
+    width = float(np.ptp(seam[:, 0]))
+    whole = across & _in_long_stretches(np.column_stack([to_after, to_before]), at, across, width)
     if whole.sum() < 3:
         return None
+    far = np.asarray(cKDTree(at[to_after[whole]]).query(at[to_after])[0])
+    loose = across & ~whole & (far < LOOSE * width)
     used = np.zeros(len(ends), bool)
     used[to_after[whole]] = used[to_before[whole]] = True
     # the cut ends in the edge of a triangle that stays whole: there both lips share one vertex, without a thread
     is_end = np.zeros(len(ends), bool)
-    is_end[to_after[~whole]] = is_end[to_before[~whole]] = True
+    stays = ~whole & ~loose
+    is_end[to_after[stays]] = is_end[to_before[stays]] = True
     is_end &= used
     n, rank = len(places), np.cumsum(used) - 1
     upper = n + rank
@@ -183,7 +220,7 @@ def _cut(face: Face, skin: Skin, seam: FloatArray) -> _Slit | None:
         ]  # fmt: skip
         source += [rows[chosen]] * 3
     for edge, opposite, tip in ((to_after, before, after), (to_before, after, before)):
-        chosen = ~whole & is_end[edge]
+        chosen = stays & is_end[edge]
         a, b = alone[chosen], tip[chosen]
         c, m = opposite[chosen], upper[edge[chosen]]
         halves = [np.column_stack([a, m, c]), np.column_stack([m, b, c])]
@@ -196,6 +233,7 @@ def _cut(face: Face, skin: Skin, seam: FloatArray) -> _Slit | None:
         lower[used],
         np.concatenate(triangles),
         np.concatenate(source),
+        rows[loose],
         at[used],
     )
 
@@ -260,7 +298,7 @@ def _add_mouth(face: Face, slit: _Slit, landmarks: FloatArray, scale: float) -> 
     jaw = (1 - share) * np.stack([0.0, 1.0])[:, None, None] * np.linspace(1.0, 0.3, len(ROLL))[None, :, None]
     return OpenedMouth(
         _with_lip_landmarks(made, slit, landmarks), sides, numbers, of.astype(np.int64), share.reshape(-1),
-        jaw.reshape(-1), scale,
+        jaw.reshape(-1), lip_skin, scale,
     )  # fmt: skip
 
 
@@ -300,7 +338,7 @@ def _joined(
     skin_colours, uv = extended(face.colours), None if face.uv is None else extended(face.uv)
     colours = np.where((row < N_LIP_ROWS)[:, None], skin_colours[lips], np.array(INSIDE, np.uint8))
     is_cut = np.zeros(len(face.triangles), bool)
-    is_cut[slit.source] = True
+    is_cut[slit.source] = is_cut[slit.loose] = True
     home = int(np.bincount(_part_of(face)[slit.source]).argmax())
     parts: list[FacePart] = []
     corners: list[NDArray[np.integer]] = []

@@ -31,6 +31,7 @@ from tts2face.interchange.characters.transfer.mouth_cut import (
     is_closed,
     lip_relief,
     open_mouth,
+    with_edges_apart,
 )
 from tts2face.interchange.characters.transfer.mouth_mesh import prepare_mouth
 from tts2face.interchange.characters.transfer.parts import add_teeth, jaw_shares, move_jaw, vertices_of
@@ -120,7 +121,7 @@ def transfer_shapes(
     )
     if opened is not None:
         added = np.arange(len(made.vertices) - n_added, len(made.vertices))
-        made = keep_covered(made, opened.rows, added, opened.scale)
+        made = with_edges_apart(keep_covered(made, opened.rows, added, opened.scale), opened.rolled)
     return Transferred(_with_lip_line(made), head.name, tuple(notes))
 
 
