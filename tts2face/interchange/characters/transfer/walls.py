@@ -43,7 +43,7 @@ def without_inner_wall(face: Face) -> tuple[Face, bool]:
     more = _along_surface(np.where(across.any(axis=1), hidden - hidden[other], 0.0), welded)
     # where walls cross, neither is behind the other: what lies among the inner side belongs to it
     is_inner = more > np.where(across.any(axis=1), 0.0, CLEARLY)
-    outer = ~is_inner[welded].all(axis=1)
+    outer: Mask = ~np.asarray(is_inner[welded].all(axis=1))
     piece = connected_pieces(welded[outer], len(places))[welded[outer][:, 0]]
     means = np.bincount(piece, hidden[welded[outer]].mean(axis=1)) / np.maximum(np.bincount(piece), 1)
     outer[np.flatnonzero(outer)[means[piece] > INSIDE]] = False
@@ -56,10 +56,10 @@ def _along_surface(values: FloatArray, triangles: IntArray) -> FloatArray:
     """Values (N,) as their neighbourhoods have them: walls that touch or cross hide each other by chance."""
     edges = np.unique(np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     half = sp.coo_matrix((np.ones(len(edges)), edges.T), (len(values),) * 2)
-    around = (half + half.T + sp.eye(len(values))).tocsr()
+    around: sp.csr_matrix = (half + half.T + sp.eye(len(values))).tocsr()
     count = np.asarray(around.sum(axis=1)).reshape(-1)
     for _ in range(N_ROUNDS):
-        values = (around @ values) / count
+        values = np.asarray(around @ values) / count
     return values
 
 
