@@ -11,6 +11,7 @@ from tts2face.interchange.characters.head_mesh import HeadMesh
 from tts2face.interchange.characters.import_notes import place_notes
 from tts2face.interchange.characters.transfer.cover import keep_covered
 from tts2face.interchange.characters.transfer.first_look import _check_whole
+from tts2face.interchange.characters.transfer.lids import keep_off_eyeballs
 from tts2face.interchange.characters.transfer.lip_edges import smooth_edges
 from tts2face.interchange.characters.transfer.mouth_cut import (
     LIP_EDGES,
@@ -21,7 +22,7 @@ from tts2face.interchange.characters.transfer.mouth_cut import (
     with_edges_apart,
 )
 from tts2face.interchange.characters.transfer.mouth_mesh import prepare_mouth
-from tts2face.interchange.characters.transfer.skin import build_skin
+from tts2face.interchange.characters.transfer.skin import Skin, build_skin
 from tts2face.interchange.characters.transfer.source import own_landmarks
 from tts2face.interchange.characters.transfer.walls import without_inner_wall
 from tts2face.interchange.characters.transfer.winding import facing_outwards
@@ -226,6 +227,26 @@ def test_displacements_along_a_cut_become_smooth_and_lines_stay() -> None:
     jagged[0, edge, 1] += 0.5 * (-1.0) ** np.arange(len(edge))
     found = smooth_edges(skin, jagged, (edge, none))
     assert np.abs(found - line)[0, edge].mean() < 0.2
+
+
+def test_shut_lids_lie_before_the_eyeball_and_their_inner_side_behind_them() -> None:
+    eye = ball_face(10.0)
+    face = replace(eye, parts=(replace(eye.parts[0], name="eyes:balls"),))
+    sheet, landmarks = plate(25)
+    flat = (sheet.vertices * [0.2, 0.2, 0.0]).astype(np.float64)
+    n, corners = len(flat), sheet.triangles.astype(np.int64)
+    skin = Skin(
+        np.concatenate([flat + depth * np.eye(3)[2] for depth in (11.0, 10.6)]), np.concatenate([corners, n + corners]),
+        np.full(len(face.vertices), -1), np.arange(2 * n) < n, landmarks, np.full(2 * n, 3),
+    )  # fmt: skip
+    shape = np.zeros((2 * n, 3))
+    shape[:n, 2], shape[n:, 2] = -4.0, 3.0  # the outer side into the eyeball, the inner one before it
+    keep_off_eyeballs(face, skin, shape)
+    outer, inner = (skin.vertices + shape)[:n], (skin.vertices + shape)[n:]
+    over = np.linalg.norm(outer[:, :2], axis=1) < 8.0
+    assert (outer[over, 2] > np.sqrt(100.0 - (outer[over, :2] ** 2).sum(axis=1)) - 0.05).all()
+    assert (inner[over, 2] < outer[over, 2]).all()
+    assert np.abs(shape[:, :2]).max() == 0.0
 
 
 def test_half_a_face_is_refused() -> None:

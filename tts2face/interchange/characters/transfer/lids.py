@@ -8,11 +8,11 @@ from scipy.spatial import cKDTree
 
 from tts2face.interchange.characters.transfer.parts import triangles_of, vertices_of
 from tts2face.interchange.characters.transfer.registration import Similarity, factorise
-from tts2face.interchange.characters.transfer.sight import view_ahead
+from tts2face.interchange.characters.transfer.sight import Sight, view_ahead
 from tts2face.interchange.characters.transfer.skin import Skin
 from tts2face.models.face import Face
 from tts2face.models.landmarks import LEFT_LIDS, RIGHT_LIDS
-from tts2face.numeric.arrays import FloatArray, IntArray, true_runs
+from tts2face.numeric.arrays import FloatArray, IntArray, Mask, true_runs
 
 LIDS = {"Right": RIGHT_LIDS, "Left": LEFT_LIDS}
 MIN_COLUMNS = 8  # of cells in which an eyeball is seen, for an eye to have edges
@@ -27,6 +27,8 @@ LID_REACH_MM = 30.0
 OPENING_RATIOS = (0.2, 3.0)  # of a target's opening over the source's; beyond them landmarks are wrong
 CLEARANCE_MM = 0.3  # of a shut lid over the eyeball
 LID_RADII = 1.8  # from the centre of an eyeball within which lids are kept off it
+MOVED_MM = 0.5  # by which a shape moves lids that are
+N_PUSHES = 5  # of lids, which bring other triangles to the front
 
 
 def eyeballs(face: Face) -> list[tuple[FloatArray, float]]:
@@ -150,15 +152,42 @@ def shut_lids(
 
 
 def keep_off_eyeballs(face: Face, skin: Skin, shape: FloatArray) -> None:
-    """Push lids that a shape (S, 3) moves into an eyeball out of it, in place."""
+    """Move lids that a shape (S, 3) brings behind an eyeball before it, in place; corneas bulge, drawn eyes are flat.
+
+    What is hidden at rest, as the inner side of a lid, stays behind what is seen.
+    """
+    is_eye = triangles_of(face, "eyes")
+    is_lid = (skin.side > 2) & (np.abs(shape).max(axis=1) > MOVED_MM)
+    lids = is_lid[skin.triangles].all(axis=1)
+    is_inner = lids & ~skin.is_seen[skin.triangles].any(axis=1)
     for centre, radius in eyeballs(face):
-        near = np.flatnonzero((skin.side > 2) & (np.linalg.norm(skin.vertices - centre, axis=1) < LID_RADII * radius))
-        from_centre = skin.vertices[near] + shape[near] - centre
-        far = np.linalg.norm(from_centre, axis=1)
-        least = np.minimum(radius + CLEARANCE_MM, np.linalg.norm(skin.vertices[near] - centre, axis=1))
-        is_moved = np.abs(shape[near]).max(axis=1) > 0.5  # mm; the eyeball's sphere is not its cornea
-        push = np.where((far < least) & is_moved, least / np.maximum(far, 1.0) - 1.0, 0.0)
-        shape[near] += push[:, None] * from_centre
+        box = (centre - LID_RADII * radius, centre + LID_RADII * radius)
+        eye = view_ahead(face.vertices.astype(np.float64), face.triangles[is_eye], box)
+        for _ in range(N_PUSHES):
+            outer = view_ahead(skin.vertices + shape, skin.triangles[~is_inner], box)
+            push = _missing(eye, outer, np.append(lids[~is_inner], False)[outer.triangle], radius)
+            forward = _at_vertices(push, outer, skin.triangles[~is_inner], len(shape))
+            shape[:, 2] += forward
+            inner = view_ahead(skin.vertices + shape, skin.triangles[is_inner], box)
+            push = _missing(inner, outer, np.append(lids[~is_inner], False)[outer.triangle], np.inf)
+            back = _at_vertices(push, inner, skin.triangles[is_inner], len(shape)) * ~skin.is_seen
+            shape[:, 2] -= back
+            if not forward.any() and not back.any():
+                break
+
+
+def _missing(behind: Sight, before: Sight, is_asked: Mask, most: float) -> FloatArray:
+    """(X, Y) distance by which what should lie behind is not `CLEARANCE_MM` behind the other; 0 beyond `most`."""
+    both = is_asked & np.isfinite(behind.depth) & np.isfinite(before.depth)
+    missing: FloatArray = np.where(both, behind.depth, 0.0) - np.where(both, before.depth, 0.0) + CLEARANCE_MM
+    return np.where(both & (missing < most), np.maximum(missing, 0.0), 0.0)
+
+
+def _at_vertices(push: FloatArray, sight: Sight, triangles: IntArray, n: int) -> FloatArray:
+    """(N,) largest of the distances (X, Y) in the cells of the triangles (F, 3) around each vertex."""
+    found, hit = np.zeros(n), push > 0
+    np.maximum.at(found, triangles[sight.triangle[hit]], push[hit][:, None])
+    return found
 
 
 def closed_share(skin: Skin, shape: FloatArray, side: str) -> float:

@@ -205,6 +205,8 @@ def _lids(
     for gain in BLINK_GAINS:
         grown = shapes.copy()
         grown[blinks] *= gain
+        for blink in blinks:
+            keep_off_eyeballs(face, skin, grown[blink])
         if _shuts(face, skin, grown, blinks):
             return grown, []
     shut = shut_lids((head.skin, head.moves()), (skin, shapes), head.shape_names, registration.similarity)
