@@ -83,18 +83,15 @@ class OpenedMouth:
 def with_edges_apart(face: Face, rolled: IntArray) -> Face:
     """Face whose rolled edges of the lips (E, 3) are a part with own vertices: they leave the light on the lips alone.
 
-    Their triangles follow one another in the part that was cut.
+    Their triangles are the last of the part that was cut.
     """
     first = int(np.flatnonzero((face.triangles == rolled[0]).all(axis=1))[0])
     rows, corners = np.unique(rolled, return_inverse=True)
     parts: list[FacePart] = []
     for part in face.parts:
-        end = part.first + part.count
-        if part.first <= first < end:
-            rest = replace(part, name=LIP_EDGES, first=first, count=len(rolled))
-            parts += [replace(part, count=first - part.first), rest]
-            if end > first + len(rolled):
-                parts.append(replace(part, first=first + len(rolled), count=end - first - len(rolled)))
+        if part.first <= first < part.first + part.count:
+            edges = replace(part, name=LIP_EDGES, first=first, count=len(rolled))
+            parts += [replace(part, count=first - part.first), edges]
         else:
             parts.append(part)
     triangles = face.triangles.copy()
