@@ -9,7 +9,7 @@ from lexicon.errors import Tts2faceError
 from tts2face.interchange.characters.shapes import TRANSFER
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.sent_resources import MAX_MAPPING, MAX_NAME, Sent, store_resource
-from tts2face.serving.studio.pages.frame import file_field, heading, sentence
+from tts2face.serving.studio.pages.frame import file_field, heading, held_dialog, sentence
 from tts2face.serving.studio.pages.open_page import OpenPage
 from tts2face.serving.studio.pages.photo_dialog import Made, face_name
 from tts2face.serving.work.resource_check import FACE
@@ -82,20 +82,14 @@ class CharacterDialog:
         """Nothing else can be done meanwhile; an error is shown in the dialog, which names what helps."""
         controls = (self._upload, self._make, self._close, self._transfer, self._mapping, self._name)
         self._status.text = "The face is made."
-        self._dialog.props("persistent")
-        for control in controls:
-            control.set_enabled(False)
         try:
-            yield
+            with held_dialog(self._dialog, controls):
+                yield
         except (Tts2faceError, RefusedError) as wrong:
             text = sentence(wrong)
             for part, shown in PARTS.items():
                 text = text.replace(part, shown)
             self._status.text = text
-        finally:
-            self._dialog.props(remove="persistent")
-            for control in controls:
-                control.set_enabled(True)
 
     def _forget(self) -> None:
         self._file = None

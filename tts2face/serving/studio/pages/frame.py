@@ -1,6 +1,6 @@
 """The frame of all pages: style, dark mode, icons with names, and errors that are shown."""
 
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
 from html import escape
@@ -8,6 +8,7 @@ from pathlib import Path
 
 from fastapi import Request as HttpRequest
 from nicegui import ui
+from nicegui.elements.mixins.disableable_element import DisableableElement
 from nicegui.events import Handler, UploadEventArguments
 
 from lexicon.errors import Tts2faceError
@@ -109,6 +110,20 @@ def file_field(label: str, kinds: str, max_bytes: int, on_upload: Handler[Upload
 def heading(level: int, text: str) -> None:
     """Heading of a level."""
     ui.html(f"<h{level}>{escape(text)}</h{level}>", sanitize=False)
+
+
+@contextmanager
+def held_dialog(dialog: ui.dialog, controls: Sequence[DisableableElement]) -> Iterator[None]:
+    """Keep a dialog open and its controls without effect while something is made."""
+    dialog.props("persistent")
+    for control in controls:
+        control.set_enabled(False)
+    try:
+        yield
+    finally:
+        dialog.props(remove="persistent")
+        for control in controls:
+            control.set_enabled(True)
 
 
 @contextmanager

@@ -25,7 +25,7 @@ from tts2face.serving.service.sent_resources import (
 )
 from tts2face.serving.service.uploads import UPLOAD_PREFIX, UploadFolder
 from tts2face.serving.studio.components.photo_places import PhotoPlacesElement
-from tts2face.serving.studio.pages.frame import file_field, heading, shown_errors
+from tts2face.serving.studio.pages.frame import file_field, heading, held_dialog, shown_errors
 from tts2face.serving.studio.pages.open_page import OpenPage
 from tts2face.serving.work.resource_check import FACE
 from tts2face.serving.work.resources import MB
@@ -146,16 +146,11 @@ class PhotoDialog:
         """Show what is done, while nothing else can be."""
         controls = (self._upload, self._make, self._again, self._close)
         self._status.text = status
-        self._dialog.props("persistent")
-        for control in controls:
-            control.set_enabled(False)
         try:
-            yield
+            with held_dialog(self._dialog, controls):
+                yield
         finally:
-            self._dialog.props(remove="persistent")
             self._status.text = "" if self._status.text == status else self._status.text
-            for control in controls:
-                control.set_enabled(True)
 
     def _forget(self) -> None:
         """Delete the picture, and show what the dialog begins with."""
