@@ -13,17 +13,19 @@ from lexicon.marked_text import PhoneMark
 from lexicon.normalize import spoken_form
 from lexicon.pronounce import Word, pronounce
 from lexicon.sentence_ends import MARKS
+from lexicon.tones import EVEN, Tone
 
 _STEM = "qzx"  # of the placeholders of given words during normalisation; not a word of any language
 
 
 @dataclass(frozen=True, slots=True)
 class TextWord:
-    """A normalised word, the phones given for it (or none), and the punctuation after it."""
+    """A normalised word, the phones given for it (or none), the punctuation after it, and how it is said."""
 
     text: str
     segments: tuple[IpaPhone, ...] = ()
     after: str = ""
+    tone: Tone = EVEN
 
 
 def words_with_given_phones(written: str, phones: Sequence[PhoneMark], language: str) -> tuple[TextWord, ...]:

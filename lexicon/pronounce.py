@@ -18,6 +18,7 @@ from lexicon.languages import language_code
 from lexicon.normalize import MARKS, split_tokens, spoken_form
 from lexicon.phones import PHONES, ipa_to_arpabet
 from lexicon.scripts import check_script
+from lexicon.tones import EVEN, Tone
 
 NOTHING = "there is nothing to say in the text; add at least one word or number"
 PAUSES_S = MappingProxyType({"": 0.0, ",": 0.2, ";": 0.3, ":": 0.3, ".": 0.5, "!": 0.5, "?": 0.5})  # s, nominal
@@ -59,6 +60,8 @@ class Word:
         Punctuation after the word, or empty.
     arpabet : N names, English only
         ARPABET with stress digits; empty for other languages.
+    tone
+        How it is said.
     """
 
     text: str
@@ -68,6 +71,7 @@ class Word:
     syllables: tuple[tuple[int, int], ...]
     mark: str = ""
     arpabet: tuple[str, ...] = ()
+    tone: Tone = EVEN
 
     @property
     def pause_s(self) -> float:

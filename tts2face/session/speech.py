@@ -230,7 +230,7 @@ def _trimmed(speech: Speech, sentence: Sentence, part: Phrase, request: Request)
 
 def phrase_content(part: Phrase) -> SpeechInput:
     """Words of a phrase with their phones, or its text."""
-    return [SpokenWord(word.text, word.segments, word.after) for word in part.words] or part.text
+    return [SpokenWord(word.text, word.segments, word.after, word.tone) for word in part.words] or part.text
 
 
 def speaker_of(part: Phrase, voice: Voice, request: Request, voices: Voices | None) -> Voice:

@@ -16,6 +16,7 @@ from lexicon.given_phones import TextWord, pronounce_words
 from lexicon.ipa import IpaPhone
 from lexicon.phones import PHONES
 from lexicon.pronounce import Word, pronounce
+from lexicon.tones import EVEN, Tone
 from tts2face.types import Speech, Waveform
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ SENTENCE_MARKS = frozenset(".!?")
 
 @dataclass(frozen=True, slots=True)
 class SpokenWord:
-    """A written word with its phones; `after` is the punctuation that follows it.
+    """A written word with its phones; `after` is the punctuation that follows it, `tone` how it is said.
 
     If `segments` is empty, the voice determines the pronunciation.
     """
@@ -34,6 +35,7 @@ class SpokenWord:
     text: str
     segments: tuple[IpaPhone, ...]
     after: str = ""
+    tone: Tone = EVEN
 
 
 SpeechInput = str | Sequence[SpokenWord]  # text, or phones word by word
@@ -158,7 +160,7 @@ def pronounce_content(content: SpeechInput, language: str, own_words: Pronunciat
     own = Dictionary(MappingProxyType(dict(own_words)))
     if isinstance(content, str):
         return pronounce(content, language, own).words
-    return pronounce_words([TextWord(word.text, word.segments, word.after) for word in content], language, own)
+    return pronounce_words([TextWord(word.text, word.segments, word.after, word.tone) for word in content], language, own)
 
 
 def word_segments(word: Word) -> tuple[IpaPhone, ...]:
