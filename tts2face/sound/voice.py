@@ -160,7 +160,8 @@ def pronounce_content(content: SpeechInput, language: str, own_words: Pronunciat
     own = Dictionary(MappingProxyType(dict(own_words)))
     if isinstance(content, str):
         return pronounce(content, language, own).words
-    return pronounce_words([TextWord(word.text, word.segments, word.after, word.tone) for word in content], language, own)
+    words = [TextWord(word.text, word.segments, word.after, word.tone) for word in content]
+    return pronounce_words(words, language, own)
 
 
 def word_segments(word: Word) -> tuple[IpaPhone, ...]:
