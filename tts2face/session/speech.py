@@ -31,7 +31,9 @@ from tts2face.session.joining import (
     trim_end,
 )
 from tts2face.session.prepared import innermost_styles
+from tts2face.sound.delivery import sound_with, speak_with
 from tts2face.sound.level import level_speech
+from tts2face.sound.prosody import Prosody
 from tts2face.sound.voice import SpeechInput, SpokenWord, Voice, apply_volume
 from tts2face.sound.voice_pool import has_voice, speaks
 from tts2face.types import Speech, Waveform, YieldTurn, concatenate_speech, keep_on
@@ -169,7 +171,9 @@ def speak_sentence(
         delivery = delivery_of(part, sentence.runs, request, deliveries)
         rate = text.rate * part.rate * delivery.rate
         try:
-            speech = speaker.speak(phrase_content(part), rate=rate, seed=request.seed)
+            speech = speak_with(
+                speaker, phrase_content(part), Prosody(rate), request.seed, language=part.language or request.language
+            )
         except SilentTextError:  # signs, such as pictures, for which a voice has no words
             # a sentence of signs alone is an error, beside words they are left out
             if part is sentence.utterances[-1] and not spoken:
@@ -211,7 +215,8 @@ def sentence_sound(
     speaker = speaker_of(part, voice, request, voices)
     delivery = delivery_of(part, sentence.runs, request, deliveries)
     rate = text.rate * part.rate * delivery.rate
-    sound = speaker.sound(phrase_content(part), rate=rate, seed=request.seed)
+    language = part.language or request.language
+    sound = sound_with(speaker, phrase_content(part), Prosody(rate), request.seed, language=language)
     whole = _trimmed(resampled_speech(Speech.without_phones(sound), voice.sample_rate), sentence, part, request)
     levelled = level_speech([whole], [text.volume * delivery.volume * np.ones(1)])
     return _join_sentence(levelled, sentence, voice.sample_rate)[0].waveform

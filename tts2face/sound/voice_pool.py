@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING
 from lexicon.errors import BackendError, InputError
 from lexicon.languages import language_code
 from tts2face.plugins import VOICES, declared, load_plugin
+from tts2face.sound.delivery import sound_with, speak_with
+from tts2face.sound.prosody import Prosody
 from tts2face.sound.voice import NativeRun, PronunciationMap, SpeechInput, Voice, VoiceInfo, VoiceSetting
 from tts2face.types import Speech, Waveform, YieldTurn, keep_on
 
@@ -291,7 +293,7 @@ class _SharedVoice:
     """A voice of a pool."""
 
     pool: VoicePool
-    key: Hashable
+    key: tuple[Hashable, ...]  # name, language, words of a user
     load: Callable[[], Voice]
     keeps_utterances: bool
 
@@ -300,16 +302,27 @@ class _SharedVoice:
         with self.pool.borrow(self.key, self.load) as voice:
             return voice.sample_rate
 
+    @property
+    def language(self) -> str:
+        """Code of the language for which it was loaded."""
+        return str(self.key[1])
+
     def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
-        utterance = (self.key, content if isinstance(content, str) else tuple(content), rate, seed)
+        return self.deliver(content, Prosody(rate), seed)
+
+    def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
+        return self.deliver_sound(content, Prosody(rate), seed)
+
+    def deliver(self, content: SpeechInput, prosody: Prosody, seed: int) -> Speech:
+        utterance = (self.key, content if isinstance(content, str) else tuple(content), prosody, seed)
         speech = self.pool.release(utterance)
         if speech is None:
             with self.pool.borrow(self.key, self.load) as voice:
-                speech = voice.speak(content, rate=rate, seed=seed)
+                speech = speak_with(voice, content, prosody, seed, language=self.language)
         if self.keeps_utterances:
             self.pool.keep(utterance, speech)
         return speech
 
-    def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
+    def deliver_sound(self, content: SpeechInput, prosody: Prosody, seed: int) -> Waveform:
         with self.pool.borrow(self.key, self.load) as voice:
-            return voice.sound(content, rate=rate, seed=seed)
+            return sound_with(voice, content, prosody, seed, language=self.language)
