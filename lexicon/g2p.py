@@ -4,7 +4,6 @@ espeak-ng is a library with global state: one lock guards all calls.
 """
 
 import functools
-import logging
 import re
 import threading
 from collections.abc import Mapping, Sequence
@@ -90,14 +89,10 @@ def check_language(language: str) -> None:
 
 
 @functools.cache
-def _espeak_backend(language: str) -> Any:
-    _espeak_wrapper()
-    from phonemizer.backend import EspeakBackend
-
-    quiet = logging.getLogger("tts2face.phonemizer")
-    # phonemizer warns of each line with other numbers of words than the text
-    quiet.setLevel(logging.CRITICAL)
-    return EspeakBackend(language, with_stress=True, language_switch="keep-flags", logger=quiet)
+def _espeak_reader(language: str) -> Any:
+    reader = _espeak_wrapper()()
+    reader.set_voice(language)
+    return reader
 
 
 def phonemize(lines: Sequence[str], language: str) -> tuple[tuple[str, ...], ...]:
@@ -116,19 +111,10 @@ def phonemize(lines: Sequence[str], language: str) -> tuple[tuple[str, ...], ...
     if not lines:
         return ()
     with _LOCK:
-        backend = _espeak_backend(language)
-        from phonemizer.separator import Separator
-
-        # phonemizer counts lines: a line break would make two of one
-        flat = [line.replace("\n", " ") for line in lines]
-        # phonemizer drops empty lines, and the rest would move up
-        kept = [at for at, line in enumerate(flat) if line.strip()]
-        spoken = backend.phonemize([flat[at] for at in kept], separator=Separator(phone="_", word=" "), strip=True)
-    written: list[tuple[str, ...]] = [()] * len(flat)
-    for at, line in zip(kept, spoken, strict=True):
-        words = (_LANGUAGE_SWITCH.sub("", word).strip("_") for word in line.split())
-        written[at] = tuple(word for word in words if word)
-    return tuple(written)
+        reader = _espeak_reader(language)
+        spoken = [reader.text_to_phonemes(line) if line.strip() else "" for line in lines]
+    parts = ([part.strip("_") for part in _LANGUAGE_SWITCH.sub("", line).split()] for line in spoken)
+    return tuple(tuple(part for part in line if part) for line in parts)
 
 
 def parse_espeak_word(written: str, language: str) -> tuple[IpaPhone, ...]:

@@ -36,6 +36,8 @@ _SINGLE_LETTER = re.compile(rf"{_START}[^\W\d_]{_STOP}")
 # espeak-ng omits what follows the first 160 letters of a word; the longest in use have 85. From U+0900 on, scripts
 # without spaces between words begin.
 _LONG_WORD = re.compile(r"[^\W\d_\u0900-\U0010ffff]{100}(?=[^\W\d_\u0900-\U0010ffff])")
+# espeak-ng reads aujourd’hui in English, and 12 345 with a narrow space as two numbers
+_AS_ESPEAK_READS = str.maketrans({"’": "'", "ʼ": "'", "\u00a0": " ", "\u202f": " ", "\u2009": " "})
 _LONG_NUMBER = re.compile(rf"[0-9]{{{MAX_CARDINAL_DIGITS + 1},}}")
 
 
@@ -251,5 +253,6 @@ def spoken_form(text: str, language: str) -> str:
         text = to_kana(text)
     if language.partition("-")[0] == "de":
         text = read_german_dates(text)
-    text = _LONG_NUMBER.sub(lambda number: " ".join(number.group()), name_foreign_letters(text, language))
+    text = name_foreign_letters(text.translate(_AS_ESPEAK_READS), language)
+    text = _LONG_NUMBER.sub(lambda number: " ".join(number.group()), text)
     return _LONG_WORD.sub(r"\g<0> ", text)

@@ -2,16 +2,16 @@
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
 
-from lexicon.canonical import canonical_text
 from lexicon.dictionary import Dictionary
 from lexicon.english import CAPITALISED_WORDS, fold_to_arpabet, is_initialism, look_up_word
 from lexicon.errors import InputError, SilentTextError
+from lexicon.espeak_words import words_by_espeak
 from lexicon.function_words import reduced_segments
-from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word, phonemize, segments_by_rules
+from lexicon.g2p import DEFAULT_LANGUAGE, segments_by_rules
 from lexicon.homographs import homograph_segments, is_homograph
 from lexicon.ipa import IpaPhone
 from lexicon.languages import language_code
@@ -122,29 +122,15 @@ def _split_words(forms: Iterator[tuple[str, str]]) -> list[_WordDraft]:
     return words
 
 
-def _pronounce_by_rules(words: Sequence[_WordDraft], language: str) -> None:
-    """Phones by espeak-ng, word by word."""
-    for word, segments in zip(words, segments_by_rules([word.text for word in words], language), strict=True):
-        word.segments = segments
-
-
-def _pronounce_in_context(words: list[_WordDraft], language: str) -> None:
-    """Phones by espeak-ng clause by clause, or word by word where it joins or splits the words of a clause."""
-    clauses: list[list[_WordDraft]] = [[]]
-    for word in words:
-        clauses[-1].append(word)
-        if word.mark:
-            clauses.append([])
-    spoken = phonemize([" ".join(word.text for word in clause) for clause in clauses], language)
-    unmatched: list[_WordDraft] = []
-    for clause, written in zip(clauses, spoken, strict=True):
-        # espeak-ng joins and splits words (tout le monde); their phones cannot be assigned then
-        if len(clause) == len(written):
-            for word, part in zip(clause, written, strict=True):
-                word.segments = parse_espeak_word(part, language)
-        else:
-            unmatched += clause
-    _pronounce_by_rules(unmatched, language)
+def _words_by_espeak(text: str, language: str) -> list[_WordDraft]:
+    """Words of a text, as far as it is no English, as they are written, with the phones that espeak-ng speaks."""
+    spoken = spoken_form(text, language)
+    words = [_WordDraft(word.text, word.text, word.mark, own) for word, own in words_by_espeak(spoken, language)]
+    if language.partition("-")[0] == "en":
+        normalised = _split_words((token.source, token.spoken) for token in split_tokens(text))
+        if len(normalised) == len(words):
+            words = [replace(word, source=own.source) for word, own in zip(words, normalised, strict=True)]
+    return words
 
 
 def _is_english_onset(onset: tuple[str, ...]) -> bool:
@@ -218,20 +204,13 @@ def pronounce(text: str, language: str = DEFAULT_LANGUAGE, dictionary: Dictionar
     language = language_code(language)
     check_script(text, language)
     own = dictionary or Dictionary(MappingProxyType({}))
-    if language.partition("-")[0] == "en":
-        words = _split_words((token.source, token.spoken) for token in split_tokens(text))
-    else:
-        spoken = spoken_form(text, language)
-        words = _split_words((piece, piece) for piece in canonical_text(spoken, keep_marks=True).split())
-        words = [word for word in words if any(letter.isalnum() for letter in word.text)]
-    if not words:
-        raise SilentTextError(NOTHING)
     if language == DEFAULT_LANGUAGE:
+        words = _split_words((token.source, token.spoken) for token in split_tokens(text))
         spoken_segments = english_segments([word.text for word in words], [word.mark for word in words], own)
         for word, segments in zip(words, spoken_segments, strict=True):
             word.segments = segments
     else:
-        _pronounce_in_context(words, language)
+        words = _words_by_espeak(text, language)
         for word in words:
             word.segments = own.lookup(word.text) or word.segments
     words = [word for word in words if word.segments or any(map(str.isalpha, word.text))]  # no signs without words

@@ -9,11 +9,11 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.canonical import canonical_text
 from lexicon.normalize import spoken_form
 from lexicon.sentence_length import n_letters
 from lexicon.sentences import text_prefix
 from lexicon.sequence import MIN_PHONE_S, SILENCE, PhoneSequence, WordSpan, enforce_increasing
+from lexicon.written_words import written_words
 from tts2face.sound.pauses import speech_onset
 from tts2face.types import Speech, Waveform, concatenate_speech, first_sample
 
@@ -269,7 +269,7 @@ class WordTimes:
     def _count_words(self, written: str) -> int:
         normalised = spoken_form(written, self._language)
         if not self._language.startswith("en"):
-            normalised = canonical_text(normalised, keep_marks=True)
+            return len(written_words(normalised, self._language))
         return sum(any(letter.isalnum() for letter in word) for word in normalised.split())
 
 

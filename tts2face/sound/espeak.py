@@ -22,11 +22,10 @@ from numpy.typing import NDArray
 from lexicon.errors import BackendError, SilentTextError
 from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word
 from lexicon.ipa import IpaPhone
-from lexicon.japanese import has_kanji, to_kana
 from lexicon.languages import language_code
+from lexicon.normalize import spoken_form
 from lexicon.phones import PHONES, nearest_phones, phone_distance
 from lexicon.pronounce import Word
-from lexicon.scripts import check_script
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan, enforce_increasing
 from tts2face.sound.voice import (
     PronunciationMap,
@@ -41,7 +40,6 @@ from tts2face.types import Speech, Waveform
 CHILD = Path(__file__).with_name("espeak_child.py")
 WORD_EVENT, PHONEME_EVENT = 1, 7
 ANY_GENDER, FEMALE = 0, 2  # espeak_VOICE.gender; ANY_GENDER selects the male voice if a language has both
-_WORDS = re.compile(r"\w+(?:[ '’-]\w+)*")
 LANGUAGE_SWITCH = re.compile(r"\([a-z0-9-]+\)")  # espeak-ng marks where a foreign word begins and ends: (en)...(fr)
 DEFAULT_WORDS_PER_MINUTE = 175  # espeak-ng's default; the times of its events are wrong above 400
 CHILD_TIMEOUT_S = 60.0  # a sentence takes about 50 ms
@@ -119,6 +117,14 @@ def given_starts(given: Sequence[str], reported: Sequence[str], starts: Sequence
 
 
 @dataclass(frozen=True, slots=True)
+class _SpokenWord:
+    """A word and its phones."""
+
+    text: str
+    phones: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class _PhonemeEvent:
     """A phoneme event: its phones, its start in seconds, and the index of its word (-1 for none)."""
 
@@ -142,65 +148,62 @@ class EspeakVoice:
 
     def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
         """Synthesise a sentence; see `tts2face.sound.voice.Voice`. The voice is deterministic: `seed` is unused."""
-        text, spoken = self._espeak_text(content)
-        words = [word.text for word in spoken]
+        text, words = self._espeak_text(content)
         header, samples = _run_child({
-            "text": text, "language": self._language, "gender": self._gender, "has_phonemes": bool(words),
+            "text": text, "language": self._language, "gender": self._gender, "has_phonemes": "[[" in text,
             "words_per_minute": round(DEFAULT_WORDS_PER_MINUTE * rate), "parent": os.getpid(),
         })  # fmt: skip
         sound = np.pad(samples / np.float32(32768), round(EDGE_SILENCE_S * self._rate)).astype(np.float32)
-        events, names = self._phoneme_events(header, text, sound)
-        if words:
-            events = _assign_written_words(events, header, text)
+        events = self._phoneme_events(header, sound)
         if not any(phone != SILENCE for event in events for phone in event.phones):
             raise SilentTextError(f"there is nothing to say in {text[:40]!r}; give at least one word")
-        given = [tuple(segment.phone for segment in word.segments) for word in spoken]
-        events = _relabel_events(events, given, len(sound) / self._rate)
-        phones, spans = _phone_sequence(events, words or names, len(sound) / self._rate)
+        if self._language == DEFAULT_LANGUAGE:
+            events = _assign_words_by_place(events, header, text)
+        else:
+            events = _assign_words_by_phones(events, [word.phones for word in words])
+        events = _relabel_events(events, [word.phones for word in words], len(sound) / self._rate)
+        phones, spans = _phone_sequence(events, [word.text for word in words], len(sound) / self._rate)
         return Speech(Waveform(apply_volume(sound), self._rate), phones, spans)
 
     def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
         """Sound of `speak`; see `tts2face.sound.voice.Voice`."""
         return self.speak(content, rate=rate, seed=seed).waveform
 
-    def _espeak_text(self, content: SpeechInput) -> tuple[str, list[SpokenWord]]:
-        """Input text for espeak-ng, and its words if any has phones.
+    def _espeak_text(self, content: SpeechInput) -> tuple[str, list[_SpokenWord]]:
+        """Input text for espeak-ng, and its words with their phones.
 
-        American English is spoken by the phones of `lexicon`, other languages by those of espeak-ng.
+        American English is spoken by the phones of `lexicon`, other languages by those of espeak-ng, but for words
+        with given phones.
         """
+        spoken = pronounce_content(content, self._language, self._own_words)
         if self._language == DEFAULT_LANGUAGE:
-            spoken = pronounce_content(content, self._language, self._own_words)
-            words = [part for word in spoken for part in _short_words(word)]
-            return " ".join(_word_mnemonic(word) for word in words), words
+            parts = [part for word in spoken for part in _short_words(word)]
+            given = [tuple(segment.phone for segment in part.segments) for part in parts]
+            words = [_SpokenWord(part.text, phones) for part, phones in zip(parts, given, strict=True)]
+            return " ".join(map(_word_mnemonic, parts)), words
+        words = [_SpokenWord(word.text, word.phones) for word in spoken]
         if isinstance(content, str):
-            check_script(content, self._language)
-            if self._language == "ja" and has_kanji(content):
-                content = to_kana(content)
-            plain = _without_brackets(content)
+            plain = _without_brackets(spoken_form(content, self._language))
             if not any(map(self._look_up, plain.split())):
-                return plain, []
+                return plain, words
             content = [SpokenWord(word, ()) for word in plain.split()]
-        words = [word if word.segments else self._pronounce(word) for word in content]
-        return " ".join(_word_mnemonic(word) for word in words), words
+        written = [word if word.segments else self._pronounce(word) for word in content]
+        return " ".join(map(_word_mnemonic, written)), words
 
     def _look_up(self, word: str) -> tuple[IpaPhone, ...] | None:
         return self._own_words.get(word.strip(".,;:!?\"'()").lower())
 
     def _pronounce(self, word: SpokenWord) -> SpokenWord:
         """A word with its phones in the user's dictionary, or without phones."""
-        check_script(word.text, self._language)
         text = "".join(_without_brackets(word.text).split())
         return SpokenWord(text, self._look_up(text) or (), word.after)
 
-    def _phoneme_events(
-        self, header: dict[str, Any], text: str, sound: NDArray[np.float32]
-    ) -> tuple[list[_PhonemeEvent], list[str]]:
+    def _phoneme_events(self, header: Mapping[str, Any], sound: NDArray[np.float32]) -> list[_PhonemeEvent]:
         found: list[_PhonemeEvent] = []
-        names: list[str] = []
-        starts = iter([value[0] for kind, _, value in header["events"] if kind == WORD_EVENT][1:])
+        n_words = 0
         for kind, sample, value in header["events"]:
             if kind == WORD_EVENT:
-                names.append(_word_at(text, value[0], value[1], next(starts, len(text))))
+                n_words += 1
                 continue
             ipa = LANGUAGE_SWITCH.sub("", value)
             phones = tuple(segment.phone for segment in parse_espeak_word(ipa, self._language)) if ipa else ()
@@ -208,21 +211,31 @@ class EspeakVoice:
             start = at / self._rate
             if phones and PHONES[phones[0]].kind in {"stop", "affricate"}:
                 start = _closure_start(sound, at, self._rate)
-            found.append(_PhonemeEvent(phones or (SILENCE,), start, len(names) - 1))
-        return _drop_false_silences(found, sound, self._rate), names
+            found.append(_PhonemeEvent(phones or (SILENCE,), start, n_words - 1))
+        return _drop_false_silences(found, sound, self._rate)
 
 
-def _word_at(text: str, start: int, length: int, following: int) -> str:
-    """A word as it is written; where espeak-ng speaks several as one (tout le monde, 你好), it names the first only."""
-    run = _WORDS.match(text, start, max(following, start))
-    return text[start : max(start + length, run.end() if run else start)]
-
-
-def _assign_written_words(found: Sequence[_PhonemeEvent], header: Mapping[str, Any], text: str) -> list[_PhonemeEvent]:
+def _assign_words_by_place(found: Sequence[_PhonemeEvent], header: Mapping[str, Any], text: str) -> list[_PhonemeEvent]:
     """Events with indices of the space-separated words instead of espeak-ng's own, which splits and joins words."""
     starts = [0, *(match.end() for match in re.finditer(" ", text))]
     owners = [bisect_right(starts, value[0]) - 1 for kind, _, value in header["events"] if kind == WORD_EVENT]
     return [replace(event, word=owners[event.word] if event.word >= 0 else -1) for event in found]
+
+
+def _assign_words_by_phones(found: Sequence[_PhonemeEvent], given: Sequence[Sequence[str]]) -> list[_PhonemeEvent]:
+    """Events with indices of the words to which their phones belong, since espeak-ng's places are wrong in numbers."""
+    owners = [word for word, phones in enumerate(given) for _ in phones]
+    expected = [phone for phones in given for phone in phones]
+    reported = [phone for event in found for phone in event.phones if phone != SILENCE]
+    pairs = enumerate(range(len(expected))) if expected == reported else reversed(match_phones(expected, reported))
+    matched = {k: owners[i] for i, k in pairs}
+    found_words: list[int] = []
+    at = 0
+    for event in found:  # a silence belongs to the word before it, which may go on behind it
+        is_silent = event.phones == (SILENCE,)
+        found_words.append((found_words or [-1])[-1] if is_silent else matched[at])
+        at += 0 if is_silent else len(event.phones)
+    return [replace(event, word=word) for event, word in zip(found, found_words, strict=True)]
 
 
 def _relabel_events(
@@ -247,7 +260,10 @@ def _relabel_events(
         ]
         own = given_starts(phones, reported, starts, parts[-1][1])
         found += [_PhonemeEvent((phone,), start, word) for phone, start in zip(phones, own, strict=True)]
-    silences = [event for event in events if event.phones == (SILENCE,)]
+    # one without duration comes before a closure that begins earlier than it
+    silences = [
+        event for event, end in zip(events, ends, strict=True) if event.phones == (SILENCE,) and end > event.start
+    ]
     return sorted([*silences, *found], key=lambda event: event.start)
 
 

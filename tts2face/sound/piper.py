@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import DataError, InputError, SilentTextError, import_of_extra
-from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word, phonemize
+from lexicon.errors import DataError, InputError, import_of_extra
+from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.ipa import IpaPhone
 from lexicon.languages import language_code
 from lexicon.nominal_durations import NOMINAL_S
+from lexicon.normalize import spoken_form
 from lexicon.phones import PHONES, nearest_phones
 from lexicon.pronounce import Word
-from lexicon.scripts import check_script
 from lexicon.sequence import PhoneSequence, WordSpan
 from lexicon.values.json_text import read_json
 from tts2face.numeric.telemetry import disable_telemetry
@@ -246,15 +246,13 @@ class PiperVoice:
 
     def _spoken(self, content: SpeechInput) -> tuple[list[AlignedWord], list[list[str]]]:
         """Words with their phones, and the letters of each sentence in Piper's alphabet."""
+        words = pronounce_content(content, self._language, self._own_words)
         if self._text_reader is None:
-            words = pronounce_content(content, self._language, self._own_words)
             sentences = [self._sentence_letters(sentence) for sentence in split_spoken_sentences(words)]
             return [(word.text, [tuple(word.phones)]) for word in words], sentences
-        spoken = self._words(content)
-        if not spoken:
-            raise SilentTextError("there is nothing to say in the text; give at least one word")
+        spoken = [SpokenWord(word.text, word_segments(word), word.mark) for word in words]
         if isinstance(content, str):
-            text = self._insert_own_words(content)
+            text = self._insert_own_words(spoken_form(content, self._language))
         else:
             text = " ".join(map(self._bracketed_ipa, spoken))
         aligned = [(word.text, [tuple(segment.phone for segment in word.segments)]) for word in spoken]
@@ -269,26 +267,6 @@ class PiperVoice:
         spoken = (english_letters(word_segments(word), self._phones, self._network.letters) for word in words)
         marks = ("".join(mark for mark in word.mark if mark in self._network.letters) for word in words)
         return list(" ".join(letters + mark for letters, mark in zip(spoken, marks, strict=True)))
-
-    def _words(self, content: SpeechInput) -> list[SpokenWord]:
-        """Words with phones: those given, of the user's dictionary, or of espeak-ng."""
-        if not isinstance(content, str):
-            return [part for word in content for part in ([word] if word.segments else self._pronounce(word))]
-        check_script(content, self._language)
-        written = WORD.findall(content)
-        own = {word: self._own_words.get(word.lower()) for word in written}
-        words = []
-        for text, parts in zip(written, phonemize(written, self._language), strict=True):
-            segments = [segment for part in parts for segment in parse_espeak_word(part, self._language)]
-            words.append(SpokenWord(text, own[text] or tuple(segments)))
-        return [word for word in words if word.segments]
-
-    def _pronounce(self, word: SpokenWord) -> list[SpokenWord]:
-        """The spoken words of a written one without given phones."""
-        # a written word may be several spoken ones (numbers, units)
-        *others, last = self._words(word.text) or [SpokenWord("", ())]
-        after = "".join(re.findall("[.,;:!?]+$", word.text)) + word.after
-        return [*others, SpokenWord(last.text, last.segments, after)] if last.segments else []
 
     def _insert_own_words(self, text: str) -> str:
         """Replace a user's words by ``[[IPA]]``, Piper's notation for given pronunciations."""

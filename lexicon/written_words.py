@@ -1,0 +1,79 @@
+"""Words of a text as they are written, in languages that espeak-ng reads: 3,5 and € and aujourd'hui are one each."""
+
+import re
+import unicodedata
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from lexicon.sentence_ends import MARKS, ends_sentence
+
+_CONTEXT_BEFORE, _CONTEXT_AFTER = 24, 40  # characters by which `ends_sentence` decides
+# digits in groups of three with spaces between are one number: 12 000 zł
+_PIECE = re.compile(r"[^\s\w]*\d{1,3}(?: \d{3})+(?!\d)\S*|\S+")
+# Chinese is written without spaces, and espeak-ng reads it character by character
+_UNSPACED = frozenset({"cmn", "yue", "hak"})
+_CHARACTER = r"[\u3400-\u9fff\uf900-\ufaff\U00020000-\U0003ffff]"
+_CHARACTERS = re.compile(rf"{_CHARACTER}|(?:(?!{_CHARACTER}).)+")
+_SPOKEN_SIGNS = frozenset("%‰&@#§")  # punctuation of Unicode with a name that is spoken
+_MARK_OF_SIGN = {
+    **{mark: mark for mark in MARKS}, "…": ".", "—": ",", "–": ",", "(": ",", ")": ",",
+    "。": ".", "｡": ".", "।": ".", "॥": ".", "۔": ".", "，": ",", "、": ",", "،": ",", "؛": ";", "；": ";", "：": ":",
+    "？": "?", "؟": "?", "！": "!",
+}  # fmt: skip
+_STRENGTH = " ,;:.!?"  # from none
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenWord:
+    """A word, the text between spaces of which it is a part, and the strongest mark after it (or none)."""
+
+    text: str
+    piece: str
+    mark: str = ""
+
+
+def written_words(text: str, language: str) -> tuple[WrittenWord, ...]:
+    """Words of a text in order; signs that are spoken (€, %) are words, punctuation is none."""
+    found: list[WrittenWord] = []
+    for start, piece in _pieces(text, language):
+        first, last = _span_of_word(piece)
+        if found and (mark := _mark(text, start, start + first, language)):  # the dash, French "?", a bracket
+            strongest = max(found[-1].mark, mark, key=_STRENGTH.find)
+            found[-1] = replace(found[-1], mark=strongest)
+        if first < last:
+            mark = _mark(text, start + last, start + len(piece), language)
+            found.append(WrittenWord(piece[first:last], piece, mark))
+    return tuple(found)
+
+
+def _pieces(text: str, language: str) -> Iterator[tuple[int, str]]:
+    for piece in _PIECE.finditer(text):
+        if language.partition("-")[0] in _UNSPACED:
+            yield from ((piece.start() + part.start(), part[0]) for part in _CHARACTERS.finditer(piece[0]))
+        else:
+            yield piece.start(), piece[0]
+
+
+def _span_of_word(piece: str) -> tuple[int, int]:
+    """Half-open range of a word within its punctuation; an empty one at the end where there is none."""
+    kept = [at for at, sign in enumerate(piece) if not _is_punctuation(sign)]
+    if not kept:
+        return len(piece), len(piece)
+    first = kept[0]
+    is_number = piece[first].isdigit() and piece[first - 1 : first] in {"-", "–", "."}
+    return first - is_number, kept[-1] + 1  # -5 and .5 begin with a sign of theirs
+
+
+def _is_punctuation(sign: str) -> bool:
+    return unicodedata.category(sign)[0] in "PZC" and sign not in _SPOKEN_SIGNS
+
+
+def _mark(text: str, start: int, end: int, language: str) -> str:
+    """Strongest mark among the signs of a range, without the full stop of an abbreviation (d. h.)."""
+    marks = [_MARK_OF_SIGN[sign] for sign in text[start:end] if sign in _MARK_OF_SIGN]
+    if marks == ["."] and text[start : start + 1] == ".":
+        after = text[end : end + _CONTEXT_AFTER].lstrip()
+        before = text[max(0, start - _CONTEXT_BEFORE) : start]
+        if after and (after[0].islower() or not ends_sentence(before, after, language)):
+            return ""
+    return max(marks, key=_STRENGTH.find, default="")
