@@ -13,6 +13,7 @@ from tests.rendered_takes import manifest_rows
 from tests.sound.conftest import HEARD_TOGETHER
 from tests.world import World
 from tts2face.sound.alignment import Aligner, HeardSound
+from tts2face.sound.pauses import speech_onset
 from tts2face.sound.recogniser import RATE
 from tts2face.sound.segments import STEP_S
 from tts2face.sound.transcript import pronounce_transcript
@@ -36,6 +37,17 @@ def test_phones_cover_the_sound_and_words_their_phones(aligner: Aligner, heard: 
     assert found.phones.end == heard.sound.duration
     spoken = ["".join(found.phones.phones[word.first : word.last]) for word in found.words]
     assert spoken == ["bɑb", "meɪ", "ɹid"]
+
+
+@pytest.mark.parametrize("lead", [0.0, 0.0025, 0.005, 0.0075, 0.01, 0.015])
+def test_the_first_phone_of_a_sound_without_silence_begins_with_it(aligner: Aligner, lead: float) -> None:
+    """A silence of less than a step before it is no phone of its own."""
+    text = "Are you there?"
+    sound = load_voice("espeak", "en-us").sound(text)
+    start = round((speech_onset(sound) - lead) * sound.rate)
+    found = aligner.align(sound.part(start, len(sound.samples)), pronounce_transcript(text, "en-us"))
+    assert found.phones.start == 0.0
+    assert found.phones.end == pytest.approx(sound.duration - start / sound.rate)
 
 
 def test_of_several_pronunciations_the_fitting_one_is_taken(aligner: Aligner, heard: HeardSound) -> None:

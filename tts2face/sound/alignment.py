@@ -336,7 +336,8 @@ def _sequence(
 ) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
     """Phones from 0 s to the end, and the words of them."""
     labels = [SILENCE if phone is None else phone.label for phone, *_ in chosen]
-    edges = np.array([*(max(start, 0.0) for _, start, _ in chosen), duration])
+    # a silence of a step before the first phone is left out: that phone begins with the sound
+    edges = np.array([0.0, *(max(start, 0.0) for _, start, _ in chosen[1:]), duration])
     of_word: list[list[int]] = [[] for _ in texts]
     for at, (phone, *_) in enumerate(chosen):
         if phone is not None:
