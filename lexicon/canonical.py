@@ -9,6 +9,8 @@ import re
 import unicodedata
 from collections.abc import Callable
 
+from lexicon.pauses import PAUSES_S
+
 # 3½ is two words: NFKC would make 31/2 of it
 _VULGAR = re.compile(r"(?<=[0-9])\s*([¼-¾⅐-⅞↉])")
 # (212) 555-1234: brackets become commas otherwise
@@ -39,22 +41,22 @@ _MARKS = re.compile("[\u0300-\u036f\u0483-\u0489\u1ab0-\u1aff\u1dc0-\u1dff\u20d0
 # Applied in order; each is linear in the text, as no pattern has overlapping repeats.
 _STEPS: tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...] = (
     (re.compile(r"\r"), "\n"),
-    (re.compile(r"(?<!\.)\.{2,}+(?= ?\n?[a-z])"), ","),
+    (re.compile(r"(?<!\.)\.{2,}+(?= ?\n?[a-z])"), "… "),
     (re.compile(r"\.{2,}"), "."),
     (re.compile(r"[ \n]{2,}|\n"), lambda run: ". " if run.group().count("\n") > 1 else " "),
     # a dash between numbers is a range, elsewhere a pause
     (re.compile(r"(?<=[0-9]) ?– ?(?=[0-9$£€])"), "–"),
-    (re.compile(r"–(?![0-9$£€])|(?<![0-9])–|--+"), ", "),
-    (re.compile(r"(?<![0-9]) -(?= )|(?<= )-(?= ?[^0-9$£€¥.\s-])|-(?![\w$£€¥.])"), ", "),
+    (re.compile(r"–(?![0-9$£€])|(?<![0-9])–|--+|(?<![0-9]) -(?= )|(?<= )-(?= ?[^0-9$£€¥.\s-])"), "— "),
+    (re.compile(r"-(?![\w$£€¥.])"), ", "),
     (re.compile(r"-(?=\.(?![0-9]))"), ""),
     (re.compile(r"(?<!\w)-(?=[^\W0-9])"), " "),
     (re.compile(r"(?<!\w)'(?!(?:em|cause|til|[Tt]is|[Tt]was|bout|round|n)\b|[0-9]0s\b)|(?<=[^\W0-9])'(?!\w)"), " "),
     (re.compile(r"'{2,}"), " "),
     (re.compile(r" {2,}"), " "),
-    (re.compile(r" +(?=[.,;:!?](?![\w]))"), ""),
+    (re.compile(r" +(?=[.,;:!?](?![\w])|[—…])"), ""),
 )
-_PUNCTUATION_RUN = re.compile(r"[.,;:!?](?: ?[.,;:!?](?![0-9]))+")
-_STRENGTH = ",;:.!?"
+_PUNCTUATION_RUN = re.compile(r"[.,;:!?—…](?: ?[.,;:!?—…](?![0-9]))+")
+_STRENGTH = "".join(PAUSES_S)
 
 
 def _replacement(code: int) -> int | str:
@@ -106,4 +108,4 @@ def canonical_text(text: str, *, keep_marks: bool = False) -> str:
         text = unicodedata.normalize("NFKC", _MARKS.sub("", text)).translate(_translation_table())
     for pattern, replacement in _STEPS:
         text = pattern.sub(replacement, text)
-    return _PUNCTUATION_RUN.sub(_strongest_mark, text).strip(" ,;:")
+    return _PUNCTUATION_RUN.sub(_strongest_mark, text).strip(" ,;:—").lstrip("… ")

@@ -4,11 +4,13 @@ import re
 from collections.abc import Iterator
 
 from lexicon.errors import InputError
+from lexicon.function_words import is_function_word
 from lexicon.sentence_ends import ends_sentence
 
 # A sentence ends at ., !, ? or … (with closing quotes) before a space that no lower-case letter follows, at an end mark
-# of East Asian or Indic writing, or at a blank line. A run of marks is tried once, from its first mark, and as a whole.
-_END = re.compile(r"""(?<![.!?…])[.!?…]++["'”’)\]]*+(?=\s++[^a-z])|[。！？｡।॥؟۔]+["'”’」』）]*|\n\s*\n""")
+# of East Asian or Indic writing, at a blank line or a line separator, or where a line ends on purpose. A run of marks
+# is tried once, from its first mark, and as a whole.
+_END = re.compile(r"""(?<![.!?…])[.!?…]++["'”’)\]]*+(?=\s++[^a-z])|[。！？｡।॥؟۔]+["'”’」』）]*|\n\s*\n|\u2028|\n""")
 _CLAUSE = re.compile(r"[,;:—–、，；：،؛](?=\s)|[、，；：]")
 # Words before which an English phrase may end where a sentence has no clause mark, the better places first.
 _PHRASE_STARTS = (
@@ -20,6 +22,9 @@ _BETWEEN_WORDS = re.compile(r"(?<=[^\W\d_A-Z])\s(?=[^\W\d_A-Z])")
 _MIN_PHRASE_CHARACTERS = 20  # of either part; shorter ones sound like words of their own
 _MAX_UNDIVIDED_CHARACTERS = 600  # a longer word, as of digits, is divided; addresses are shorter
 _CONTEXT_BEFORE, _CONTEXT_AFTER = 24, 40  # characters around a full stop by which an abbreviation is recognised
+_SHORT_LINE = 50  # characters at most of a line of a poem, a list or a title; text that is wrapped has longer ones
+_LAST_WORD = re.compile(r"([^\W\d_]*)[^\w.]*\Z|\.\s*\Z")
+_PRONOUN = re.compile(r"I\b")
 
 
 def split_chunks(text: str, limit: int, language: str = "en-us") -> Iterator[str]:
@@ -38,7 +43,7 @@ def split_chunks(text: str, limit: int, language: str = "en-us") -> Iterator[str
         raise InputError(f"the limit of a chunk must be at least 1 character, not {limit}; increase it")
     start = 0
     for match in _END.finditer(text):
-        if _is_abbreviated(text, start, match, language):
+        if _is_abbreviated(text, start, match, language) or (match.group() == "\n" and _is_wrapped(text, start, match)):
             continue
         yield from _split_sentence(text[start : match.end()], limit)
         start = match.end()
@@ -78,6 +83,17 @@ def _is_abbreviated(text: str, start: int, end: "re.Match[str]", language: str) 
         return False
     before = text[max(start, end.start() - _CONTEXT_BEFORE) : end.start()]
     return not ends_sentence(before, text[end.end() : end.end() + _CONTEXT_AFTER].lstrip(), language)
+
+
+def _is_wrapped(text: str, start: int, end: "re.Match[str]") -> bool:
+    """Whether a sentence goes on behind the end of a line, as in text that is wrapped at a width."""
+    first = max(text.rfind("\n", start, end.start()) + 1, start)
+    line, following = text[first : end.start()].rstrip(), text[end.end() : end.end() + _CONTEXT_AFTER].lstrip()
+    last = _LAST_WORD.search(line[-_CONTEXT_BEFORE:])
+    # no line of a poem or a list ends behind a function word, or with the full stop of an abbreviation
+    if last is None or last[1] is None or len(line) > _SHORT_LINE or is_function_word(last[1]):
+        return True
+    return following[:1].islower() or _PRONOUN.match(following) is not None
 
 
 def _split_sentence(sentence: str, limit: int) -> Iterator[str]:

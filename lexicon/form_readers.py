@@ -7,8 +7,9 @@ from collections.abc import Callable
 from lexicon import written_forms as readings
 from lexicon.dictionary import word_set
 from lexicon.number_words import cardinal_words, digit_words, number_words, ordinal_words, roman_value, year_words
+from lexicon.pauses import MARKS
 from lexicon.scripts import language_scripts, letter_name, letter_script
-from lexicon.sentence_ends import MARKS, is_abbreviated, starts_sentence
+from lexicon.sentence_ends import is_abbreviated, starts_sentence
 
 NEVER_LETTERS = frozenset({"II", "III", "VII", "VIII"})  # Roman numerals that abbreviate nothing
 TITLES = frozenset({"title", "doctor", "saint"})  # contexts of abbreviations before names

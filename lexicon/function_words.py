@@ -52,6 +52,12 @@ def weak_forms(word: str) -> tuple[tuple[str, ...], ...]:
     return _weak_forms().get(word_key(word), ())
 
 
+def is_function_word(word: str) -> bool:
+    """Whether a word is one of the tables of this module."""
+    key = word_key(word)
+    return key in _forms() or key in _weak_forms()
+
+
 def fitting_forms(
     words: Sequence[tuple[str, Sequence[tuple[str, ...]]]],
 ) -> tuple[tuple[str, tuple[tuple[str, ...], ...]], ...]:

@@ -11,8 +11,8 @@ from lexicon.errors import InputError
 from lexicon.ipa import IpaPhone
 from lexicon.marked_text import PhoneMark
 from lexicon.normalize import spoken_form
+from lexicon.pauses import MARKS
 from lexicon.pronounce import Word, pronounce
-from lexicon.sentence_ends import MARKS
 from lexicon.tones import EVEN, Tone
 
 _STEM = "qzx"  # of the placeholders of given words during normalisation; not a word of any language

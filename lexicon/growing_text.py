@@ -40,8 +40,7 @@ class GrowingText:
         end = open_mark.start() if open_mark else len(self._text)
         # the last one may go on: the next part may bring small letters or an abbreviation
         complete = list(split_chunks(self._text[:end], MAX_SENTENCE_CHARACTERS, self._language))[:-1]
-        self._drop(sum(n_letters(chunk) for chunk in complete))
-        return complete
+        return [chunk + self._drop(n_letters(chunk)) for chunk in complete]
 
     def flush(self) -> list[str]:
         """All sentences that are left."""
@@ -52,13 +51,14 @@ class GrowingText:
         """Forget the text that waits."""
         self._text = ""
 
-    def _drop(self, letters: int) -> None:
-        """Remove a number of letters from the beginning."""
+    def _drop(self, letters: int) -> str:
+        """Remove a number of letters from the beginning; the blank line behind them, if there is one."""
         at = 0
         while letters:
             letters -= not self._text[at].isspace()
             at += 1
         self._text = self._text[at:]
+        return "\n\n" if self._text[:2] == "\n\n" else ""
 
 
 def _shortened(spaces: "re.Match[str]") -> str:

@@ -14,7 +14,7 @@ from lexicon.dictionary import arpabet_segments, word_set
 from lexicon.english import add_s
 from lexicon.ipa import IpaPhone
 from lexicon.part_of_speech import tag_words
-from lexicon.sentence_ends import MARKS
+from lexicon.pauses import MARKS
 from lexicon.verb_tense import tense_tag
 
 NEAR_WORDS = 9  # words on each side that are searched for evidence

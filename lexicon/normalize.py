@@ -16,9 +16,9 @@ from lexicon.capitals import sentence_case
 from lexicon.german_dates import read_german_dates
 from lexicon.japanese import has_kanji, to_kana
 from lexicon.number_words import MAX_CARDINAL_DIGITS
+from lexicon.pauses import MARKS
 from lexicon.scripts import name_foreign_letters, name_letters_in_words
 
-MARKS = frozenset(".,;:!?")
 _FULL_MONTH = "|".join(readings.MONTHS)
 _MONTH = rf"(?:{_FULL_MONTH}|(?:Jan|Feb|Mar|Apr|Jun|Jul|Aug|Sept?|Oct|Nov|Dec)\b\.?)"
 _AMOUNT = r"(?:[0-9]{1,3}(?:,[0-9]{3}){1,6}(?:\.[0-9]{1,20})?(?!,?[0-9])|[0-9]{1,400}(?:\.[0-9]{1,20})?|\.[0-9]{1,20})"
@@ -73,9 +73,9 @@ def _abbreviation_pattern() -> str:
 def _form_table() -> tuple[tuple[str, str, forms.Reader], ...]:
     unit = _unit_pattern()
     return (
-        ("quick", r"(?!(?:etc|vs|approx|et)\b)[a-z]+(?= |$|[,;!?](?: |$))", forms.read_unchanged),
+        ("quick", r"(?!(?:etc|vs|approx|et)\b)[a-z]+(?= |$|[,;!?—…](?: |$))", forms.read_unchanged),
         ("space", r" +", forms.read_nothing),
-        ("mark", r"[.,;:!?](?= |$)", forms.read_punctuation),
+        ("mark", r"[.,;:!?—…](?= |$)", forms.read_punctuation),
         ("email", rf"[\w+-](?:[\w.+-]{{0,62}}[\w+-])?@{_LABEL}(?:\.{_LABEL}){{1,5}}(?!\w)", forms.read_address),
         ("url", rf"(?:(?:https?|ftp)://|www\.){_TAIL}", forms.read_address),
         ("host", rf"(?:{_LABEL}\.){{1,4}}{_TLD}\b(?![.]\w)(?:/(?:{_TAIL})?)?", forms.read_address),
@@ -180,7 +180,7 @@ def _form_table() -> tuple[tuple[str, str, forms.Reader], ...]:
         ("unitname", rf"{_START}{_letter_unit_pattern()}{_STOP}", forms.read_unit_name),
         ("letter", rf"{_START}(?![\u0000-\u024f])[^\W\d_]{_STOP}", forms.read_letter),
         ("word", rf"{_LETTERS}(?:['-]{_LETTERS})*", forms.read_unchanged),
-        ("sentence", r"(?<=[a-z])\.(?=[A-Z])|[,;:!?]", forms.read_unchanged),
+        ("sentence", r"(?<=[a-z])\.(?=[A-Z])|[,;:!?—…]", forms.read_unchanged),
         ("dot", r"\.", forms.read_dot),
         ("symbol", r"[\s\S]", forms.read_symbol),
     )

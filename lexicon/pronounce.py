@@ -15,15 +15,15 @@ from lexicon.g2p import DEFAULT_LANGUAGE, segments_by_rules
 from lexicon.homographs import homograph_segments, is_homograph
 from lexicon.ipa import IpaPhone
 from lexicon.languages import language_code
-from lexicon.normalize import MARKS, split_tokens, spoken_form
+from lexicon.normalize import split_tokens, spoken_form
+from lexicon.pauses import MARKS, PAUSES_S
 from lexicon.phones import PHONES, ipa_to_arpabet
 from lexicon.scripts import check_script
 from lexicon.tones import EVEN, Tone
 
 NOTHING = "there is nothing to say in the text; add at least one word or number"
-PAUSES_S = MappingProxyType({"": 0.0, ",": 0.2, ";": 0.3, ":": 0.3, ".": 0.5, "!": 0.5, "?": 0.5})  # s, nominal
 _MARKS_BY_STRENGTH = tuple(PAUSES_S)  # of two adjacent marks the later one of this order is kept
-_PIECE = re.compile(r"[^\s.,;:!?]+|[.,;:!?]")
+_PIECE = re.compile(r"[^\s.,;:!?—…]+|[.,;:!?—…]")
 # English onsets of two and three consonants (Cruttenden, Gimson's Pronunciation of English, chapter on clusters).
 _ONSET_PAIRS = MappingProxyType({
     "ɹ": "p b t d k ɡ f θ ʃ", "l": "p b k ɡ f s", "w": "t d k ɡ θ s h", "j": "p b k ɡ f v m n h s l t d θ",
@@ -116,7 +116,7 @@ def _split_words(forms: Iterator[tuple[str, str]]) -> list[_WordDraft]:
     for written, spoken in forms:
         for piece in _PIECE.findall(spoken):
             if piece not in MARKS:
-                words.append(_WordDraft(piece, written.strip(" .,;:!?") or piece))
+                words.append(_WordDraft(piece, written.strip(" .,;:!?—…") or piece))
             elif words:
                 words[-1].mark = max(words[-1].mark, piece, key=_MARKS_BY_STRENGTH.index)
     return words

@@ -20,7 +20,6 @@ from types import MappingProxyType
 
 from lexicon import written_forms as readings
 
-MARKS = frozenset(".,;:!?")  # of clauses and sentences
 _WORD = re.compile(r"""[^\s("'“‘«„\[]*\Z""")
 _FIRST_WORD = re.compile(r"""["'“‘«(\[]*([^\W\d_]{1,40})""")
 _NUMBER = re.compile(r"""[#("'“‘]?(?:[0-9]|[IVXLC]{2,9}\b|[VX]\b)""")

@@ -4,6 +4,7 @@ Positions are counted in letters, that is in characters other than white space, 
 changes only its white space.
 """
 
+import re
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,7 +15,10 @@ from lexicon.given_phones import TextWord, words_with_given_phones
 from lexicon.ipa import IpaPhone
 from lexicon.marked_text import Mark, MarkedText, NodMark, PauseMark, PhoneMark, StyleRun
 from lexicon.normalize import spoken_form
+from lexicon.pauses import PARAGRAPH_S, pause_behind
 from lexicon.sentence_length import n_letters, overlapping_runs, pieces_of_text
+
+_BLANK_LINE = re.compile(r"\n\s*\n")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +65,8 @@ class Sentence:
         Seconds of silence marked before the first sentence.
     n_characters
         Number of characters of the text that it covers.
-    is_cut
-        Whether the written sentence continues, so that little silence follows.
+    pause_s
+        Seconds of silence between it and the next one, at a rate of 1; None for the last one of a text.
     """
 
     utterances: tuple[Phrase, ...]
@@ -70,7 +74,7 @@ class Sentence:
     marks: tuple[Mark, ...]
     leading_pause: float
     n_characters: int
-    is_cut: bool = False
+    pause_s: float | None = None
 
     @property
     def first(self) -> int:
@@ -113,6 +117,7 @@ def split_sentences(
     phones = [mark for mark in placed.marks if isinstance(mark, PhoneMark)]
     phone_positions = [mark.at for mark in phones]
     others = [mark for mark in placed.marks if not isinstance(mark, PauseMark | PhoneMark)]
+    paragraphs = frozenset(_paragraph_ends(placed.text))
     pending: Sentence | None = None
     leading_pause = sum(mark.seconds for mark in pauses[:1] if mark.at == 0)
     end = 0
@@ -138,10 +143,20 @@ def split_sentences(
             n_used += 1
         utterances[-1] = _continued_phrase(utterances[-1], is_cut=is_cut)
         marks = tuple(others[first_mark:n_used])
-        pending = Sentence(tuple(utterances), runs, marks, leading_pause, len(chunk), is_cut)
+        pause_s = PARAGRAPH_S if end in paragraphs else pause_behind(chunk, is_cut=is_cut)
+        pending = Sentence(tuple(utterances), runs, marks, leading_pause, len(chunk), pause_s)
         leading_pause = 0.0
     if pending is not None:
-        yield replace(pending, marks=(*pending.marks, *others[n_used:]))
+        yield replace(pending, marks=(*pending.marks, *others[n_used:]), pause_s=None)
+
+
+def _paragraph_ends(text: str) -> Iterator[int]:
+    """Number of letters before each blank line."""
+    start = letters = 0
+    for match in _BLANK_LINE.finditer(text):
+        letters += n_letters(text[start : match.start()])
+        start = match.end()
+        yield letters
 
 
 def _continued_phrase(phrase: Phrase, *, is_cut: bool) -> Phrase:

@@ -54,7 +54,7 @@ def _with_sources(words: Sequence[Word], written: str, language: str) -> tuple[W
     if not language.startswith("en"):
         return tuple(words)
     sources = [
-        token.source.strip(" .,;:!?") or piece
+        token.source.strip(" .,;:!?—…") or piece
         for token in split_tokens(written)
         for piece in token.spoken.split()
         if any(letter.isalnum() for letter in piece)

@@ -41,6 +41,7 @@ _TIME = re.compile(r"\+?([0-9]{1,9}(?:\.[0-9]{1,9})?|\.[0-9]{1,9})\s*(ms|s)")
 # Volume factor and nod size of each level: accented words are 2-5 dB louder than their neighbours, and nods are the
 # visual cue of stress (Krahmer and Swerts 2007, J. Memory and Language 57).
 EMPHASES = MappingProxyType({"strong": (1.6, 1.0), "moderate": (1.25, 0.6), "none": (1.0, 0.0), "reduced": (0.7, 0.0)})
+STRETCH_ENDS = MappingProxyType({"p": "\n\n", "s": "\u2028"})  # a blank line, and a line separator
 SPAN_KINDS = frozenset({"emphasis", "prosody", "express-as", "voice", "lang"})
 LEAF_KINDS = frozenset({"break", "mark", "sub", "phoneme", "say-as"})  # contain no elements
 REPLACED_KINDS = frozenset({"phoneme", "say-as"})  # speak other words than their text
@@ -147,7 +148,7 @@ class _SsmlReader:
         if span:
             self._builder.close(span, f"</{tag}>")
         if name in {"p", "s"}:
-            self._builder.add_text("\n\n")
+            self._builder.add_text(STRETCH_ENDS[name])
 
     def _words(self, text: str) -> None:
         inside = self._elements[-1]
@@ -170,7 +171,7 @@ class _SsmlReader:
 
     def _stretch(self, attributes: Attributes) -> None:
         tag = check_attributes(self._elements[-1], attributes, LANGUAGE).get(LANGUAGE)
-        self._builder.add_text("\n\n")  # a blank line ends the sentence before
+        self._builder.add_text(STRETCH_ENDS[self._elements[-1]])
         if tag is not None and primary_subtag(tag) != primary_subtag(self._current_language):
             self._spans[-1] = "lang"
             self._builder.open_voice("lang", f"<{self._elements[-1]}>", voice=None, language=language_code(tag))

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from lexicon.dictionary import word_set
-from lexicon.sentence_ends import MARKS
+from lexicon.pauses import MARKS
 
 _FORMS_OF_HAVE = word_set("have has had having i've you've we've they've haven't hasn't hadn't he's she's it's")
 _BE = word_set("is are was were be been being isn't aren't wasn't weren't get gets got")

@@ -5,7 +5,8 @@ import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from lexicon.sentence_ends import MARKS, ends_sentence
+from lexicon.pauses import MARK_OF_SIGN, PAUSES_S
+from lexicon.sentence_ends import ends_sentence
 
 _CONTEXT_BEFORE, _CONTEXT_AFTER = 24, 40  # characters by which `ends_sentence` decides
 # digits in groups of three with spaces between are one number: 12 000 zł
@@ -15,12 +16,8 @@ _UNSPACED = frozenset({"cmn", "yue", "hak"})
 _CHARACTER = r"[\u3400-\u9fff\uf900-\ufaff\U00020000-\U0003ffff]"
 _CHARACTERS = re.compile(rf"{_CHARACTER}|(?:(?!{_CHARACTER}).)+")
 _SPOKEN_SIGNS = frozenset("%‰&@#§")  # punctuation of Unicode with a name that is spoken
-_MARK_OF_SIGN = {
-    **{mark: mark for mark in MARKS}, "…": ".", "—": ",", "–": ",", "(": ",", ")": ",",
-    "。": ".", "｡": ".", "।": ".", "॥": ".", "۔": ".", "，": ",", "、": ",", "،": ",", "؛": ";", "；": ";", "：": ":",
-    "？": "?", "؟": "?", "！": "!",
-}  # fmt: skip
-_STRENGTH = " ,;:.!?"  # from none
+_MARK_OF_SIGN = {**MARK_OF_SIGN, "(": ",", ")": ","}
+_STRENGTH = "".join(PAUSES_S)
 
 
 @dataclass(frozen=True, slots=True)

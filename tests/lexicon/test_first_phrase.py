@@ -3,6 +3,7 @@
 import pytest
 
 from lexicon.chunks import split_phrase
+from lexicon.pauses import PAUSES_S
 from lexicon.sentence_length import FIRST_PIECE_CHARACTERS
 from lexicon.sentences import split_sentences
 from lexicon.text_marks import parse_marks
@@ -38,7 +39,7 @@ def test_both_parts_of_a_sentence_are_phrases_of_their_own() -> None:
 def test_the_first_sentence_only_is_divided() -> None:
     long = f"We came home and nobody knew that it was late in the evening because {HOUSE}."
     parts = list(split_sentences(parse_marks(f"{long} {long}"), "en-us"))
-    assert [part.is_cut for part in parts] == [True, False, False]
+    assert [part.pause_s for part in parts] == [PAUSES_S[","], PAUSES_S["."], None]
     assert " ".join(part.utterances[0].source for part in parts) == f"{long} {long}"
     assert len(parts[0].utterances[0].source) <= FIRST_PIECE_CHARACTERS
     assert parts[0].utterances[0].text.endswith(",")  # so that the voice does not end a sentence there
@@ -47,4 +48,4 @@ def test_the_first_sentence_only_is_divided() -> None:
 
 def test_a_first_sentence_within_the_limit_stays_whole() -> None:
     (only,) = split_sentences(parse_marks("x" * (FIRST_PIECE_CHARACTERS - 1) + "."), "en-us")
-    assert not only.is_cut
+    assert only.pause_s is None

@@ -58,7 +58,7 @@ def test_a_word_keeps_what_was_written_and_its_mark() -> None:
     assert [(w.text, w.source, w.mark) for w in spoken.words] == [
         ("Pay", "Pay", ""), ("five", "$5", ""), ("dollars", "$5", ","), ("now", "now", "!"),
     ]  # fmt: skip
-    assert [w.pause_s for w in spoken.words] == [0.0, 0.0, 0.2, 0.5]
+    assert [w.pause_s for w in spoken.words] == [0.0, 0.0, 0.25, 0.5]
 
 
 def test_the_user_wins() -> None:

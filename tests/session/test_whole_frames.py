@@ -11,9 +11,9 @@ from tests.tones import LetterVoice
 from tts2face.gestures.elements import Nod
 from tts2face.gestures.timeline import Timeline
 from tts2face.request import Idle, Listening, Request
+from tts2face.session.joining import END_S
 from tts2face.session.prepared import prepare
 from tts2face.session.speech_stream import Piece, SpeechModels, measure_speech, spoken_pieces
-from tts2face.session.whole_frames import TAIL_S
 from tts2face.sound.voice import SpeechInput
 from tts2face.types import Speech, exact_rate, first_sample
 
@@ -98,7 +98,7 @@ def test_a_sentence_ends_in_silence() -> None:
     *others, last = pieces_of(TEXTS[1], 120.0, AbruptVoice())
     assert others
     assert last.speech.phones.phones[-1] == SILENCE
-    assert float(np.diff(last.speech.phones.edges)[-1]) == pytest.approx(TAIL_S, abs=0.001)
+    assert float(np.diff(last.speech.phones.edges)[-1]) == pytest.approx(END_S, abs=0.001)
 
 
 def test_what_is_left_before_silent_sentences_is_kept() -> None:

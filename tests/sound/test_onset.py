@@ -8,7 +8,7 @@ import tts2face
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tests.tones import LEAD_S, RATE_HZ, LetterVoice
 from tts2face.session.corrections import SentenceEdges
-from tts2face.session.joining import lead_in
+from tts2face.session.joining import END_S, lead_in
 from tts2face.sound import voice_pool
 from tts2face.sound.pauses import ONSET_WINDOW_S, speech_onset
 from tts2face.types import Speech, Waveform
@@ -83,10 +83,21 @@ def fake(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(voice_pool, "load_voice", lambda *_: LetterVoice())
 
 
-def test_only_the_first_sentence_of_a_clip_loses_the_silence_of_its_voice(fake: None) -> None:
-    first, second = tts2face.Session().stream_speech("Hello. Bob.", fps=10)
-    assert first.speech.phones.edges[1] == pytest.approx(0.1)
-    assert second.speech.phones.edges[1] == pytest.approx(LEAD_S)
+@pytest.mark.parametrize(
+    ("text", "pause"),
+    [("Hello. Bob.", 0.5), ("Hello.\n\nBob.", 0.8), ("Hello... Bob.", 0.45), ("Hello\nBob.", 0.5)],
+)
+@pytest.mark.parametrize("rate", [1.0, 1.25])
+def test_a_sentence_begins_behind_the_pause_of_the_one_before(fake: None, text: str, pause: float, rate: float) -> None:
+    first, second = tts2face.Session().stream_speech(text, fps=10, rate=rate, lead=0.3)
+    assert first.speech.phones.edges[1] == pytest.approx(0.3)
+    silence = first.speech.phones.end - first.speech.phones.edges[-2] + second.speech.phones.edges[1]
+    assert silence == pytest.approx(pause / rate)
+
+
+def test_a_text_ends_with_little_silence(fake: None) -> None:
+    (only,) = tts2face.Session().stream_speech("Hello Bob", fps=10)
+    assert only.speech.phones.end - only.speech.phones.edges[-2] == pytest.approx(END_S)
 
 
 def test_live_speech_begins_with_the_lead_unless_it_goes_on(fake: None) -> None:

@@ -17,7 +17,10 @@ from lexicon.written_words import written_words
 from tts2face.sound.pauses import speech_onset
 from tts2face.types import Speech, Waveform, concatenate_speech, first_sample
 
-CUT_SILENCE_S = 0.05  # after a phrase within a sentence; with the silence before the next one a pause as at a comma
+CUT_SILENCE_S = 0.05  # around words that are cut out of a sentence
+JOIN_LEAD_S = 0.1  # of the silence between two sentences, in which the lips open for the second one
+LEAST_TAIL_S = 0.05  # of silence at the end of a sentence: a frame from 20 a second on, so that no sound is cut
+END_S = 0.3  # of silence at the end of a text, in which the lips close
 AUDIBLE_SHARE = 0.01  # of the largest amplitude
 SAME_EDGE_S = 1e-4  # within which two times are the same edge of a phone; phones last 5 ms or more
 FADE_S = 0.005  # linear fade at each cut, which avoids clicks
@@ -125,12 +128,12 @@ def word_bounds(speech: Speech, start: float, end: float) -> tuple[float, float]
     return max(first - before, 0.0), min(float(edges[voiced[-1] + 1]) + CUT_SILENCE_S, end)
 
 
-def trim_end(speech: Speech) -> Speech:
-    """Speech with at most `CUT_SILENCE_S` of silence after its last audible sample, whatever its phones."""
+def end_after(speech: Speech, seconds: float) -> Speech:
+    """Speech with so much silence after its last audible sample, whatever its phones; silence stays as it is."""
     sound = speech.waveform
     end = last_audible(sound)
-    end = end + round(CUT_SILENCE_S * sound.rate) if end else len(sound.samples)
-    return _part(speech, 0, min(end, len(sound.samples)))
+    end = end + round(seconds * sound.rate) if end else len(sound.samples)
+    return _part(speech, 0, end) if end < len(sound.samples) else with_length(speech, end)
 
 
 def last_audible(sound: Waveform) -> int:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
+from lexicon.pauses import pause_behind
 from tts2face.gestures.elements import ListeningSpan
 from tts2face.gestures.listening import LASTS_S, responses
 from tts2face.gestures.timeline import Timeline
@@ -23,6 +24,7 @@ from tts2face.lips.performer import PerformerRetargeter, build_performer_retarge
 from tts2face.models.face import Face
 from tts2face.models.talker import speech_channels
 from tts2face.request import Idle, Listening, Request, Spoken
+from tts2face.session.joining import END_S, JOIN_LEAD_S
 from tts2face.session.prepared import prepare
 from tts2face.session.recording import select_audio_map
 from tts2face.session.shared_models import SessionModels
@@ -255,7 +257,7 @@ class LiveSpeech:
         self._silent = replace(request, source=Idle(UNUSED_IDLE_S), dictionary=None)
         self._layer = models.gesture_layer(prepare(self._silent))
         self._n_frames = 0
-        self._is_speaking = False
+        self._pause_s: float | None = None  # behind the sentence before, while the face speaks
         self._has_listened = False
         self._rate = exact_rate(request.fps)
         self._cues: list[float] = []  # seconds of the clip at which the face responds
@@ -279,9 +281,10 @@ class LiveSpeech:
         spoken = replace(self._spoken, text=text)
         spoken = after_listening(spoken) if self._has_listened else spoken
         self._has_listened = False
-        spoken = replace(spoken, lead=None) if self._is_speaking else spoken
+        if self._pause_s is not None:
+            spoken = replace(spoken, lead=max(self._pause_s / spoken.rate - END_S, JOIN_LEAD_S))
         yield from self._append(replace(self._request, source=spoken))
-        self._is_speaking = True
+        self._pause_s = pause_behind(text)
 
     def idle(self, seconds: float) -> Iterator[Piece]:
         """Append silence."""
@@ -307,7 +310,7 @@ class LiveSpeech:
 
     def rest(self) -> None:
         """The next text begins with the ``lead`` of the request, without a pause after the sentence before it."""
-        self._is_speaking = False
+        self._pause_s = None
 
     def _append(self, request: Request, listening: Timeline | None = None) -> Iterator[Piece]:
         prepared = prepare(request)

@@ -12,7 +12,7 @@ import numpy as np
 
 from lexicon.errors import InputError, SilentTextError
 from lexicon.marked_text import MAX_PAUSE_S, Mark, MarkedText, NameMark, NodMark, StyleRun
-from lexicon.pronounce import PAUSES_S
+from lexicon.pauses import PAUSES_S, last_mark
 from lexicon.sentence_length import n_letters
 from lexicon.sentences import Phrase, Sentence, index_by_letters
 from lexicon.sequence import PhoneSequence, WordSpan
@@ -22,13 +22,16 @@ from tts2face.models.palette import FEATURES, PLAIN, Delivery
 from tts2face.numeric.arrays import FloatArray
 from tts2face.request import Request, Spoken
 from tts2face.session.joining import (
+    END_S,
+    JOIN_LEAD_S,
+    LEAST_TAIL_S,
     SentenceTimes,
     WordTimes,
+    end_after,
     join_utterances,
     lead_in,
     resampled_speech,
     silent_speech,
-    trim_end,
 )
 from tts2face.session.prepared import innermost_styles
 from tts2face.sound.delivery import sound_with, speak_with
@@ -153,7 +156,7 @@ def speak_sentence(
     voice
         Voice of the request.
     request
-        Options of the clip; its ``lead`` is None for a sentence after another one, whose pause is that of the voice.
+        Options of the clip; its ``lead`` is `JOIN_LEAD_S` for a sentence after another one.
     voices
         Returns the voice of a name and a language, for spans in another voice or language; their sound is resampled to
         the sample rate of `voice`.
@@ -163,8 +166,6 @@ def speak_sentence(
     text = text_of(request)
     parts: list[Phrase] = []
     spoken: list[Speech] = []
-    word_times: list[WordTimes] = []
-    gains: list[FloatArray] = []
     volumes: list[float] = []  # of the sound; motion follows the voice's own loudness
     for part in sentence.utterances:
         speaker = speaker_of(part, voice, request, voices)
@@ -180,14 +181,21 @@ def speak_sentence(
                 raise
             continue
         parts.append(part)
-        speech = _trimmed(resampled_speech(speech, voice.sample_rate), sentence, part, request)
-        language = part.language or request.language
-        times_of_part = WordTimes(part.source, speech.phones, speech.words, language=language, first=part.first)
-        spoken.append(speech)
-        word_times.append(times_of_part)
-        gains.append(_gain(speech.waveform, sentence.runs, part, times_of_part))
+        spoken.append(resampled_speech(speech, voice.sample_rate))
         volumes.append(text.volume * delivery.volume)
+    spoken[0] = _led(spoken[0], request)
+    spoken[-1] = _ended(spoken[-1], sentence, rate)
     sentence = replace(sentence, utterances=tuple(parts))
+    word_times = [
+        WordTimes(
+            part.source, speech.phones, speech.words, language=part.language or request.language, first=part.first
+        )
+        for part, speech in zip(parts, spoken, strict=True)
+    ]
+    gains = [
+        _gain(speech.waveform, sentence.runs, part, times)
+        for part, speech, times in zip(parts, spoken, word_times, strict=True)
+    ]
     scaled = [_scale_speech(speech, text.volume, gain) for speech, gain in zip(spoken, gains, strict=True)]
     speech, starts = _join_sentence(scaled, sentence, voice.sample_rate)
     yield_turn()
@@ -217,20 +225,22 @@ def sentence_sound(
     rate = text.rate * part.rate * delivery.rate
     language = part.language or request.language
     sound = sound_with(speaker, phrase_content(part), Prosody(rate), request.seed, language=language)
-    whole = _trimmed(resampled_speech(Speech.without_phones(sound), voice.sample_rate), sentence, part, request)
+    whole = _led(resampled_speech(Speech.without_phones(sound), voice.sample_rate), request)
+    whole = _ended(whole, sentence, rate)
     levelled = level_speech([whole], [text.volume * delivery.volume * np.ones(1)])
     return _join_sentence(levelled, sentence, voice.sample_rate)[0].waveform
 
 
-def _trimmed(speech: Speech, sentence: Sentence, part: Phrase, request: Request) -> Speech:
-    """Speech of a phrase with the request's silence before the first one of a sentence.
-
-    Little silence follows the last one if the written sentence continues after it.
-    """
+def _led(speech: Speech, request: Request) -> Speech:
+    """Speech with the request's silence before it."""
     lead = text_of(request).lead
-    if lead is not None and part is sentence.utterances[0]:
-        speech = lead_in(speech, lead)
-    return trim_end(speech) if sentence.is_cut and part is sentence.utterances[-1] else speech
+    return speech if lead is None else lead_in(speech, lead)
+
+
+def _ended(speech: Speech, sentence: Sentence, rate: float) -> Speech:
+    """Speech with the silence behind a sentence."""
+    tail = END_S if sentence.pause_s is None else sentence.pause_s / rate - JOIN_LEAD_S
+    return end_after(speech, max(tail, LEAST_TAIL_S))
 
 
 def phrase_content(part: Phrase) -> SpeechInput:
@@ -344,7 +354,7 @@ def _pause_after(utterance: Phrase) -> float:
     """Pause in seconds between an utterance and the next one of its sentence."""
     if utterance.pause is not None:
         return max(utterance.pause, MIN_UTTERANCE_GAP_S)
-    return max(PAUSES_S.get(utterance.source[-1:], 0.0), SPEED_CHANGE_PAUSE_S)
+    return max(PAUSES_S[last_mark(utterance.source)] / utterance.rate, SPEED_CHANGE_PAUSE_S)
 
 
 def _gain(sound: Waveform, runs: Sequence[StyleRun], part: Phrase, times: WordTimes) -> FloatArray:

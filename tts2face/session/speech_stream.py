@@ -18,7 +18,7 @@ from lexicon.sentences import Sentence, text_prefix
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.gestures.timeline import Timeline
 from tts2face.request import CONVERSATION, TURN_S, Idle, Listening, Recorded, Spoken
-from tts2face.session.joining import Excerpt, excerpt_of_speech, shift_start, silent_speech, word_bounds
+from tts2face.session.joining import JOIN_LEAD_S, Excerpt, excerpt_of_speech, shift_start, silent_speech, word_bounds
 from tts2face.session.prepared import IDLE_STEPS, PreparedRequest
 from tts2face.session.speech import (
     NO_DELIVERIES,
@@ -35,7 +35,7 @@ from tts2face.session.speech import (
     text_of,
     without_long_silence,
 )
-from tts2face.session.whole_frames import FramedPart, WholeFrames, end_in_silence
+from tts2face.session.whole_frames import FramedPart, WholeFrames
 from tts2face.sound.pauses import speech_onset
 from tts2face.sound.voice_pool import require_installed
 from tts2face.storage.memory import NO_MEMORY, ResultMemory
@@ -279,11 +279,11 @@ def speak_sentences(
     request = replace(request, source=first)
     unspoken = cache(lambda: replace(request, source=replace(first, text=""), **NOT_SPOKEN))
     spoken_with = cache(lambda: (unspoken(), frozenset(prepared.dictionary.items())))
-    following = cache(lambda: replace(request, source=replace(first, lead=None)))  # which keep the voice's pause
+    following = cache(lambda: replace(request, source=replace(first, lead=JOIN_LEAD_S)))
 
     def speak(sentence: Sentence) -> SpokenSentence:
         given = following() if said else request
-        lead = None if said else first.lead
+        lead = JOIN_LEAD_S if said else first.lead
         if not has_phones:
             sound = sentence_sound(voice, sentence, given, voices, deliveries=models.deliveries)
             return SpokenSentence(Speech.without_phones(sound), Timeline(), (), sound)
@@ -296,10 +296,10 @@ def speak_sentences(
     shortened = map(without_long_silence, prepared.sentences())
     for (sentence, before_s, after_s), found, is_last in _spoken(shortened, speak):
         text = " ".join(phrase.source for phrase in sentence.utterances)
-        spoken = end_in_silence(found)
+        spoken = found
         if has_phones:
-            phones = prepared.corrected(spoken.speech.phones, text, said[text])
-            spoken = replace(spoken, speech=replace(spoken.speech, phones=phones))
+            phones = prepared.corrected(found.speech.phones, text, said[text])
+            spoken = replace(found, speech=replace(found.speech, phones=phones))
         said[text] += 1
         before = long_silence(before_s, Timeline(), voice.sample_rate)
         after = long_silence(after_s, spoken.timeline, voice.sample_rate)

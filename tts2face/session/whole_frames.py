@@ -1,7 +1,7 @@
 """Spoken parts of a clip in whole frames: their sound goes on as it is spoken, and frames follow it.
 
 A part is cut at its last whole frame, and what is behind it begins the next part. So the sound of a text is the same at
-any frame rate at which a frame is no longer than the silence at the end of a sentence (`TAIL_S`).
+any frame rate at which a frame is no longer than the silence at the end of a sentence (`joining.LEAST_TAIL_S`).
 """
 
 from dataclasses import replace
@@ -16,8 +16,6 @@ from tts2face.gestures.timeline import Timeline
 from tts2face.session.joining import last_audible, with_length
 from tts2face.session.speech import SpokenSentence
 from tts2face.types import Speech, Waveform, concatenate_speech, first_sample, frame_count
-
-TAIL_S = 0.05  # of silence at least at the end of a sentence: a frame from 20 a second on, so that no sound is cut
 
 
 class FramedPart(NamedTuple):
@@ -95,12 +93,6 @@ class WholeFrames:
         while self._n_samples(n_frames, rate) > n_samples:
             n_frames -= 1
         return n_frames
-
-
-def end_in_silence(spoken: SpokenSentence) -> SpokenSentence:
-    """A part with `TAIL_S` of silence at least at its end."""
-    n_samples = last_audible(spoken.sound) + round(TAIL_S * spoken.sound.rate)
-    return spoken if n_samples <= len(spoken.sound.samples) else _with_length(spoken, n_samples)
 
 
 def _after(spoken: SpokenSentence, n_samples: int) -> SpokenSentence:

@@ -24,6 +24,7 @@ from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word
 from lexicon.ipa import IpaPhone
 from lexicon.languages import language_code
 from lexicon.normalize import spoken_form
+from lexicon.pauses import SIMPLE_MARKS
 from lexicon.phones import PHONES, nearest_phones, phone_distance
 from lexicon.pronounce import Word
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan, enforce_increasing
@@ -283,7 +284,7 @@ def _short_words(word: Word) -> list[SpokenWord]:
     segments = word_segments(word)
     starts = range(0, len(segments), MAX_WORD_PHONES)
     parts = [SpokenWord(word.text, segments[start : start + MAX_WORD_PHONES]) for start in starts]
-    return [*parts[:-1], replace(parts[-1], after=word.mark)]
+    return [*parts[:-1], replace(parts[-1], after=SIMPLE_MARKS.get(word.mark, word.mark))]
 
 
 def _without_brackets(text: str) -> str:

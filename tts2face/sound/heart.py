@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import import_of_extra
+from lexicon.pauses import PAUSES_S
 from lexicon.phones import PHONES, nearest_phones
-from lexicon.pronounce import PAUSES_S, Word
+from lexicon.pronounce import Word
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.numeric.telemetry import disable_telemetry
 from tts2face.sound.transforms import import_hibari

@@ -19,6 +19,7 @@ from lexicon.ipa import IpaPhone
 from lexicon.languages import language_code
 from lexicon.nominal_durations import NOMINAL_S
 from lexicon.normalize import spoken_form
+from lexicon.pauses import SIMPLE_MARKS
 from lexicon.phones import PHONES, nearest_phones
 from lexicon.pronounce import Word
 from lexicon.sequence import PhoneSequence, WordSpan
@@ -265,7 +266,7 @@ class PiperVoice:
     def _sentence_letters(self, words: Sequence[Word]) -> list[str]:
         """Letters of a sentence; phones that the voice does not have are replaced by the nearest ones."""
         spoken = (english_letters(word_segments(word), self._phones, self._network.letters) for word in words)
-        marks = ("".join(mark for mark in word.mark if mark in self._network.letters) for word in words)
+        marks = (self._known_marks(word.mark) for word in words)
         return list(" ".join(letters + mark for letters, mark in zip(spoken, marks, strict=True)))
 
     def _insert_own_words(self, text: str) -> str:
@@ -284,8 +285,12 @@ class PiperVoice:
             + "".join(map(phone_letters, nearest_phones(segment.phone, self._phones)))
             for segment in word.segments
         )
-        marks = "".join(mark for mark in word.after if mark in self._network.letters)
-        return f"[[{written}{marks}]]"  # Piper omits punctuation that follows the brackets
+        # Piper omits punctuation that follows the brackets
+        return f"[[{written}{self._known_marks(word.after)}]]"
+
+    def _known_marks(self, marks: str) -> str:
+        simple = (SIMPLE_MARKS.get(mark, mark) for mark in marks)
+        return "".join(mark for mark in simple if mark in self._network.letters)
 
 
 def nominal_phones_in(words: Sequence[AlignedWord], seconds: float) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
