@@ -17,7 +17,7 @@ _CHARACTER = r"[\u3400-\u9fff\uf900-\ufaff\U00020000-\U0003ffff]"
 _CHARACTERS = re.compile(rf"{_CHARACTER}|(?:(?!{_CHARACTER}).)+")
 _SPOKEN_SIGNS = frozenset("%‰&@#§")  # punctuation of Unicode with a name that is spoken
 _MARK_OF_SIGN = {**MARK_OF_SIGN, "(": ",", ")": ","}
-_STRENGTH = "".join(PAUSES_S)
+_STRENGTH = " " + "".join(PAUSES_S)  # from none
 
 
 @dataclass(frozen=True, slots=True)

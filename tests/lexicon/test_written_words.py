@@ -11,7 +11,7 @@ from lexicon.written_words import written_words
     ("language", "text", "words"),
     [
         ("de", "Der Weg ist 3,5 km lang, 1.000 € teuer.", "Der|Weg|ist|3,5|km|lang,|1.000|€|teuer."),
-        ("de", "Das heißt (d. h.) -5 °C — oder?", "Das|heißt,|d|h.|-5|°C,|oder?"),
+        ("de", "Das heißt (d. h.) -5 °C — oder?", "Das|heißt,|d|h.|-5|°C—|oder?"),
         ("fr-fr", "« L'été », dit-il à 14h30 : 12 000 € !", "L'été,|dit-il|à|14h30:|12 000|€!"),
         ("es", "¿Cuesta $1.500,50 o 20 %?", "Cuesta|$1.500,50|o|20|%?"),
         ("it", "L'anno 1881: 82,5 kg.", "L'anno|1881:|82,5|kg."),
