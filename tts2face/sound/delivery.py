@@ -3,6 +3,7 @@
 from typing import Protocol, runtime_checkable
 
 from tts2face.sound.prosody import PLAIN_PROSODY, Prosody
+from tts2face.sound.spacing import has_pauses, with_pauses
 from tts2face.sound.voice import SpeechInput, Voice
 from tts2face.types import Speech, Waveform
 
@@ -37,7 +38,7 @@ def speak_with(
     """
     if isinstance(voice, DeliveringVoice):
         return voice.deliver(content, prosody, seed)
-    return voice.speak(content, rate=prosody.rate, seed=seed)
+    return with_pauses(voice.speak(content, rate=prosody.rate, seed=seed), content, prosody.rate, language)
 
 
 def sound_with(
@@ -46,4 +47,6 @@ def sound_with(
     """Sound of `speak_with` alone, which some voices compute sooner; arguments and errors as there."""
     if isinstance(voice, DeliveringVoice):
         return voice.deliver_sound(content, prosody, seed)
+    if has_pauses(content):  # edges of words tell where they are
+        return speak_with(voice, content, prosody, seed, language=language).waveform
     return voice.sound(content, rate=prosody.rate, seed=seed)

@@ -1,0 +1,125 @@
+"""Silence at the punctuation within a sentence, by one table for voices that pause as they were trained to."""
+
+from collections.abc import Sequence
+from difflib import SequenceMatcher
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.pauses import MARKS, PAUSES_S
+from lexicon.sequence import SILENCE, PhoneSequence, enforce_increasing
+from lexicon.written_words import written_words
+from tts2face.numeric.arrays import FloatArray, true_runs
+from tts2face.sound.pauses import sound_windows
+from tts2face.sound.voice import SpeechInput, pronounce_content
+from tts2face.types import Speech, Waveform
+
+WINDOW_S = 0.005
+QUIET_DB = -40.0  # of the loudest window: what is below is not heard as speech
+REACH_S = 0.08  # around a silence between two words, in which the quiet part of the sound lies
+LEAST_CHANGE_S = 0.02  # edges and windows are not more exact
+FADE_S = 0.005  # at each cut, which avoids clicks
+
+
+class _Cut(NamedTuple):
+    """A place within a silence in seconds, and the seconds that are added there; removed from there on if negative."""
+
+    place: float
+    change: float
+
+
+def has_pauses(content: SpeechInput) -> bool:
+    """Whether a content may have punctuation before its last word."""
+    words = content.split() if isinstance(content, str) else [word.text + word.after for word in content]
+    return any(MARKS.intersection(word) for word in words[:-1])
+
+
+def with_pauses(speech: Speech, content: SpeechInput, rate: float, language: str) -> Speech:
+    """Speech of a content with the pauses of the table at its marks; words whose mark is unknown keep theirs.
+
+    Edges behind a pause move with the sound.
+
+    Parameters
+    ----------
+    rate
+        By which pauses are shorter.
+    language
+        Code of the content.
+    """
+    phones, edges = speech.phones.phones, speech.phones.edges
+    levels = _levels(speech.waveform)
+    cuts: list[_Cut] = []
+    for (word, following), mark in zip(pairwise(speech.words), _marks(speech, content, language), strict=False):
+        if not mark or SILENCE not in phones[word.last : following.first]:
+            continue
+        silence = float(edges[word.last]), float(edges[following.first])
+        begin, end = _quiet_span(levels, silence)
+        change = PAUSES_S[mark] / rate - (end - begin)
+        if abs(change) >= LEAST_CHANGE_S:
+            middle = min(max((begin + end) / 2, silence[0] + WINDOW_S), silence[1])
+            cuts.append(_Cut(middle if change > 0.0 else min(max(middle + change / 2, begin), end + change), change))
+    return _respaced(speech, cuts) if cuts else speech
+
+
+def _marks(speech: Speech, content: SpeechInput, language: str) -> list[str]:
+    """Mark behind each word of the speech but the last, as far as the words of the content are found again."""
+    written = content if isinstance(content, str) else " ".join(word.text + word.after for word in content)
+    if language.partition("-")[0] == "en":
+        known = [(word.text, word.mark) for word in pronounce_content(content, language, {})]
+    else:
+        known = [(word.text, word.mark) for word in written_words(written, language)]
+    spoken = [word.text.lower() for word in speech.words]
+    if len(known) == len(spoken):
+        return [mark for _, mark in known[:-1]]
+    marks = [""] * len(spoken)
+    texts = [text.lower() for text, _ in known]
+    for at, block, size in SequenceMatcher(None, spoken, texts, autojunk=False).get_matching_blocks():
+        marks[at : at + size] = [mark for _, mark in known[block : block + size]]
+    return marks[:-1]
+
+
+def _levels(sound: Waveform) -> FloatArray:
+    """Levels (T,) of windows in dB, relative to the loudest one."""
+    powers = np.square(sound_windows(sound, WINDOW_S), dtype=np.float64).mean(axis=1)
+    levels: FloatArray = 10.0 * np.log10(np.maximum(powers, 1e-12) / max(powers.max(initial=0.0), 1e-12))
+    return levels
+
+
+def _quiet_span(levels: FloatArray, silence: tuple[float, float]) -> tuple[float, float]:
+    """Begin and end of the longest quiet part around a silence between two words; the silence where there is none."""
+    first = max(round((silence[0] - REACH_S) / WINDOW_S), 0)
+    runs = true_runs(levels[first : round((silence[1] + REACH_S) / WINDOW_S)] < QUIET_DB) + first
+    longest = max(runs.tolist(), key=lambda run: run[1] - run[0], default=None)
+    return silence if longest is None else (longest[0] * WINDOW_S, longest[1] * WINDOW_S)
+
+
+def _respaced(speech: Speech, cuts: Sequence[_Cut]) -> Speech:
+    """Speech with silence added and removed at places in the order of time, faded there."""
+    rate, samples = speech.waveform.rate, speech.waveform.samples
+    edges = speech.phones.edges.copy()
+    parts: list[NDArray[np.float32]] = []
+    start = 0
+    for place, change in cuts:
+        at = round(place * rate)
+        parts += [_faded(samples[start:at], rate, starts=start > 0, ends=True)]
+        if change > 0.0:
+            parts.append(np.zeros(round(change * rate), np.float32))
+        start = at + round(max(-change, 0.0) * rate)
+        moved = change if change > 0.0 else place - np.clip(speech.phones.edges, place, place - change)
+        edges += np.where(speech.phones.edges >= place, moved, 0.0)
+    parts.append(_faded(samples[start:], rate, starts=True, ends=False))
+    sound = Waveform(np.concatenate(parts), rate)
+    edges[-1] = sound.duration
+    return Speech(sound, PhoneSequence(speech.phones.phones, enforce_increasing(edges)), speech.words)
+
+
+def _faded(samples: NDArray[np.float32], rate: int, *, starts: bool, ends: bool) -> NDArray[np.float32]:
+    ramp = np.linspace(0.0, 1.0, min(round(FADE_S * rate), len(samples) // 2), endpoint=False, dtype=np.float32)
+    faded = samples.copy()
+    if starts:
+        faded[: len(ramp)] *= ramp
+    if ends:
+        faded[len(samples) - len(ramp) :] *= ramp[::-1]
+    return faded
