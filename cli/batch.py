@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from cli.batch_plan import place_of, print_plan
-from cli.flags import Face, Hair, HairColor, add_option_flags, options_from_flags, switch, whole_number
+from cli.flags import Face, Hair, HairColor, Person, add_option_flags, options_from_flags, switch, whole_number
 from cli.process import WhatRemains, write_message
 from cli.progress import progress_bar
 from lexicon.errors import DataError, InputError
@@ -54,6 +54,7 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
     hair: Hair = None,
     hair_color: HairColor = None,
+    person: Person = None,
     palette: Annotated[str, Parameter(help="Palette of gesture styles.")] = "starter",
     audio: Annotated[
         Path | None,
@@ -103,7 +104,7 @@ def batch(  # noqa: PLR0913 - one parameter a flag
         options_from_flags(BatchOptions, options, audio=audio, exports=tuple(export or ())),
         request=options_from_flags(Request, options),
         picture=options_from_flags(Picture, options),
-        models=Models(talker, face or "", identity, palette, hair, hair_color),
+        models=Models(talker, face or "", identity, palette, hair, hair_color, person),
         cast=read_cast(cast) if cast is not None else Cast(),
         lines=lines,
     )

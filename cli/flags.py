@@ -34,6 +34,13 @@ Face = Annotated[
 ]
 Hair = Annotated[str | None, Parameter(help="Haircut: one of `tts2face haircuts` for the face, or a .hair file.")]
 HairColor = Annotated[str | None, Parameter(help="Hair colour: one of `tts2face hair-colors`, or #rrggbb.")]
+Person = Annotated[
+    str | None,
+    Parameter(
+        help="Sex and age of the person shown, to whom the voice is fitted: woman, man 70, girl; by default what is "
+        "known of the face."
+    ),
+]
 Exports = Annotated[
     list[str] | None,
     Parameter(

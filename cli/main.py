@@ -8,7 +8,18 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
-from cli.flags import Exports, Face, Hair, HairColor, Out, add_option_flags, check_options, options_from_flags, switch
+from cli.flags import (
+    Exports,
+    Face,
+    Hair,
+    HairColor,
+    Out,
+    Person,
+    add_option_flags,
+    check_options,
+    options_from_flags,
+    switch,
+)
 from cli.lists import LISTS
 from cli.photo import (
     Consent,
@@ -138,6 +149,7 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
     hair: Hair = None,
     hair_color: HairColor = None,
+    person: Person = None,
     photo: Photo = None,
     consent: Consent = None,
     fit: Fit = None,
@@ -183,7 +195,7 @@ def speak(  # noqa: PLR0913 - one parameter a flag
             note_transcript_beside(audio)
     speak_options = SpeakOptions(
         out,
-        Models(talker, face or "", identity, palette, hair, hair_color),
+        Models(talker, face or "", identity, palette, hair, hair_color, person),
         explain,
         view,
         quiet,

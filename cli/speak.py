@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from cli.process import return_large_blocks, write_message
 from cli.progress import compilation_messages, progress_bar
 from lexicon.errors import InputError
+from tts2face.models.person import seed_of
 from tts2face.picture.options import Picture
 from tts2face.processes.collection import resume_collection
 from tts2face.request import OWN_FACE, FromPhones, Recorded, Request, Spoken
@@ -77,7 +78,11 @@ def _make(prepared: "PreparedRequest", picture: Picture, options: SpeakOptions) 
     for note in () if options.quiet else prepared.notes:
         write_message(f"tts2face: note: {note}")
     voices = VoicePool()
-    prepared.preload_voice(voices)  # beside the imports of the session, and loading of talker and face
+    person = options.models.shown_person()
+    fitting = prepared.fitting(person)
+    if fitting is not None and fitting.sentence and not options.quiet:
+        write_message(f"tts2face: note: {fitting.sentence}")
+    prepared.preload_voice(voices, person)  # beside the imports of the session, and loading of talker and face
     if not _write_speech(prepared, picture, options, voices):
         _write_clip(prepared, picture, options, voices)
 
@@ -99,7 +104,8 @@ def _write_clip(prepared: "PreparedRequest", picture: Picture, options: SpeakOpt
             collect(piece)
             _warn_mismatches(piece.mismatches)
     if options.explain is not None:
-        _write_explanation(tuple(explanations), options.explain)
+        voice = prepared.fitting(options.models.shown_person())
+        _write_explanation(tuple(explanations), options.explain, "" if voice is None else voice.described)
     if options.view:
         from tts2face.picture.window import show_clip
 
@@ -186,7 +192,8 @@ def _write_speech(prepared: "PreparedRequest", picture: Picture, options: SpeakO
     outputs = plan_outputs(None, options.exports, input_paths(prepared.request, picture))
     if not is_speech_only(prepared, outputs):
         return False
-    _report_writing(lambda on_progress: write_speech(prepared, outputs, voices, on_progress), options)
+    person, seeded = options.models.shown_person(), prepared.with_seed(seed_of(options.models.description()))
+    _report_writing(lambda on_progress: write_speech(seeded, outputs, voices, on_progress, person), options)
     return True
 
 
@@ -246,9 +253,13 @@ def _open_session(options: SpeakOptions, voices: "VoicePool") -> "Session":
     return session
 
 
-def _write_explanation(explanations: "tuple[PhoneExplanation, ...]", path: Path) -> None:
+def _write_explanation(explanations: "tuple[PhoneExplanation, ...]", path: Path, voice: str) -> None:
     from tts2face.lips.explanation import explanation_json, explanation_text
 
     is_json = path.suffix == ".json"
-    text = dumps(explanation_json(explanations), ensure_ascii=False) if is_json else explanation_text(explanations)
+    if is_json:
+        said = {"voice": voice} if voice else {}
+        text = dumps([phone | said for phone in explanation_json(explanations)], ensure_ascii=False)
+    else:
+        text = (f"voice: {voice}\n" if voice else "") + explanation_text(explanations)
     write_atomically(path, text.encode())

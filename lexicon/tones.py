@@ -7,7 +7,7 @@ Contour = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True, slots=True)
 class Tone:
-    """What a word adds to its sentence; the level is that of the runs of a text (`lexicon.marked_text`).
+    """Addition of a word to its sentence; the level is that of the runs of a text (`lexicon.marked_text`).
 
     Parameters
     ----------

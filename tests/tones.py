@@ -7,6 +7,7 @@ import numpy as np
 
 from lexicon.languages import language_code
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from tts2face.sound.prosody import PLAIN_PROSODY, Prosody
 from tts2face.sound.voice import (
     PronunciationMap,
     SpeechInput,
@@ -15,7 +16,7 @@ from tts2face.sound.voice import (
     VoiceSetting,
     pronounce_content,
 )
-from tts2face.sound.voice_pool import VoicePool
+from tts2face.sound.voice_pool import VoicePool, default_voice
 from tts2face.types import Speech, Waveform
 
 VOICE = "tones"
@@ -85,11 +86,18 @@ class WorldVoices(VoicePool):
     """Voices of which the default one is that of tones."""
 
     def voice(
-        self, name: str | None, language: str, dictionary: PronunciationMap, *, keeps_utterances: bool = False
+        self,
+        name: str | None,
+        language: str,
+        dictionary: PronunciationMap,
+        *,
+        prosody: Prosody = PLAIN_PROSODY,
+        keeps_utterances: bool = False,
     ) -> Voice:
-        if name is None:
-            return ToneVoice(VoiceSetting(language_code(language), dictionary))
-        return super().voice(name, language, dictionary, keeps_utterances=keeps_utterances)
+        code = language_code(language)
+        if name in (None, default_voice(code)):
+            return ToneVoice(VoiceSetting(code, dictionary))
+        return super().voice(name, language, dictionary, prosody=prosody, keeps_utterances=keeps_utterances)
 
 
 TONES = VoiceInfo("a tone for each phone", ToneVoice, "none", "numpy", "-", "none")

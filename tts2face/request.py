@@ -31,6 +31,7 @@ SYNTHESIS_METHODS = ("exemplar", "theobald2007")
 FIELDS = "fields"
 GESTURES = (FIELDS, "ju2008", "noise", "none")
 CONVERSATION, CAMERA = GAZES = ("conversation", "camera")
+AUTO = "auto"  # the voice that fits the face, as where none is named
 OWN_FACE = "self"  # name of the talker's own face
 DRAWN_FACE, REALISTIC_FACE = "ada", "head"  # the shipped face that is shown by default, and the one with identities
 # Order of flags, of fields over HTTP and of lists in messages.
@@ -59,7 +60,8 @@ class SourceOptions:
         choices=AUDIO_MAP_NAMES,
     )
     voice: str | None = option(
-        None, "Voice: heart or joe (English), espeak or espeak-female (every language), or a Piper voice (x.onnx)."
+        None,
+        "Voice: auto (fits the face), one of `tts2face voices`, a Piper voice (x.onnx), or a server's URL.",
     )
     rate: float = option(1.0, "Speaking rate as a factor, 0.5 to 2.", limits=RATE_LIMITS)
     lead: float | None = option(
@@ -89,6 +91,8 @@ class SourceOptions:
 
     def __post_init__(self) -> None:
         """Refuse values of other types, numbers outside their range, and options that exclude each other."""
+        if self.voice == AUTO:
+            object.__setattr__(self, "voice", None)
         if is_number(self.articulation):
             object.__setattr__(self, "articulation", f"{self.articulation:g}")
         check_fields(self)
@@ -130,6 +134,8 @@ class CheckedOptions:
     def __post_init__(self) -> None:
         """Refuse them by the names and limits of `SourceOptions`."""
         check_fields(self)
+        if self.as_options().get("voice") == AUTO:
+            object.__setattr__(self, "voice", None)
         for name, value in self.as_options().items():
             limits = SOURCE_OPTIONS[name].metadata["limits"]
             if limits is not None and value is not None:
@@ -281,7 +287,7 @@ class Request:
         "Language of the text: a code (en-us, de), a tag (pt-BR, zh-Hans) or a name (German); `tts2face languages` "
         "lists all. Chinese characters in Japanese text need the extra japanese.",
     )
-    seed: int = option(0, "Seed of all random numbers; the same seed gives the same sound and motion.")
+    seed: int | None = option(None, "Seed of all random numbers, for equal sound and motion; default: the face's own.")
     dictionary: Path | None = option(None, "Pronunciation dictionary that takes precedence over the built-in one.")
     synthesis: str = option(
         "exemplar",
@@ -343,7 +349,7 @@ class Request:
         check_option_limits(self)
         if self.synthesis not in SYNTHESIS_METHODS:
             raise InputError(f"there is no synthesis {self.synthesis!r}; choose {' or '.join(SYNTHESIS_METHODS)}")
-        if self.seed < 0:
+        if self.seed is not None and self.seed < 0:
             raise InputError(f"seed must be 0 or more, not {self.seed}")
         if self.gestures not in GESTURES:
             raise InputError(f"gestures must be {', '.join(GESTURES[:-1])} or {GESTURES[-1]}, not {self.gestures!r}")
@@ -364,6 +370,11 @@ class Request:
         """Factor of rounding, spreading and opening; None for the default of the face."""
         given = self.source.articulation
         return None if given is None else parse_articulation(given)
+
+    @property
+    def known_seed(self) -> int:
+        """Seed; 0 until a session sets that of its face."""
+        return self.seed or 0
 
     @property
     def has_gestures(self) -> bool:

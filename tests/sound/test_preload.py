@@ -60,5 +60,5 @@ def test_only_text_loads_a_voice(loading: CountedLoading) -> None:
     prepare(Request(idle=1.0)).preload_voice(voices)
     assert loading.names == []
     prepare(Request(text="Hello.")).preload_voice(voices)
-    voices.voice(None, Request(text="Hello.").language, {})
-    assert loading.names == [None]
+    voices.voice("heart", Request(text="Hello.").language, {})
+    assert loading.names == ["heart"]

@@ -72,7 +72,7 @@ def clips_of_length(
             prepared.request,
             source=Idle(float(n_idle / fps)),
             dictionary=None,
-            seed=prepared.request.seed + done,
+            seed=prepared.request.known_seed + done,
             expression=None,
             timeline=None,
         )

@@ -109,8 +109,8 @@ class GestureLayer:
             palette.require(style)
         face.check_gains(self._requested.gains.factors)
         self.edits = ChannelEdits(self._requested.edits, face)
-        self._body = Body(face.channels, request.seed)
-        self._seed, self._options = request.seed, [getattr(request, name) for name in KEYED]
+        self._body = Body(face.channels, request.known_seed)
+        self._seed, self._options = request.known_seed, [getattr(request, name) for name in KEYED]
         self._has_microsaccades = method.has_microsaccades
         self._thread = ThreadPoolExecutor(1, "gestures")
         # Building the fields takes 0.5 s, in parallel with loading the voice.
@@ -118,7 +118,7 @@ class GestureLayer:
             method.stream,
             fields,
             style=default_style(palette),
-            seed=request.seed,
+            seed=request.known_seed,
             fps=float(prepared.fps),
             seeds=self._requested.seeds,
         )

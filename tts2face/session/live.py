@@ -303,7 +303,7 @@ class LiveSpeech:
         self.rest()
         start = self.seconds
         self._cues = [cue for cue in self._cues if cue > start - LASTS_S] + [start + cue for cue in cues or ()]
-        responding = responses(self._cues, self._request.seed).restrict(start, start + seconds).shift(-start)
+        responding = responses(self._cues, self._request.known_seed).restrict(start, start + seconds).shift(-start)
         listened = Timeline(listens=(ListeningSpan(0.0, seconds, reacts=cues is None),))
         yield from self._append(replace(self._silent, source=Listening(seconds)), responding.merge(listened))
         self._has_listened = True

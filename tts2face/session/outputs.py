@@ -14,11 +14,13 @@ from lexicon.errors import InputError
 from lexicon.marked_text import NameMark
 from tts2face.gestures.timeline import Timeline
 from tts2face.interchange.exports.writer import ExportFile, ExportWriter, mesh_of, plan_exports
+from tts2face.models.person import Person
 from tts2face.processes.threads import Prefetch
 from tts2face.request import Recorded
 from tts2face.session.prepared import HEARING_STEPS, PreparedRequest, marked_styles
 from tts2face.session.speech import MarkTime
 from tts2face.session.speech_stream import Piece, SpeechModels, spoken_pieces
+from tts2face.sound.fitting import fitted_voices
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.storage.output_paths import AnyPath, refuse_overwriting
 from tts2face.types import Clip, Progress, ignore_progress
@@ -241,16 +243,20 @@ def is_speech_only(prepared: PreparedRequest, outputs: OutputFiles) -> bool:
 
 
 def write_speech(
-    prepared: PreparedRequest, outputs: OutputFiles, voices: VoicePool, on_progress: Progress
+    prepared: PreparedRequest,
+    outputs: OutputFiles,
+    voices: VoicePool,
+    on_progress: Progress,
+    person: Person | None = None,
 ) -> WrittenClip:
-    """Write outputs for which `is_speech_only` holds: the same files as those of a session.
+    """Write outputs for which `is_speech_only` holds: the same files as those of a session that shows a person.
 
     Raises
     ------
     InputError, DataError, BackendError
         As `Session.export`.
     """
-    models = SpeechModels(lambda name, language: voices.voice(name, language, prepared.dictionary), voices.yield_turn)
+    models = SpeechModels(fitted_voices(voices, person, prepared.dictionary), voices.yield_turn)
     has_phones = any(not file.format.is_sound for file in outputs.exports)
     has_names = any(isinstance(mark, NameMark) for mark in prepared.text.marks)
     pieces = spoken_pieces(prepared, models, has_phones=has_phones or has_names)

@@ -26,6 +26,7 @@ from tts2face.gestures.listening import CUE_RATE, cue_times, responses
 from tts2face.gestures.timeline import Timeline, parse_expressions, parse_gains, parse_style
 from tts2face.gestures.timeline_file import read_timeline
 from tts2face.lips.options import METHOD_OPTIONS, ExcludedToken, SynthesisOptions
+from tts2face.models.person import Person
 from tts2face.picture.options import Picture
 from tts2face.request import CAMERA, Listening, Recorded, Request, Source, Spoken, option_fields
 from tts2face.session.corrections import SentenceEdges, StaleEdgesError
@@ -34,6 +35,7 @@ from tts2face.storage.output_paths import AnyPath
 from tts2face.types import exact_rate
 
 if TYPE_CHECKING:
+    from tts2face.sound.fitting import Fitting
     from tts2face.sound.voice_pool import VoicePool
 
 HEARING_STEPS, RECORDING_STEPS = 300, 700  # steps of progress of a recording: until its phones are known, and then
@@ -109,11 +111,27 @@ class PreparedRequest:
                 return corrected
         return phones
 
-    def preload_voice(self, voices: "VoicePool") -> None:
-        """Load the voice of the text in a thread; none for a recording or a request without text."""
+    def fitting(self, person: Person | None) -> "Fitting | None":
+        """Voice in which a person speaks the text; None for a recording and a request without text."""
+        from tts2face.sound.fitting import Fitting, fitting_voice
+
         spoken = self.request.spoken
-        if spoken is not None and spoken.text:
-            voices.preload(spoken.voice, self.request.language, self.dictionary)
+        if spoken is None or not spoken.text:
+            return None
+        return Fitting(spoken.voice) if spoken.voice else fitting_voice(person, self.request.language)
+
+    def preload_voice(self, voices: "VoicePool", person: Person | None = None) -> None:
+        """Load the voice of the text in a thread; none for a recording or a request without text."""
+        if (fitting := self.fitting(person)) is not None:
+            voices.preload(fitting.name, self.request.language, self.dictionary)
+
+    def with_seed(self, seed: int) -> "PreparedRequest":
+        """The same with the seed of a face, where the request has none."""
+        if self.request.seed is not None:
+            return self
+        request = replace(self.request, seed=seed)
+        has_partner = isinstance(request.source, Listening) and request.source.partner is not None
+        return replace(self, request=request, listening=listening_timeline(request) if has_partner else self.listening)
 
 
 def prepare(request: Request) -> PreparedRequest:
@@ -316,4 +334,4 @@ def listening_timeline(request: Request) -> Timeline:
         from tts2face.video.media import read_sound
 
         cues = [time for time in cue_times(read_sound(source.partner, CUE_RATE)) if time < source.seconds]
-    return responses(cues, request.seed).merge(Timeline(listens=(span,)))
+    return responses(cues, request.known_seed).merge(Timeline(listens=(span,)))

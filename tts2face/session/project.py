@@ -16,6 +16,7 @@ from tts2face.gestures.elements import Gains, StyleSpan, check_feature
 from tts2face.gestures.timeline import Timeline, parse_style
 from tts2face.lips.options import ExcludedToken
 from tts2face.models.palette import FEATURES
+from tts2face.models.person import seed_of
 from tts2face.picture.options import Picture
 from tts2face.request import Request
 from tts2face.session.corrections import SentenceEdges
@@ -78,6 +79,11 @@ class Project:
             raise InputError("a project has its own timeline; remove the timeline file from its request")
         object.__setattr__(self, "pronunciations", MappingProxyType(dict(self.pronunciations)))
         self.dictionary()
+
+    @property
+    def seed(self) -> int:
+        """Seed of its motion: that of the request, or of the face; raises as `Session`."""
+        return seed_of(self.models.description()) if self.request.seed is None else self.request.seed
 
     @property
     def silent_features(self) -> frozenset[str]:

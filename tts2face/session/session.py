@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from lexicon.errors import InputError
 from tts2face.models.face import Face
 from tts2face.models.palette import Derivation, Palette
+from tts2face.models.person import parse_person
 from tts2face.models.talker import Talker
 from tts2face.picture.frame_renderer import FrameRenderer
 from tts2face.picture.options import Picture
@@ -58,6 +59,9 @@ class Session:
         as for `tts2face.face_from_photo`.
     hair, hair_color
         Haircut and colour of the hair, as for `tts2face.load_face`; None for the face's own.
+    person
+        Sex and age of who is shown, to which the voice is fitted where a text names none: ``female``, ``man 70``; None
+        for those of the face.
     palette
         Name of a shipped palette, path of a .palette file, or a `Palette`; None for clips without gestures.
     voices
@@ -91,13 +95,17 @@ class Session:
         photo: str | Path | None = None,
         consent: str | None = None,
         smile: str | Path | None = None,
+        person: str | None = None,
         voices: VoicePool | None = None,
         memory_mb: float = 0.0,
     ) -> None:
         if photo is not None:
             face = _face_of(photo, consent, smile, (face, identity, hair, hair_color))
         memory = ResultMemory(round(memory_mb * 1e6))
-        self._models = SessionModels(talker, shown_face(face, identity, hair, hair_color), palette, voices, memory)
+        mesh = shown_face(face, identity, hair, hair_color)
+        self._models = SessionModels(
+            talker, mesh, palette, voices, memory, person=None if person is None else parse_person(person)
+        )
 
     @property
     def talker(self) -> Talker:
@@ -148,14 +156,14 @@ class Session:
 
     def stream(self, text: str | Request | PreparedRequest, **options: Any) -> Iterator[Piece]:
         """Synthesise the clip of a text or request piece by piece, in bounded memory; arguments as for `clip`."""
-        return self._models.pieces(prepare_request(text, options))
+        return self._models.pieces(self._prepared(text, options))
 
     def measure_speech(self, text: str | Request | PreparedRequest, **options: Any) -> SpeechSpan:
         """Seconds at which the speech of a text begins and ends in its clip, without synthesis of motion.
 
         The last utterances are kept, so that a following `stream` of the same text does not speak it again.
         """
-        prepared = prepare_request(text, options)
+        prepared = self._prepared(text, options)
         return measure_speech(prepared, self._models.for_request(prepared, keeps_utterances=True).speech)
 
     def stream_to_length(self, text: str | Request | PreparedRequest, n_frames: int, **options: Any) -> Iterator[Clip]:
@@ -164,7 +172,7 @@ class Session:
         Idle animation follows the speech; speech beyond the last frame is cut. Head and face are at rest in the first
         and last frame, so that such clips can be joined. Arguments and errors as `clip`.
         """
-        prepared = prepare_request(text, options)
+        prepared = self._prepared(text, options)
         sound_end = self.measure_speech(prepared).total if prepared.request.spoken is not None else None
         length = Length(n_frames, self._models.n_fixed_channels)
         yield from clips_of_length(prepared, sound_end, length, self._models.pieces)
@@ -174,12 +182,12 @@ class Session:
 
         Arguments and errors as `clip`; a recording is refused.
         """
-        prepared = prepare_request(text, options)
+        prepared = self._prepared(text, options)
         return timed_speech(prepared, self._models.for_request(prepared).speech)
 
     def live(self, **options: Any) -> LiveSpeech:
         """A clip without an end, extended by `say`, `idle` and `listen` of the result; options and errors as `clip`."""
-        return LiveSpeech(Request(**options), self._models)
+        return LiveSpeech(self._models.seeded(Request(**options)), self._models)
 
     def listen(self, rate: int = FEATURE_RATE, *, audio_map: str | None = None) -> LiveLips:
         """Lip motion of speech that is still being spoken; arguments and errors as `LiveLips`."""
@@ -220,7 +228,7 @@ class Session:
             As `write`; or the format is unknown or cannot be transparent.
         """
         picture, options = split_picture(picture, options)
-        prepared = prepare_request(text, options)
+        prepared = self._prepared(text, options)
         return encode_stream(prepared, self._models, StreamFormat(format, picture, threads, pace, is_complete))
 
     def write(
@@ -262,7 +270,7 @@ class Session:
             As `clip`; or the file cannot be written.
         """
         picture, options = split_picture(picture, options)
-        prepared = prepare_request(text, options)
+        prepared = self._prepared(text, options)
         outputs = plan_outputs(out, exports, input_paths(prepared.request, picture))
         return self._write(prepared, outputs, picture, on_progress or ignore_progress, on_piece)
 
@@ -289,7 +297,7 @@ class Session:
         InputError, DataError, BackendError
             As `clip` and `tts2face.export`.
         """
-        prepared = prepare_request(text, options)
+        prepared = self._prepared(text, options)
         exports = [paths] if isinstance(paths, str | Path) else paths
         outputs = plan_outputs(None, exports, input_paths(prepared.request, Picture()))
         return self._write(prepared, outputs, Picture(), on_progress or ignore_progress, on_piece)
@@ -346,6 +354,10 @@ class Session:
         new._models = self._models.with_style(name, derived)
         return new
 
+    def _prepared(self, text: str | Request | PreparedRequest, options: dict[str, Any]) -> PreparedRequest:
+        """A request with the seed of the face, where it has none."""
+        return prepare_request(text, options).with_seed(self._models.seed)
+
     def _write(
         self,
         prepared: PreparedRequest,
@@ -355,7 +367,7 @@ class Session:
         on_piece: Callable[[Piece], None] | None,
     ) -> WrittenClip:
         has_gestures = prepared.request.has_gestures
-        prepared.preload_voice(self._models.voices)  # while the face is prepared
+        prepared.preload_voice(self._models.voices, self._models.person)  # while the face is prepared
         progress = RequestSteps(prepared.n_steps, on_progress)
         face = self._models.face(has_gestures=has_gestures)
         with ahead(self._models.pieces(prepared, progress.report_heard)) as pieces:  # while the renderer is built

@@ -18,11 +18,12 @@ from tts2face.models.face_names import default_face
 from tts2face.models.palette import Derivation, Palette
 from tts2face.models.palette_editing import add_derivation
 from tts2face.models.palette_file import load_palette
+from tts2face.models.person import Person, person_of, seed_of
 from tts2face.models.talker import Talker
 from tts2face.models.talker_file import load_talker
 from tts2face.picture.frame_renderer import FrameRenderer
 from tts2face.picture.options import Picture
-from tts2face.request import OWN_FACE
+from tts2face.request import OWN_FACE, Request
 from tts2face.session.animated_face import AnimatedFace, mesh_face, own_appearance_face
 from tts2face.session.gesture_layer import METHODS, GestureLayer, GestureMethod
 from tts2face.session.lip_steps import SynthesisModels
@@ -30,7 +31,7 @@ from tts2face.session.prepared import PreparedRequest, marked_styles
 from tts2face.session.speech import NO_DELIVERIES
 from tts2face.session.speech_stream import Piece, SpeechModels
 from tts2face.session.steps import pieces
-from tts2face.sound.voice import Voice
+from tts2face.sound.fitting import fitted_voices
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.storage.memory import NO_MEMORY, ResultMemory
 from tts2face.types import Progress, ignore_progress
@@ -80,6 +81,8 @@ class SessionModels:
         Face to show; None for the talker's own face.
     memory
         Speech and lip motion of finished sentences.
+    person
+        Who is shown, whose voice speaks where none is named; None: whom the face names. ``seed`` is that of the face.
     """
 
     def __init__(
@@ -89,6 +92,8 @@ class SessionModels:
         palette: str | Path | Palette | None,
         voices: VoicePool | None = None,
         memory: ResultMemory = NO_MEMORY,
+        *,
+        person: Person | None = None,
     ) -> None:
         self.talker: Talker = talker if isinstance(talker, Talker) else load_talker(str(talker))
         self._mesh, self._memory = mesh, memory
@@ -97,6 +102,8 @@ class SessionModels:
         self._cache: dict[Hashable, Any] = {}
         self._renderers: OrderedDict[Hashable, FrameRenderer] = OrderedDict()
         self.voices = voices or VoicePool()
+        shown = {**self.talker.metadata, "name": OWN_FACE} if mesh is None else mesh.metadata
+        self.person, self.seed = person or person_of(shown), seed_of(shown)
         self._without: tuple[tuple[ExcludedToken, ...], ExemplarModel] | None = None
         self.speech_face: AnimatedFace = (
             own_appearance_face(self.talker, self._exemplars)
@@ -168,10 +175,7 @@ class SessionModels:
             As for `VoicePool.voice`.
         """
         request = prepared.request
-
-        def load_voice(name: str | None, language: str) -> Voice:
-            return self.voices.voice(name, language, prepared.dictionary, keeps_utterances=keeps_utterances)
-
+        load_voice = fitted_voices(self.voices, self.person, prepared.dictionary, keeps_utterances=keeps_utterances)
         exemplars = self._exemplars if not prepared.excluded else self._exemplars_without(prepared.excluded)
         face = self.face(has_gestures=request.has_gestures)
         face.check_articulation(request.articulation_factor)
@@ -180,6 +184,10 @@ class SessionModels:
         deliveries = NO_DELIVERIES if palette is None else palette.deliveries
         speech = SpeechModels(load_voice, self.voices.yield_turn, self._memory, deliveries)
         return SynthesisModels(self.talker, exemplars, face, speech)
+
+    def seeded(self, request: Request) -> Request:
+        """A request with the seed of the face, where it has none."""
+        return request if request.seed is not None else replace(request, seed=self.seed)
 
     def pieces(self, prepared: PreparedRequest, on_heard: Progress = ignore_progress) -> Iterator[Piece]:
         """Synthesise the clip of a request piece by piece; `on_heard` is called while a recording is heard."""

@@ -172,9 +172,8 @@ def speak_sentence(
         delivery = delivery_of(part, sentence.runs, request, deliveries)
         rate = text.rate * part.rate * delivery.rate
         try:
-            speech = speak_with(
-                speaker, phrase_content(part), Prosody(rate), request.seed, language=part.language or request.language
-            )
+            language = part.language or request.language
+            speech = speak_with(speaker, phrase_content(part), Prosody(rate), request.known_seed, language=language)
         except SilentTextError:  # signs, such as pictures, for which a voice has no words
             # a sentence of signs alone is an error, beside words they are left out
             if part is sentence.utterances[-1] and not spoken:
@@ -224,7 +223,7 @@ def sentence_sound(
     delivery = delivery_of(part, sentence.runs, request, deliveries)
     rate = text.rate * part.rate * delivery.rate
     language = part.language or request.language
-    sound = sound_with(speaker, phrase_content(part), Prosody(rate), request.seed, language=language)
+    sound = sound_with(speaker, phrase_content(part), Prosody(rate), request.known_seed, language=language)
     whole = _led(resampled_speech(Speech.without_phones(sound), voice.sample_rate), request)
     whole = _ended(whole, sentence, rate)
     levelled = level_speech([whole], [text.volume * delivery.volume * np.ones(1)])

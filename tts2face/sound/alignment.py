@@ -113,7 +113,7 @@ class Alignment:
             )
 
 
-Align = Callable[[Waveform, PronouncedWords], Alignment]
+Align = Callable[..., Alignment]  # of a sound, its words and, where they are known, their times: `Aligner.align`
 
 
 def join_alignments(parts: Sequence[Alignment]) -> Alignment:

@@ -24,5 +24,11 @@ class Prosody:
     range: float = 1.0
     formants: float = 1.0
 
+    def combined(self, other: "Prosody") -> "Prosody":
+        """Both at once."""
+        return Prosody(
+            self.rate * other.rate, self.pitch + other.pitch, self.range * other.range, self.formants * other.formants
+        )
+
 
 PLAIN_PROSODY = Prosody()

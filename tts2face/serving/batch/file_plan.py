@@ -345,7 +345,7 @@ class FilePlan:
         settings = {name: value for name, value in casting.request.items() if name not in NOT_WHEN_SILENT}
         while n_frames > 0:
             part = min(n_frames, longest)
-            seed = int(settings.get("seed", 0)) + n_frames  # other motion in each part, and for other lengths
+            seed = casting.seed + n_frames  # other motion in each part, and for other lengths
             request = {**settings, "idle": max(part / fps, IDLE_LIMITS_S[0]), "seed": seed}
             yield self._segment(window, request, part, part)
             n_frames -= part

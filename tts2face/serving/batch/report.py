@@ -6,16 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import Tts2faceError
-from lexicon.languages import language_code
-from tts2face.request import Request
 from tts2face.serving.batch.lines import LineSettings, write_lines
 from tts2face.serving.batch.output import Plan, PlannedLine
 from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.segment_result import SegmentResult
-from tts2face.serving.batch.speakers import Casting, shown_name
+from tts2face.serving.batch.speakers import Casting, shown_name, spoken_voice
 from tts2face.serving.batch.store import Store
 from tts2face.session.named_models import Models
-from tts2face.sound.voice_pool import default_voice
 from tts2face.types import Progress
 
 CHANGED = 0.005  # of the rate, from which it is another one
@@ -60,10 +57,7 @@ def shown_face(models: Models) -> str:
 
 
 def _voice(casting: Casting) -> str:
-    return str(
-        casting.request.get("voice")
-        or default_voice(language_code(casting.request.get("language", Request().language)))
-    )
+    return spoken_voice(casting.models, casting.request)
 
 
 def measure_plan(

@@ -6,11 +6,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from lexicon.languages import language_code
 from tts2face.models.face_names import BALD
 from tts2face.request import OWN_FACE, Request
 from tts2face.serving.batch.audio_track import open_track
 from tts2face.serving.batch.content_address import content_address, file_hash, model_hash, program_version
 from tts2face.session.named_models import Models
+from tts2face.sound.fitting import fitting_voice
 from tts2face.types import SOUND_RATE, exact_rate, first_sample
 
 SEGMENT_SUFFIX = ".mov"
@@ -20,7 +22,7 @@ ALPHA_MOVIE = "vp9"
 TRACK = "track"
 FILE_PREFIX = "file."  # of the medium of a whole clip in a format of `Session.stream_file`
 REQUEST_FILES = ("audio", "partner", "dictionary", "voice", "timeline")
-HAIR = ("hair", "hair_color")  # of models; not part of the addresses of segments without them
+OPTIONAL = ("hair", "hair_color", "person")  # of models; not part of the addresses of segments without them
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +101,16 @@ class Segment:
         content["request"] = {name: self.file_hashes.get(name, value) for name, value in self.request.items()}
         content["picture"] = {name: self.file_hashes.get(name, value) for name, value in self.picture.items()}
         content["identity"] = self.models.identity
-        content |= {name: value for name in HAIR if (value := getattr(self.models, name)) is not None}
+        content |= {name: value for name in OPTIONAL if (value := getattr(self.models, name)) is not None}
+        if self.request.get("text") and "voice" not in self.request and (fitted := self._fitted_voice()):
+            content["fitted"] = fitted  # another one where other voices are installed
         return content_address(content | {"versions": program_version()})
+
+    def _fitted_voice(self) -> str:
+        """Voice that fits the face, and what is changed of it; empty where it is the usual one of the language."""
+        language = language_code(str(self.request.get("language", Request().language)))
+        fitting = fitting_voice(self.models.shown_person(), language)
+        return fitting.described if fitting.sentence else ""
 
     def as_json(self) -> dict[str, Any]:
         """JSON object from which `segment_from_json` makes the segment again."""

@@ -8,11 +8,13 @@ from typing import Any
 from lexicon.errors import InputError
 from lexicon.languages import language_code
 from tts2face.interchange.subtitles.cues import Cue
-from tts2face.request import DRAWN_FACE, Request
+from tts2face.models.person import seed_of
+from tts2face.request import AUTO, DRAWN_FACE, Request
 from tts2face.serving.batch.cast import MODEL_NAMES, REQUEST_NAMES, SILENT, Cast, Role
 from tts2face.serving.batch.lines import NO_SETTINGS, Lines, LineSettings
 from tts2face.session.named_models import Models
-from tts2face.sound.voice_pool import SHIPPED_VOICES, default_voice, find_voice, has_voice, is_installed, speaks
+from tts2face.sound.fitting import fitting_voice
+from tts2face.sound.voice_pool import SHIPPED_VOICES, find_voice, has_voice, is_installed, speaks
 
 UNNAMED = "(no name)"
 # Shipped faces of other speakers, by the sex of their voices.
@@ -31,6 +33,12 @@ class Casting:
     role: int | None
     other: int = 0  # counts the speakers of one cue who have no role, from the second one
     usual_rate: float = 1.0
+
+    @property
+    def seed(self) -> int:
+        """Seed of the motion: the given one, or that of the face."""
+        given = self.request.get("seed")
+        return seed_of(self.models.description()) if given is None else int(given)
 
 
 @dataclass(slots=True)
@@ -123,7 +131,7 @@ class Speakers:
             chosen = {name: settings[name] for name in MODEL_NAMES if name in settings}
             # a haircut of one face does not fit another
             if chosen.get("face", models.face) != models.face:
-                chosen = dict.fromkeys(("identity", "hair", "hair_color")) | chosen  # they belong to a face
+                chosen = dict.fromkeys(("identity", "hair", "hair_color", "person")) | chosen  # they belong to a face
             elif models.face == DRAWN_FACE:
                 chosen = {"face": ""} | chosen  # the one that the other settings belong to
             models = replace(models, **chosen)
@@ -135,6 +143,14 @@ def shown_name(speaker: str, casting: Casting | None) -> str:
     if speaker:
         return speaker
     return f"{UNNAMED} {casting.other + 1}" if casting is not None and casting.other else UNNAMED
+
+
+def spoken_voice(models: Models, request: Mapping[str, Any]) -> str:
+    """Name of the voice of a speaker: the chosen one, or the one that fits the face."""
+    voice = request.get("voice")
+    if voice not in (None, AUTO):
+        return str(voice)
+    return fitting_voice(models.shown_person(), language_code(str(request.get("language", Request().language)))).name
 
 
 def other_face(
@@ -150,7 +166,7 @@ def other_face(
         Whether only the voice is another one, for exports, which hold one face.
     """
     language = language_code(str(request.get("language", Request().language)))
-    own = str(request.get("voice") or default_voice(language))
+    own = spoken_voice(models, request)
     usable = [name for name in SHIPPED_VOICES if name != own and speaks(name, language) and is_installed(name)]
     is_male = has_voice(own) and find_voice(own).sex == "male"
     wanted = "female" if is_male == (number % 2 == 1) else "male"
@@ -158,5 +174,7 @@ def other_face(
     sex = find_voice(voice).sex if has_voice(voice) else wanted
     faces = [face for face in _OTHER_FACES[sex] if face != models.face]
     if not keeps_face:
-        models = replace(models, face=faces[(number - 1) // 2 % len(faces)], identity=None, hair=None, hair_color=None)
+        models = replace(
+            models, face=faces[(number - 1) // 2 % len(faces)], identity=None, hair=None, hair_color=None, person=None
+        )
     return models, {**request, "voice": voice}

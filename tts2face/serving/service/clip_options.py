@@ -18,7 +18,7 @@ from lexicon.errors import InputError
 from tts2face.models.face_names import default_face
 from tts2face.models.named_colours import parse_hair_colour
 from tts2face.picture.options import AUTO_SIZE, BLUR, COLOURS, STUDIO, TRANSPARENT, Picture, parse_size
-from tts2face.request import OWN_FACE, Request, option_fields
+from tts2face.request import AUTO, OWN_FACE, Request, option_fields
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.library import Library, shipped_names
@@ -36,7 +36,7 @@ MODEL_FIELDS, PICTURE_FIELDS = (frozenset(field.name for field in fields(record)
 # What differs over HTTP: names of uploads and of lists in place of paths and commands, and limits for everybody's sake.
 DESCRIPTIONS: Mapping[str, str] = MappingProxyType({
     "language": "Language of the text.",
-    "voice": "A voice of GET /v1/voices.",
+    "voice": "A voice of GET /v1/voices, or auto: the one that fits the face.",
     "plain_delivery": "The style leaves rate and loudness of the voice unchanged.",
     "dictionary": "A dictionary of GET /v1/dictionaries.",
     "talker": "A talker of GET /v1/talkers.",
@@ -44,6 +44,7 @@ DESCRIPTIONS: Mapping[str, str] = MappingProxyType({
     "identity": "Identity preset of the face.",
     "hair": "Haircut of the face, or bald.",
     "hair_color": "Colour of the hair: a name or #rrggbb.",
+    "person": "Sex and age of the person shown, to whom the voice is fitted: woman, man 70, girl.",
     "palette": "A palette of GET /v1/palettes.",
     "background": "studio, transparent, blur, or a colour.",
 })  # fmt: skip
@@ -54,6 +55,7 @@ EXAMPLES: Mapping[str, Any] = MappingProxyType({
     "text": "Hello there.", "voice": "heart", "articulation": "clear", "style": "delighted", "gain": "head=1.5",
     "talker": "grid_s1", "face": "ada", "identity": "kofi", "hair": "long01", "hair_color": "brown",
     "palette": "starter", "size": "512x512", "background": "#204060", "quality": "draft", "expression": "happy=0.6",
+    "person": "woman 70",
     "idle": 2.5, "listen": 2.5, "gaze": "camera", "context": 3, "exemplars": 10, "audio_map": "network",
     "language": "en-us", "rate": 1.0, "lead": 0.1, "plain_delivery": False, "volume": 1.0, "seed": 0, "fps": 30.0,
     "pitch": False, "camera": "front", "supersampling": 2, "visible_mark": False, "dictionary": None,
@@ -198,7 +200,7 @@ async def resolve_dictionary(library: Library, key: ApiKey, fields: Mapping[str,
 
 def check_voice(voice: str | None) -> None:
     """Refuse voices that are not known by name."""
-    if voice is not None:
+    if voice not in (None, AUTO):
         known = tuple(voice.name for voice in catalogue.voices() if voice.languages)
         if voice not in known:
             raise RefusedError(

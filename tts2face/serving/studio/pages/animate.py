@@ -156,7 +156,7 @@ class AnimatePage:
 
     def _lanes(self) -> list[dict[str, Any]]:
         project = self.workspace.project
-        seeds = {**dict.fromkeys(FEATURES, project.request.seed), **project.timeline.seeds}
+        seeds = {**dict.fromkeys(FEATURES, project.seed), **project.timeline.seeds}
         return [
             {"feature": lane, "muted": lane in project.muted, "solo": lane in project.solo, "seed": seeds[lane]}
             for lane in FEATURES

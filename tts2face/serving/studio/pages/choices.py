@@ -23,13 +23,13 @@ COLOURS = (
 
 @lru_cache(maxsize=1)
 def voices() -> dict[str, str]:
-    """Voices by name with what is said of them; the empty one is the best for the language."""
+    """Voices by name with what is said of them; the empty one is the one that fits the face."""
     found = {
         voice.name: f"{voice.name} - {voice.summary}"
         for voice in catalogue.voices()
         if voice.languages and voice.is_installed
     }
-    return {"": "best for the language", **found}
+    return {"": "the one that fits the face", **found}
 
 
 @lru_cache(maxsize=1)

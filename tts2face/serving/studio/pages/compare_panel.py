@@ -105,7 +105,7 @@ class ComparePanel:
         elif name == LIVE_LINK:
             self._offer_take()
         elif name == SEED:
-            seed = project.request.seed + 1
+            seed = project.seed + 1
             await self._compare({"kind": SETTINGS, "label": f"seed {seed}", "request": {"seed": seed}})
         elif name in SETTINGS_OFFERED:
             await self._compare({"kind": SETTINGS, "label": name, "request": SETTINGS_OFFERED[name]})

@@ -1,0 +1,109 @@
+"""A face speaks in a voice of its sex and age: the one that is installed, else the language's in another pitch."""
+
+from dataclasses import replace
+from types import MappingProxyType
+
+import pytest
+
+from lexicon.errors import InputError
+from tts2face.models.person import FEMALE, MALE, SHIPPED_PEOPLE, Person, parse_person, person_of, seed_of
+from tts2face.request import Request, Spoken
+from tts2face.session.catalogue import shipped_names
+from tts2face.session.named_models import Models
+from tts2face.sound import fitting, voice_pool
+from tts2face.sound.fitting import fitting_voice
+from tts2face.sound.prosody import PLAIN_PROSODY, Prosody
+
+WITHOUT = "a_module_that_nobody_has"
+
+
+@pytest.fixture
+def only_heart(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One neural voice is installed."""
+    voices = dict(voice_pool.SHIPPED_VOICES)
+    there = {name: voice if name == "heart" else replace(voice, package=WITHOUT) for name, voice in voices.items()}
+    for module in (voice_pool, fitting):
+        monkeypatch.setattr(module, "SHIPPED_VOICES", MappingProxyType(there))
+    fitting_voice.cache_clear()
+    yield
+    fitting_voice.cache_clear()
+
+
+@pytest.mark.usefixtures("only_heart")
+@pytest.mark.parametrize(
+    ("person", "lowest", "highest"),
+    [
+        (Person(MALE, 25), 110, 122),  # men: 132 Hz where women have 223, and heart 193
+        (Person(MALE, 75), 120, 130),
+        (Person(FEMALE, 75), 165, 178),
+        (Person(FEMALE, 8), 220, 235),
+    ],
+)
+def test_one_voice_is_changed_by_what_people_differ(person: Person, lowest: float, highest: float) -> None:
+    found = fitting_voice(person, "en-us")
+    assert found.name == "heart"
+    assert lowest < 193 * 2 ** (found.prosody.pitch / 12) < highest
+    assert (found.prosody.formants < 1) == (person.sex == MALE or person.age > 60)
+    assert found.described.startswith("heart, " + ("lowered" if found.prosody.pitch < 0 else "raised"))
+    assert found.described in found.sentence
+
+
+@pytest.mark.usefixtures("only_heart")
+def test_grown_up_women_and_unknown_people_have_the_voice_as_it_is() -> None:
+    for person in (None, Person(FEMALE, 20), Person(FEMALE, 45)):
+        assert fitting_voice(person, "en-us") == fitting.Fitting("heart", PLAIN_PROSODY, "")
+    assert fitting_voice(None, "de").name == "espeak"
+
+
+def test_old_people_speak_more_slowly_in_any_voice() -> None:
+    old = fitting_voice(Person(MALE, 80), "de")
+    assert (old.name, old.prosody.rate, old.prosody.pitch) == ("espeak", 0.92, 1.5)
+    assert fitting_voice(Person(FEMALE, 30), "de").name == "espeak-female"
+
+
+def test_prosodies_are_combined_by_factors_and_steps() -> None:
+    both = Prosody(0.9, -2.0, 1.2, 0.9).combined(Prosody(2.0, 1.0, 0.5, 0.8))
+    assert (both.rate, both.pitch, both.range, both.formants) == pytest.approx((1.8, -1.0, 0.6, 0.72))
+
+
+@pytest.mark.parametrize(
+    ("written", "person"),
+    [
+        ("female", Person(FEMALE, 30)), ("man 70", Person(MALE, 70)), ("Girl", Person(FEMALE, 9)),
+        ("woman, 25", Person(FEMALE, 25)), ("male:40", Person(MALE, 40)), (" boy 6 ", Person(MALE, 6)),
+    ],
+)  # fmt: skip
+def test_people_are_written_as_sex_and_age(written: str, person: Person) -> None:
+    assert parse_person(written) == person
+
+
+@pytest.mark.parametrize("written", ["", "70", "person", "woman of 70", "man 121", "man -3", "woman 70 80"])
+def test_other_words_are_refused(written: str) -> None:
+    with pytest.raises(InputError, match="woman 70"):
+        Models(person=written)
+
+
+def test_every_shipped_face_is_somebody() -> None:
+    assert {(name, None) for name in shipped_names("face")} <= SHIPPED_PEOPLE.keys()
+    assert Models(identity="nia").shown_person() == Person(FEMALE, 9)
+    assert Models(face="ben", person="woman 50").shown_person() == Person(FEMALE, 50)
+    assert Models(face="self").shown_person() is None
+
+
+def test_a_face_of_a_user_says_who_it_shows() -> None:
+    assert person_of({"name": "mine", "person": "man 70"}) == Person(MALE, 70)
+    assert person_of({"name": "ben", "character": {}}) is None
+    assert person_of({"name": "mara", "consent": {}}) is None
+    assert person_of({"name": "ada", "person": "a robot"}) is None
+
+
+def test_faces_have_seeds_of_their_own() -> None:
+    found = {seed_of(Models(face=name).description()) for name in shipped_names("face")}
+    assert len(found) == len(shipped_names("face"))
+    assert seed_of(Models().description()) == 0  # motion of the default face stays as it was
+    assert seed_of(Models(identity="kofi").description()) != seed_of(Models(face="head").description())
+
+
+def test_auto_is_the_same_as_no_voice() -> None:
+    assert Request(text="Hello.", voice="auto") == Request(text="Hello.") == Request(source=Spoken("Hello.", "auto"))
+    assert Request(voice="auto", idle=2.0) == Request(idle=2.0)

@@ -1,0 +1,197 @@
+"""A voice of a server: its sound with our edges, what of its errors is said, and what is never sent."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lexicon.errors import BackendError, DataError, InputError, SilentTextError
+from tests.sound.speech_server import Reply, SpeechServer, captioned_reply, speech_server, spoken, wave_reply
+from tts2face.sound.received_sound import decode_sound
+from tts2face.sound.voice import SpokenWord, VoiceSetting
+from tts2face.sound.voice_pool import load_voice
+from tts2face.sound.voice_server import (
+    KEY_VARIABLE,
+    ServerVoice,
+    SpeechClient,
+    matched_times,
+    parse_voice_url,
+)
+
+TEXT = "Bob may move five big maps."
+
+
+def says(content: dict[str, Any]) -> Reply:
+    return wave_reply(spoken(content["input"], content["speed"]))
+
+
+def client_of(server: SpeechServer, waits: list[float] | None = None) -> SpeechClient:
+    return SpeechClient(parse_voice_url(server.url), [].append if waits is None else waits.append)
+
+
+def onsets(voice: Any) -> np.ndarray:
+    return np.array([voice.phones.edges[word.first] for word in voice.words])
+
+
+def test_the_sound_of_a_server_gets_edges_of_ours() -> None:
+    with speech_server(speech=says) as server:
+        found = load_voice(server.url, "en-us").speak(TEXT)
+    truth = spoken(TEXT)
+    assert [word.text for word in found.words] == TEXT[:-1].split()
+    assert np.abs(onsets(found) - onsets(truth)).max() < 0.05
+    assert min(word.confidence for word in found.words) > 0.2
+    path, headers, content = server.asked[-1]
+    assert (path, content["voice"], content["model"], content["response_format"]) == (
+        "/v1/audio/speech", "af_heart", "tts-1", "wav",
+    )  # fmt: skip
+    assert "Authorization" not in headers
+
+
+def test_rates_are_the_servers() -> None:
+    with speech_server(speech=says) as server:
+        voice = load_voice(server.url, "en-us")
+        slow, fast = (voice.sound(TEXT, rate=rate) for rate in (0.8, 1.6))
+    assert slow.duration / fast.duration == pytest.approx(1.8, abs=0.25)  # silence stays
+
+
+def test_word_times_are_asked_for_once_where_there_are_none() -> None:
+    with speech_server(speech=says) as server:
+        client = client_of(server)
+        client.sound("One.", 1.0)
+        client.sound("Two.", 1.0)
+    assert [path for path, *_ in server.asked] == ["/dev/captioned_speech", "/v1/audio/speech", "/v1/audio/speech"]
+
+
+def test_word_times_decide_where_ours_are_far_off() -> None:
+    words = [SpokenWord(word, ()) for word in TEXT[:-1].split()]
+    for later_s, expected_s in ((0.06, 0.0), (0.4, 0.4)):  # those of Kokoro are some 60 ms off
+        with speech_server(captioned=lambda content, s=later_s: captioned_reply(spoken(content["input"]), s)) as server:
+            found = ServerVoice(server.url, VoiceSetting("en-us")).speak(words)
+        assert np.median(onsets(found) - onsets(spoken(TEXT[:-1]))) == pytest.approx(expected_s, abs=0.04)
+        assert not server.texts()
+
+
+def test_a_sentence_that_is_expected_is_asked_for_once() -> None:
+    with speech_server(speech=says) as server:
+        voice = ServerVoice(server.url, VoiceSetting("en-us"))
+        voice.expect("Two.", 1.0)
+        voice.sound("One.")
+        voice.sound("Two.")
+    assert sorted(server.texts()) == ["One.", "Two."]
+
+
+@pytest.mark.parametrize(
+    ("status", "error", "said"),
+    [
+        (400, InputError, r"no voice af_heart.*check the voice 'af_heart'"),
+        (401, BackendError, f"another key.*{KEY_VARIABLE}"),
+        (404, InputError, "check the voice"),
+        (500, BackendError, "fails"),
+        (503, BackendError, "fails"),
+        (302, BackendError, "redirects.*not followed"),
+    ],
+)
+def test_errors_of_a_server_are_said(status: int, error: type[Exception], said: str) -> None:
+    body = json.dumps({"error": {"message": "no voice af_heart\x00\n"}}).encode()
+    with (
+        speech_server(speech=lambda _: (status, {"Location": "http://127.0.0.1:1/"}, body)) as server,
+        pytest.raises(error, match=said),
+    ):
+        client_of(server).sound(TEXT, 1.0)
+    assert len(server.texts()) == (3 if status in (500, 503) else 1)
+
+
+def test_a_busy_server_is_asked_again_when_it_wishes() -> None:
+    busy, waits = iter([(429, {"Retry-After": "3"}, b""), (503, {}, b"")]), list[float]()
+    with speech_server(speech=lambda content: next(busy, None) or says(content)) as server:
+        client_of(server, waits).sound(TEXT, 1.0)
+    assert waits == [3.0, 2.0]
+
+
+def test_a_server_that_is_not_there_is_said() -> None:
+    with speech_server() as server:
+        pass
+    with pytest.raises(BackendError, match=r"127\.0\.0\.1:\d+/v1 does not answer .*start it"):
+        client_of(server).sound(TEXT, 1.0)
+
+
+@pytest.mark.parametrize("body", [b"", b"<html>no</html>", b"RIFF\x04\0\0\0WAVE"])
+def test_what_is_no_sound_is_refused(body: bytes) -> None:
+    with (
+        speech_server(speech=lambda _: (200, {"Content-Type": "audio/wav"}, body)) as server,
+        pytest.raises(DataError, match="no sound"),
+    ):
+        client_of(server).sound(TEXT, 1.0)
+
+
+def test_an_answer_without_an_end_is_cut_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tts2face.sound.voice_server.LARGEST_BYTES", 10_000)
+    with speech_server(speech=says) as server, pytest.raises(DataError, match="more than"):
+        client_of(server).sound(TEXT, 1.0)
+
+
+def test_wave_files_of_streams_do_not_know_their_length() -> None:
+    whole = wave_reply(spoken(TEXT))[2]
+    at = whole.index(b"data") + 4
+    stream = whole[:4] + b"\xff" * 4 + whole[8:at] + b"\xff" * 4 + whole[at + 4 :]
+    assert len(decode_sound(stream).samples) == len(decode_sound(whole).samples)
+
+
+def test_a_key_is_sent_to_this_machine_and_over_https_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "secret")
+    with speech_server(speech=says) as server:
+        client_of(server).sound(TEXT, 1.0)
+    assert server.asked[-1][1]["Authorization"] == "Bearer secret"
+    SpeechClient(parse_voice_url("https://api.example.org/v1#alloy"))
+    with pytest.raises(InputError, match="unencrypted"):
+        SpeechClient(parse_voice_url("http://10.0.0.8:8880/v1#af_heart"))
+
+
+def test_a_proxy_is_not_asked_for_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("http_proxy", "http://127.0.0.1:1")
+    monkeypatch.delenv("no_proxy", raising=False)
+    with speech_server(speech=says) as server:
+        client_of(server).sound(TEXT, 1.0)
+    with pytest.raises(BackendError, match="does not answer"):
+        SpeechClient(parse_voice_url("http://192.0.2.1/v1#a"), [].append).sound(TEXT, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("url", "model", "voice", "base"),
+    [
+        ("http://127.0.0.1:8880/v1#af_heart", "tts-1", "af_heart", "http://127.0.0.1:8880/v1"),
+        ("https://api.openai.com/v1/#gpt-4o-mini-tts/alloy", "gpt-4o-mini-tts", "alloy", "https://api.openai.com/v1"),
+        ("http://[::1]:9/v1#a%20b", "tts-1", "a b", "http://[::1]:9/v1"),
+        ("http://localhost/v1#org/model/af_bella(2)+af_sky", "org/model", "af_bella(2)+af_sky", "http://localhost/v1"),
+    ],
+)
+def test_urls_name_server_model_and_voice(url: str, model: str, voice: str, base: str) -> None:
+    address = parse_voice_url(url)
+    assert (address.model, address.voice, address.base) == (model, voice, base)
+
+
+@pytest.mark.parametrize(
+    "url", ["http://", "http:///v1#a", "http://host/v1", "http://host:x/v1#a", "http://host/v1?voice=a#b", "http://[#a"]
+)
+def test_other_urls_are_refused(url: str) -> None:
+    with pytest.raises(InputError, match="http://host:port/v1#voice"):
+        load_voice(url, "en-us")
+
+
+def test_a_password_in_a_url_is_refused() -> None:
+    with pytest.raises(InputError, match=KEY_VARIABLE):
+        load_voice("http://user:secret@host/v1#a", "en-us")
+
+
+def test_a_text_without_words_is_not_sent() -> None:
+    with speech_server(speech=says) as server, pytest.raises(SilentTextError):
+        ServerVoice(server.url, VoiceSetting("en-us")).sound("...")
+    assert not server.asked
+
+
+def test_times_count_where_all_words_have_one() -> None:
+    stated = [("Hello", 0.1, 0.3), (",", 0.3, 0.4), ("there.", 0.4, 0.7)]
+    assert matched_times(["hello", "there"], stated) == [(0.1, 0.3), (0.4, 0.7)]
+    assert matched_times(["hello", "you"], stated) == []
+    assert matched_times(["hello", "there"], [*stated[:2], ("there", 0.2, 0.1)]) == []
