@@ -17,8 +17,9 @@ from sentences import sentences
 
 from lexicon.phones import PHONES
 from lexicon.sequence import SILENCE, PhoneSequence, enforce_increasing
-from tts2face.sound import heart
 from tts2face.sound.alignment import Aligner
+from tts2face.sound.heart import NeuralVoice
+from tts2face.sound.heart_letters import LetteredWord
 from tts2face.sound.segments import StatedPhone
 from tts2face.types import Waveform
 
@@ -55,7 +56,7 @@ def sounding(phones: PhoneSequence) -> PhoneSequence:
     return PhoneSequence([phones.phones[at] for at in kept], edges)
 
 
-def stated(words: Sequence[heart.LetteredWord], phones: Sequence[StatedPhone], duration: float) -> PhoneSequence:
+def stated(words: Sequence[LetteredWord], phones: Sequence[StatedPhone], duration: float) -> PhoneSequence:
     """Phones as the voice states them."""
     spoken = [one for one in phones if one.label != SILENCE]
     end = spoken[-1].start + spoken[-1].duration
@@ -68,7 +69,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-n", type=int, default=100, help="sentences")
     n = parser.parse_args().n
-    voice, aligner = heart.NeuralVoice({}), Aligner()
+    voice, aligner = NeuralVoice({}), Aligner()
     errors: dict[str, list[float]] = {"stated": [], "recordings": [], "segments": []}
     ends: dict[str, list[float]] = {name: [] for name in errors}
     seconds = dict.fromkeys(("voice", "recordings", "voice and segments"), 0.0)
@@ -76,7 +77,8 @@ def main() -> None:
     voice.speak("Hello.")
     for text in sentences(n):
         began = time.perf_counter()
-        ((sound, words, phones),) = voice.parts(text)
+        (part,) = voice.parts(text)
+        sound, words, phones = part.sound, part.words, part.stated
         spoken = time.perf_counter()
         aligned = aligner.align(sound, [(word.text, [word.phones]) for word in words])
         done = time.perf_counter()

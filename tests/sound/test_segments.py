@@ -10,7 +10,9 @@ from lexicon.errors import DataError
 from lexicon.sequence import SILENCE
 from tts2face.models.phone_classifier import PhoneClassifier, load_phone_classifier, write_phone_classifier
 from tts2face.sound.alignment import Aligner
-from tts2face.sound.heart import LETTERS_OF_PHONE, NeuralVoice
+from tts2face.sound.heart import NeuralVoice
+from tts2face.sound.heart_letters import LETTERS_OF_PHONE
+from tts2face.sound.prosody import Prosody
 from tts2face.sound.segments import StatedPhone, find_edges
 from tts2face.types import Waveform
 
@@ -30,8 +32,8 @@ def classifier() -> PhoneClassifier:
 @pytest.mark.parametrize("rate", [0.5, 1.0, 2.0])
 def test_edges_agree_with_those_of_the_aligner(voice: NeuralVoice, rate: float) -> None:
     speech = voice.speak(TEXT, rate=rate)
-    ((sound, words, _),) = voice.parts(TEXT, rate=rate)
-    aligned = Aligner().align(sound, [(word.text, [word.phones]) for word in words])
+    (part,) = voice.parts(TEXT, Prosody(rate))
+    aligned = Aligner().align(part.sound, [(word.text, [word.phones]) for word in part.words])
     apart = []
     for mine, other in zip(speech.words, aligned.words, strict=True):
         edges = speech.phones.edges[mine.first : mine.last + 1] - aligned.phones.edges[other.first : other.last + 1]
@@ -55,7 +57,8 @@ def test_every_sound_lies_in_a_phone_and_every_pause_in_a_silence(voice: NeuralV
 
 
 def test_what_the_voice_states_may_be_wrong(voice: NeuralVoice, classifier: PhoneClassifier) -> None:
-    ((sound, _, stated),) = voice.parts(TEXT)
+    (part,) = voice.parts(TEXT)
+    sound, stated = part.sound, part.stated
     late = [stated[0], *(replace(one, start=one.start + 0.06) for one in stated[1:])]
     assert np.median(np.abs(find_edges(sound, late, classifier) - find_edges(sound, stated, classifier))) < 0.005
 

@@ -22,6 +22,7 @@ from lexicon.sequence import SILENCE, PhoneSequence, enforce_increasing
 from tts2face.models.phone_classifier import PhoneClassifier
 from tts2face.sound.alignment import Aligner, recording_features
 from tts2face.sound.heart import NeuralVoice
+from tts2face.sound.prosody import Prosody
 from tts2face.sound.recogniser import FEATURES, FRAME_S, PhoneRecogniser, levelled
 from tts2face.sound.segments import STEP_S, StatedPhone, find_edges, frame_features
 from tts2face.sound.spikes import NEVER, find_spikes
@@ -60,8 +61,8 @@ def train_voice_classifier(*, on_progress: Progress, report: Report) -> PhoneCla
     voice, texts = NeuralVoice({}), training_texts()
     parts: list[tuple[Waveform, Sequence[StatedPhone], bool]] = []
     for at, text in enumerate(texts):
-        spoken = voice.parts(text, rate=RATES[at % len(RATES)], seed=at)
-        parts += [(sound, stated, at % TEST_SHARE == 0) for sound, _, stated in spoken]
+        spoken = voice.parts(text, Prosody(RATES[at % len(RATES)]), seed=at)
+        parts += [(part.plain, part.stated, at % TEST_SHARE == 0) for part in spoken]
         on_progress(at + 1, len(texts))
     seen = [frame_features(sound).astype(np.float16) for sound, *_ in parts]
     is_test = np.concatenate([np.full(len(observed), test) for observed, (*_, test) in zip(seen, parts, strict=True)])
