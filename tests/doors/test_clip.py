@@ -27,7 +27,7 @@ def ready(shipped: Session) -> Session:
 def made(ready: Session, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Clip]:
     path = tmp_path_factory.mktemp("clip") / "clip.mp4"
     clips: list[Clip] = []
-    ready.write(TEXT, path, size=f"{SIDE}x{SIDE}", on_piece=lambda piece: clips.append(piece.clip))
+    ready.write(f"{TEXT}[pause 0.3]", path, size=f"{SIDE}x{SIDE}", on_piece=lambda piece: clips.append(piece.clip))
     (clip,) = clips
     return path, clip
 
