@@ -1,6 +1,9 @@
 """A voice of a server: its sound with our edges, what of its errors is said, and what is never sent."""
 
 import json
+import time
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,18 +11,24 @@ import pytest
 
 from lexicon.errors import BackendError, DataError, InputError, SilentTextError
 from tests.sound.speech_server import Reply, SpeechServer, captioned_reply, speech_server, spoken, wave_reply
+from tts2face.request import Request
+from tts2face.serving.batch.cast import cast_from_tables
+from tts2face.serving.batch.lines import read_lines
+from tts2face.serving.service.clip_options import check_voice
+from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.settings import ServiceSettings
+from tts2face.session.prepared import prepare
+from tts2face.session.project_file import parse_project
+from tts2face.session.speech_stream import SpeechModels, speak_sentences
+from tts2face.sound.fitting import fitted_voices
 from tts2face.sound.received_sound import decode_sound
 from tts2face.sound.voice import SpokenWord, VoiceSetting
-from tts2face.sound.voice_pool import load_voice
-from tts2face.sound.voice_server import (
-    KEY_VARIABLE,
-    ServerVoice,
-    SpeechClient,
-    matched_times,
-    parse_voice_url,
-)
+from tts2face.sound.voice_pool import VoicePool, find_voice, load_voice, voice_names
+from tts2face.sound.voice_server import ServerVoice, SpeechClient, matched_times
+from tts2face.sound.voice_urls import KEY_VARIABLE, NAMES_VARIABLE, parse_voice_url
 
 TEXT = "Bob may move five big maps."
+DOCUMENT = '<speak><voice name="{}">Hello.</voice></speak>'
 
 
 def says(content: dict[str, Any]) -> Reply:
@@ -195,3 +204,47 @@ def test_times_count_where_all_words_have_one() -> None:
     assert matched_times(["hello", "there"], stated) == [(0.1, 0.3), (0.4, 0.7)]
     assert matched_times(["hello", "you"], stated) == []
     assert matched_times(["hello", "there"], [*stated[:2], ("there", 0.2, 0.1)]) == []
+
+
+def test_an_operator_names_voices_of_servers(monkeypatch: pytest.MonkeyPatch) -> None:
+    with speech_server(speech=says) as server:
+        monkeypatch.setenv(NAMES_VARIABLE, f"kokoro={server.url} other=https://example.org/v1#a")
+        assert {"kokoro", "other"} <= set(voice_names())
+        assert "to which texts are sent" in find_voice("kokoro").summary
+        check_voice("kokoro")
+        load_voice("kokoro", "en-us").sound("Hello.")
+    assert server.texts() == ["Hello."]
+    monkeypatch.setenv(NAMES_VARIABLE, "kokoro=ftp://example.org")
+    with pytest.raises(InputError, match="named voices must be such as"):
+        voice_names()
+    with pytest.raises(InputError, match="named voices must be such as"):
+        ServiceSettings(voices=("Kokoro",))
+
+
+def test_clients_documents_and_files_cannot_name_a_url(tmp_path: Path) -> None:
+    url = "http://127.0.0.1:1/v1#a"
+    with pytest.raises(RefusedError, match="there is no voice"):
+        check_voice(url)
+    with suppress(InputError):  # refused, or spoken by another voice
+        assert not any(run.voice for run in prepare(Request(text=DOCUMENT.format(url))).text.runs)
+    with pytest.raises(DataError, match="command line alone"):
+        cast_from_tables({"default": {"voice": url}}, "the cast")
+    with pytest.raises(DataError, match="command line alone"):
+        parse_project({"format": "tts2face project", "version": 2, "request": {"voice": url}}, "scene.json", tmp_path)
+    (tmp_path / "lines.csv").write_text(f"file,cue,voice\na,1,{url}\n", encoding="utf-8")
+    with pytest.raises(DataError, match="command line alone"):
+        read_lines(tmp_path / "lines.csv", ["a"])
+
+
+def test_the_next_sentence_is_asked_for_while_one_is_worked_on() -> None:
+    with speech_server(speech=says) as server:
+        prepared = prepare(Request(text="One. Two. Three.", voice=server.url))
+        models = SpeechModels(fitted_voices(VoicePool(), None, {}))
+        sentences = speak_sentences(prepared, models, has_phones=False)
+        next(sentences)
+        until = time.monotonic() + 5
+        while len(server.texts()) < 2 and time.monotonic() < until:
+            time.sleep(0.01)
+        assert sorted(server.texts()) == ["One.", "Two."]
+        list(sentences)
+    assert sorted(server.texts()) == ["One.", "Three.", "Two."]

@@ -31,6 +31,7 @@ from tts2face.picture.options import Picture
 from tts2face.request import CAMERA, Listening, Recorded, Request, Source, Spoken, option_fields
 from tts2face.session.corrections import SentenceEdges, StaleEdgesError
 from tts2face.session.joining import Excerpt
+from tts2face.sound.voice_urls import is_voice_url
 from tts2face.storage.output_paths import AnyPath
 from tts2face.types import exact_rate
 
@@ -230,7 +231,7 @@ def synthesis_options(request: Request) -> SynthesisOptions:
 
 def input_paths(request: Request, picture: Picture) -> dict[str, AnyPath]:
     """Paths of the files that a request and a picture read, by the names of their options."""
-    voice = None if request.spoken is None else request.spoken.voice
+    voice = None if request.spoken is None or is_voice_url(request.spoken.voice) else request.spoken.voice
     return {
         **recordings(request.source),
         "dictionary": request.dictionary,

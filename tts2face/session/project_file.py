@@ -18,6 +18,7 @@ from tts2face.request import Request, option_fields
 from tts2face.session.corrections import SentenceEdges
 from tts2face.session.named_models import Models
 from tts2face.session.project import Project
+from tts2face.sound.voice_urls import refuse_voice_url
 from tts2face.storage.files import write_atomically
 
 FORMAT, VERSION = "tts2face project", 2
@@ -83,6 +84,7 @@ def parse_project(content: Any, name: str, folder: Path) -> Project:
         )
     written = checked(_Written, content, name)
     first = {"face": FIRST_FACE} if written.version == 1 else {}
+    refuse_voice_url(written.request.get("voice"), name)
     with errors_at(f"{name}, request"):
         request = _options(Request, written.request, folder, REQUEST_FILES)
     with errors_at(f"{name}, models"):

@@ -37,7 +37,7 @@ from tts2face.session.prepared import innermost_styles
 from tts2face.sound.delivery import sound_with, speak_with
 from tts2face.sound.level import level_speech
 from tts2face.sound.prosody import Prosody
-from tts2face.sound.voice import SpeechInput, SpokenWord, Voice, apply_volume
+from tts2face.sound.voice import ExpectingVoice, SpeechInput, SpokenWord, Voice, apply_volume
 from tts2face.sound.voice_pool import has_voice, speaks
 from tts2face.types import Speech, Waveform, YieldTurn, concatenate_speech, keep_on
 
@@ -204,6 +204,15 @@ def speak_sentence(
     return SpokenSentence(
         speech, *resolve_marks(sentence.runs, sentence.marks, times, (sentence.first, sentence.last)), sound
     )
+
+
+def expect_sentence(voice: Voice, sentence: Sentence, request: Request, deliveries: Deliveries = NO_DELIVERIES) -> None:
+    """Let a voice that can begin with a sentence, while the one before it is worked on."""
+    if isinstance(voice, ExpectingVoice):
+        for part in sentence.utterances:
+            if part.voice is None and part.language is None:
+                rate = text_of(request).rate * part.rate * delivery_of(part, sentence.runs, request, deliveries).rate
+                voice.expect(phrase_content(part), rate)
 
 
 def sentence_sound(

@@ -4,7 +4,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from functools import cache
+from functools import cache, partial
 from itertools import chain
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,7 @@ from lexicon.sentence_length import n_letters
 from lexicon.sentences import Sentence, text_prefix
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.gestures.timeline import Timeline
-from tts2face.request import CONVERSATION, TURN_S, Idle, Listening, Recorded, Spoken
+from tts2face.request import CONVERSATION, TURN_S, Idle, Listening, Recorded, Request, Spoken
 from tts2face.session.joining import JOIN_LEAD_S, Excerpt, excerpt_of_speech, shift_start, silent_speech, word_bounds
 from tts2face.session.prepared import IDLE_STEPS, PreparedRequest
 from tts2face.session.speech import (
@@ -28,6 +28,7 @@ from tts2face.session.speech import (
     SpokenPart,
     SpokenSentence,
     Voices,
+    expect_sentence,
     long_silence,
     sentence_sound,
     silent_sentences,
@@ -37,6 +38,7 @@ from tts2face.session.speech import (
 )
 from tts2face.session.whole_frames import FramedPart, WholeFrames
 from tts2face.sound.pauses import speech_onset
+from tts2face.sound.voice import Voice
 from tts2face.sound.voice_pool import require_installed
 from tts2face.storage.memory import NO_MEMORY, ResultMemory
 from tts2face.types import (
@@ -293,7 +295,7 @@ def speak_sentences(
             lambda made: made.sound.samples.nbytes + made.speech.waveform.samples.nbytes,
         )
 
-    shortened = map(without_long_silence, prepared.sentences())
+    shortened = map(partial(_expected, voice, request, models.deliveries), prepared.sentences())
     for (sentence, before_s, after_s), found, is_last in _spoken(shortened, speak):
         text = " ".join(phrase.source for phrase in sentence.utterances)
         spoken = found
@@ -304,6 +306,13 @@ def speak_sentences(
         before = long_silence(before_s, Timeline(), voice.sample_rate)
         after = long_silence(after_s, spoken.timeline, voice.sample_rate)
         yield from _ending(chain(before, [SpokenPart(spoken, sentence.n_characters, text)], after), is_last=is_last)
+
+
+def _expected(voice: Voice, request: Request, deliveries: Deliveries, sentence: Sentence) -> Shortened:
+    """A sentence without its long silences, for which the voice is asked ahead."""
+    shortened = without_long_silence(sentence)
+    expect_sentence(voice, shortened.sentence, request, deliveries)
+    return shortened
 
 
 def _ending(parts: Iterator[SpokenPart], *, is_last: bool) -> Iterator[SpokenPart]:

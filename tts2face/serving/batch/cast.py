@@ -31,6 +31,7 @@ from lexicon.values.toml_text import parse_toml
 from tts2face.interchange.subtitles.cues import Cue
 from tts2face.request import OPTIONS, Request
 from tts2face.session.named_models import Models
+from tts2face.sound.voice_urls import refuse_voice_url
 
 MODEL_NAMES = tuple(option.name for option in fields(Models))
 PATTERN_NAMES = ("speaker", "subtitle_style", "file", "text")
@@ -160,6 +161,7 @@ def _settings(table: Mapping[str, Any], place: str, folder: Path | None) -> dict
             raise DataError(f"{place}: there is no setting {name!r}; use {known}")
         if value is None:
             raise DataError(f"{place}: {name} must be a text, a number or true or false, not {format_value(value)}")
+    refuse_voice_url(table.get("voice"), place)
     settings = {name: _resolve(name, value, folder) for name, value in table.items()}
     try:
         Request(**{name: value for name, value in settings.items() if name in REQUEST_NAMES})

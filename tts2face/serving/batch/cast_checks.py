@@ -11,14 +11,15 @@ from tts2face.models.palette_file import load_palette
 from tts2face.request import AUTO, NATURAL, OWN_FACE, parse_articulation
 from tts2face.session.catalogue import identities
 from tts2face.session.named_models import Models
-from tts2face.sound.voice_pool import has_voice, voice_names
+from tts2face.sound.voice_pool import find_voice
+from tts2face.sound.voice_urls import is_voice_url
 
 
 def check_names(models: Models, request: Mapping[str, Any]) -> None:
     """Refuse a voice, an identity, a haircut or a style that does not exist."""
     voice = request.get("voice")
-    if voice not in (None, AUTO) and not has_voice(voice) and not str(voice).endswith(".onnx"):
-        raise InputError(f"there is no voice {voice!r}; give {', '.join(voice_names())}, or a Piper voice (.onnx)")
+    if voice not in (None, AUTO) and not is_voice_url(voice) and not str(voice).endswith(".onnx"):
+        find_voice(str(voice))
     if models.identity is not None:
         known = _identities(models.face)
         if models.identity not in known:

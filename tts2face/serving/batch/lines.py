@@ -16,6 +16,7 @@ from lexicon.marked_text import RATE_LIMITS
 from lexicon.values.checks import check_limits
 from lexicon.values.fields import check_fields
 from lexicon.values.tables import parse_cell, read_table
+from tts2face.sound.voice_urls import refuse_voice_url
 from tts2face.storage.files import write_atomically
 
 MAX_TABLE_BYTES = 16 << 20  # 100,000 lines have 10 MB
@@ -139,6 +140,7 @@ def _settings(row: Mapping[str, str], place: Place) -> LineSettings:
     spoken, rate, voice, offset = (row.get(name, "") for name in SETTINGS)
     if spoken.lower() not in _SPOKEN:
         raise DataError(f"{_shown(place)}: spoken must be yes, no or empty, not {spoken[:20]!r}")
+    refuse_voice_url(voice, _shown(place))
     settings = LineSettings(
         _SPOKEN[spoken.lower()],
         parse_cell(rate.replace(",", "."), *place) if rate else None,  # as spreadsheets of many countries write it

@@ -13,6 +13,7 @@ from tts2face.serving.batch.audio_track import open_track
 from tts2face.serving.batch.content_address import content_address, file_hash, model_hash, program_version
 from tts2face.session.named_models import Models
 from tts2face.sound.fitting import fitting_voice
+from tts2face.sound.voice_urls import is_voice_url
 from tts2face.types import SOUND_RATE, exact_rate, first_sample
 
 SEGMENT_SUFFIX = ".mov"
@@ -182,7 +183,7 @@ def input_hashes(models: Models, request: Mapping[str, Any], picture: Mapping[st
         hashes["hair"] = model_hash(str(models.hair), "hair")
     for name in REQUEST_FILES:
         value = request.get(name)
-        if value is not None and (name != "voice" or Path(str(value)).suffix):
+        if value is not None and (name != "voice" or (Path(str(value)).suffix and not is_voice_url(value))):
             hashes[name] = file_hash(Path(str(value)))
     background = picture.get("background")
     if background is not None and Path(str(background)).suffix:

@@ -20,6 +20,7 @@ from tts2face.serving.service.logs import configure_logs, log_event
 from tts2face.serving.service.page_addresses import PAGES
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
+from tts2face.sound.voice_urls import NAMES_VARIABLE
 from tts2face.storage.temporary import remove_held
 
 SOCKET_GRACE_S = 3.0  # between the message to the clients of WebSockets and their end
@@ -39,6 +40,8 @@ def serve(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> None:
         Traces are asked for and their libraries are missing.
     """
     configure_logs(settings.log_format, with_text=settings.log_text)
+    if settings.voices:  # for the processes of the service, too
+        os.environ[NAMES_VARIABLE] = " ".join(settings.voices)
     _allow_files(settings.connections)
     server = make_server(settings, mounts)
     server.exit_s = EXIT_S

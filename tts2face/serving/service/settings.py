@@ -15,6 +15,7 @@ from lexicon.values.fields import check_fields
 from lexicon.values.files import read_text
 from lexicon.values.records import checked
 from lexicon.values.toml_text import parse_toml
+from tts2face.sound.voice_urls import parse_named_urls
 from tts2face.storage.user_folders import user_data
 
 PREFIX = "TTS2FACE_SERVE_"  # of environment variables: TTS2FACE_SERVE_PORT
@@ -59,6 +60,10 @@ class ServiceSettings:
     talker: str = setting("grid_s1", "Talker of requests that name none.")
     face: str = setting("", "Face of requests that name none; empty: ada, or head for those with an identity or hair.")
     palette: str = setting("starter", "Palette of requests that name none.")
+    voices: tuple[str, ...] = setting(
+        (),
+        "Voices of other servers, which get the texts, by names for clients: kokoro=http://127.0.0.1:8000/v1#af_heart.",
+    )
     data: Path | None = setting(None, "Folder of jobs, results and uploads; by default one of the user's.")
     database: str = setting("", "SQLite file or postgresql://...; empty: service.sqlite in the data folder.")
     store: str = setting("", "Folder or s3://, gs://, az:// of segments and results; empty: in the data folder.")
@@ -150,6 +155,7 @@ class ServiceSettings:
         for host in self.webhook_hosts:
             if not _PLACE.fullmatch(host):
                 raise InputError(f"webhook_hosts must be such as example.org or a.example:8080, not {host[:80]!r}")
+        parse_named_urls(" ".join(self.voices))
         for origin in self.origins:
             if not _ORIGIN.fullmatch(origin):
                 raise InputError(
