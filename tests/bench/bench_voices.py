@@ -6,7 +6,6 @@ are measured in clips, all else in the sound of the voice.
 """
 
 import argparse
-import re
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -31,7 +30,7 @@ from tts2face.sound.delivery import speak_with
 from tts2face.sound.loudness import integrated_loudness
 from tts2face.sound.prosody import Prosody
 from tts2face.sound.voice import Voice
-from tts2face.sound.voice_pool import find_voice, is_installed, load_voice, voice_names
+from tts2face.sound.voice_pool import is_installed, load_voice, speaks, voice_names
 
 PAGE = Path(__file__).resolve().parents[2] / "docs/voices.md"
 PICTURE = PAGE.with_name("pictures") / "voices-f0.png"
@@ -40,7 +39,8 @@ RATES = (0.5, 0.7, 0.85, 1.1, 1.25, 1.5, 2.0)
 YES_NO = (
     "Are they on the early train?", "Did Anna lose her umbrella?", "Is there any room at the table?",
     "Will you bring a warm jacket?", "Has nobody told him the news?", "Can a penguin fly?",
-    "Do they open on Sunday?", "Should we water the roses now?", "Was it really that easy?", "You have never seen snow?",
+    "Do they open on Sunday?", "Should we water the roses now?", "Was it really that easy?",
+    "You have never seen snow?",
 )  # fmt: skip
 STATEMENTS = (
     "They are on the early train.", "Anna lost her umbrella.", "There is room at the table.", "I will bring a jacket.",
@@ -177,10 +177,8 @@ def main() -> None:
     parser.add_argument("-n", type=int, default=20, help="sentences")
     parser.add_argument("--write", action="store_true", help="into docs/voices.md, with the picture")
     options = parser.parse_args()
-    speaking = [
-        name for name in voice_names() if is_installed(name) and LANGUAGE in (find_voice(name).languages or [LANGUAGE])
-    ]
-    voices = {name: load_voice(name, LANGUAGE) for name in options.names or speaking}
+    installed = [name for name in voice_names() if is_installed(name) and speaks(name, LANGUAGE)]
+    voices = {name: load_voice(name, LANGUAGE) for name in options.names or installed}
     texts, session = sentences(options.n, seed=54), Session()
     measured = {
         "basics": table({name: basics(voice, texts) for name, voice in voices.items()}),
@@ -193,12 +191,8 @@ def main() -> None:
     if options.write:
         page = PAGE.read_text(encoding="utf-8")
         for name, rows in measured.items():
-            page = re.sub(
-                rf"(<!-- {name} -->\n).*?(?=<!-- end -->)",
-                lambda start, rows=rows: f"{start[1]}\n{rows}\n\n",
-                page,
-                flags=re.S,
-            )
+            before, _, rest = page.partition(f"<!-- {name} -->\n")
+            page = f"{before}<!-- {name} -->\n\n{rows}\n\n{rest[rest.index('<!-- end -->') :]}"
         PAGE.write_text(page, encoding="utf-8")
         draw(voices)
 
