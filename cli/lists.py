@@ -1,4 +1,4 @@
-"""Lists of the available choices: ``tts2face voices | languages | faces | identities | haircuts | ...``."""
+"""Lists of the available choices: ``tts2face languages | faces | identities | haircuts | ...``."""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -14,33 +14,12 @@ AsJson = Annotated[bool, Parameter(help="Print JSON instead of a table.", name="
 EMPTY_CELL = "-"
 
 
-def voices(*, as_json: AsJson = False) -> None:
-    """List the voices (`--voice`): sex, engine, languages, whether they are installed, and licence."""
-    from tts2face.session.catalogue import voices
-
-    entries = voices()
-    rows = (
-        (
-            entry.name,
-            entry.sex,
-            entry.engine,
-            _languages_text(entry.languages),
-            "yes" if entry.is_installed else "no",
-            entry.licence,
-            entry.summary,
-        )
-        for entry in entries
-    )
-    titles = ("voice", "sex", "engine", "languages", "installed", "licence", "summary")
-    _print(entries, titles, rows, as_json)
-
-
 def languages(*, as_json: AsJson = False) -> None:
     """List the languages (`--language`): codes and English names; `--language` accepts both."""
     from tts2face.session.catalogue import languages
 
     entries = languages()
-    _print(entries, ("code", "name"), ((entry.code, entry.name) for entry in entries), as_json)
+    print_entries(entries, ("code", "name"), ((entry.code, entry.name) for entry in entries), as_json)
 
 
 def faces(*, as_json: AsJson = False) -> None:
@@ -49,7 +28,7 @@ def faces(*, as_json: AsJson = False) -> None:
 
     entries = faces()
     rows = ((entry.name, str(len(entry.identities)), entry.summary) for entry in entries)
-    _print(entries, ("face", "identities", "summary"), rows, as_json)
+    print_entries(entries, ("face", "identities", "summary"), rows, as_json)
 
 
 def identities(
@@ -59,7 +38,7 @@ def identities(
     from tts2face.session.catalogue import identities
 
     entries = identities(face)
-    _print(entries, ("identity", "summary"), ((entry.name, entry.summary) for entry in entries), as_json)
+    print_entries(entries, ("identity", "summary"), ((entry.name, entry.summary) for entry in entries), as_json)
 
 
 def haircuts(*, as_json: AsJson = False) -> None:
@@ -67,7 +46,7 @@ def haircuts(*, as_json: AsJson = False) -> None:
     from tts2face.session.catalogue import haircuts
 
     entries = haircuts()
-    _print(
+    print_entries(
         entries, ("haircut", "face", "summary"), ((entry.name, entry.face, entry.summary) for entry in entries), as_json
     )
 
@@ -77,7 +56,7 @@ def hair_colors(*, as_json: AsJson = False) -> None:
     from tts2face.session.catalogue import hair_colors
 
     entries = hair_colors()
-    _print(entries, ("color", "sRGB"), ((entry.name, entry.color) for entry in entries), as_json)
+    print_entries(entries, ("color", "sRGB"), ((entry.name, entry.color) for entry in entries), as_json)
 
 
 def styles(
@@ -90,7 +69,7 @@ def styles(
 
     entries = styles(palette)
     rows = ((entry.name, entry.source or EMPTY_CELL, entry.summary) for entry in entries)
-    _print(entries, ("style", "derived from", "summary"), rows, as_json)
+    print_entries(entries, ("style", "derived from", "summary"), rows, as_json)
 
 
 def talkers(*, as_json: AsJson = False) -> None:
@@ -109,7 +88,7 @@ def talkers(*, as_json: AsJson = False) -> None:
         )
         for entry in entries
     )
-    _print(entries, ("talker", "language", "utterances", "minutes", "own face", "licence"), rows, as_json)
+    print_entries(entries, ("talker", "language", "utterances", "minutes", "own face", "licence"), rows, as_json)
 
 
 def formats(*, as_json: AsJson = False) -> None:
@@ -121,19 +100,20 @@ def formats(*, as_json: AsJson = False) -> None:
         (entry.name, " ".join(entry.suffixes), "yes" if entry.is_installed else "no", entry.summary)
         for entry in entries
     )
-    _print(entries, ("format", "suffixes", "installed", "summary"), rows, as_json)
+    print_entries(entries, ("format", "suffixes", "installed", "summary"), rows, as_json)
 
 
-LISTS = (voices, languages, faces, identities, haircuts, hair_colors, styles, talkers, formats)
+LISTS = (languages, faces, identities, haircuts, hair_colors, styles, talkers, formats)
 
 
-def _languages_text(codes: Sequence[str]) -> str:
+def languages_text(codes: Sequence[str]) -> str:
+    """Codes of languages for a table, or their number."""
     if not codes:
         return "its own"
     return ", ".join(codes) if len(codes) < 6 else str(len(codes))
 
 
-def _print(
+def print_entries(
     entries: "Sequence[DataclassInstance]", heading: Sequence[str], rows: Iterable[Sequence[str]], as_json: bool
 ) -> None:
     """Print entries as JSON or as a table with aligned columns."""

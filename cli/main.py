@@ -85,6 +85,7 @@ app.command("cli.serve:keys")
 app.command("cli.corpus:corpus")
 app.command("cli.report:report")
 app.command("cli.face:face")
+app.command("cli.voices:voices")
 for list_command in LISTS:
     app.command(list_command)
 

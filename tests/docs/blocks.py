@@ -23,6 +23,8 @@ NOT_EXECUTED = {  # beginning of a command line: why it is parsed only
     "jobs show": "needs the name of a job",
     "jobs prune --store": "needs a finished batch",
     "corpus setup": "uses the network",
+    "voices add": "uses the network; tests/sound/test_hibari_voices.py runs the command",
+    "voices remove": "needs a voice that was added",
     "corpus build": PERSON,
     "corpus check": PERSON,
     "corpus face": PERSON,

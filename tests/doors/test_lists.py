@@ -24,7 +24,7 @@ LISTED = ["voices", "languages", "faces", "identities", "haircuts", "hair_colors
 
 
 def test_there_is_a_command_for_each_list() -> None:
-    assert [command.__name__ for command in LISTS] == LISTED
+    assert [command.__name__ for command in LISTS] == LISTED[1:]  # voices are a group of commands
 
 
 @pytest.mark.parametrize("name", LISTED)

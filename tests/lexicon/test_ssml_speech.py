@@ -19,7 +19,7 @@ from lexicon.sentences import split_sentences
 from lexicon.spoken_words import pronounce_marked
 from lexicon.ssml_values import MAX_ATTRIBUTE_CHARACTERS, VOICES
 from lexicon.text_marks import parse_marks
-from tts2face.sound.voice_pool import SHIPPED_VOICES
+from tts2face.sound.shipped_voices import SHIPPED_VOICES
 
 ELEMENTS = (
     "speak", "p", "s", "break", "emphasis", "prosody", "mark", "sub", "express-as", "mstts:express-as", "phoneme",
@@ -284,7 +284,7 @@ def test_documents_may_name_the_voices_that_need_no_file() -> None:
         ('<phoneme ph="a" type="x">a</phoneme>', "<phoneme> does not support the attribute 'type'"),
         ("<say-as>1</say-as>", "a <say-as> needs interpret-as; write"),
         ('<say-as interpret-as="ssn">1</say-as>', "no kind 'ssn'"),
-        ('<voice name="en-US-JennyNeural">a</voice>', "no voice 'en-US-JennyNeural'; use heart, joe, espeak"),
+        ('<voice name="en-US-JennyNeural">a</voice>', "no voice 'en-US-JennyNeural'; use heart, kore"),
         ('<voice name="/etc/x.onnx">a</voice>', "no voice '/etc/x.onnx'"),
         ('<voice gender="robot">a</voice>', "no gender 'robot'"),
         ('<voice age="9">a</voice>', "<voice> does not support the attribute 'age'"),

@@ -218,7 +218,7 @@ def test_very_long_words_are_spoken_in_english(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "language", "reason"),
     [
-        ("nobody", "en-us", "no voice 'nobody'; give heart, joe, espeak"),
+        ("nobody", "en-us", "no voice 'nobody'; give heart, kore"),
         ("heart", "de", "speaks English, not de"),
         ("espeak", "xx", "no language 'xx'"),
         ("missing.onnx", "en-us", r"no Piper voice missing\.onnx"),

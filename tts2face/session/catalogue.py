@@ -141,15 +141,14 @@ def voices() -> tuple[VoiceEntry, ...]:
 
 def _voice_entry(name: str, codes: tuple[str, ...]) -> VoiceEntry:
     """Entry of a voice; one whose package cannot be loaded says so, and is not installed."""
-    from tts2face.sound.voice_pool import find_voice
+    from tts2face.sound.voice_pool import find_voice, is_installed
 
     try:
         voice = find_voice(name)
     except BackendError as broken:
         return VoiceEntry(name, "-", (), False, str(broken), "-", "-")
     spoken = tuple(code for code in codes if not voice.languages or code in voice.languages)
-    is_installed = _is_installed(voice.package)
-    return VoiceEntry(name, voice.engine, spoken, is_installed, voice.summary, voice.sex, voice.licence)
+    return VoiceEntry(name, voice.engine, spoken, is_installed(name), voice.summary, voice.sex, voice.licence)
 
 
 def languages() -> tuple[LanguageEntry, ...]:

@@ -13,8 +13,9 @@ import numpy as np
 from lexicon.languages import language_code
 from tts2face.models.person import FEMALE, MALE, Person
 from tts2face.sound.prosody import PLAIN_PROSODY, Prosody
+from tts2face.sound.shipped_voices import SHIPPED_VOICES
 from tts2face.sound.voice import PronunciationMap, Voice, VoiceInfo
-from tts2face.sound.voice_pool import SHIPPED_VOICES, VoicePool, default_voice, is_installed, speaks
+from tts2face.sound.voice_pool import VoicePool, default_voice, is_installed, speaks
 
 AGES = (10.0, 18.0, 50.0, 75.0)  # years of the columns below; between them values change evenly
 # F0, Hz: men 132, women 223, children 264 (Peterson and Barney 1952, means of table II). In old age it falls in women

@@ -18,9 +18,17 @@ from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from lexicon.values.json_text import read_json
 from tts2face.numeric.arrays import FloatArray
 from tts2face.numeric.telemetry import disable_telemetry
-from tts2face.sound.heart_letters import MARKS, LetteredPart, LetteredWord, lettered_parts
+from tts2face.sound.heart_letters import (
+    BRITISH_LETTERS,
+    LETTERS_OF_PHONE,
+    MARKS,
+    LetteredPart,
+    LetteredWord,
+    lettered_parts,
+)
 from tts2face.sound.heart_network import DURATION_STEP_S, FRAME_S, HeartNetwork
 from tts2face.sound.heart_spectrum import creak_to_harmonics, match_energy, samples_of, spectrum
+from tts2face.sound.hibari_voices import USUAL_VOICE, hibari_voice, read_model
 from tts2face.sound.prosody import PLAIN_PROSODY, Prosody
 from tts2face.sound.psola import even_stretch, resynthesize
 from tts2face.sound.transforms import import_hibari
@@ -32,7 +40,6 @@ if TYPE_CHECKING:
     from tts2face.models.phone_classifier import PhoneClassifier
     from tts2face.sound.segments import StatedPhone
 
-LANGUAGE = "en-us"
 SAMPLE_RATE = 24_000
 BOUNDARY_DELAY_S = 0.061  # delay of the model's own boundaries against its sound (56 ms when fast, 71 when slow)
 FASTEST = 1.0  # rate of the network; above it its sound is shortened, in which less is lost (decision 251)
@@ -58,24 +65,28 @@ class SpokenPart:
 
 
 class NeuralVoice:
-    """The voice ``heart``: American English, 24 kHz. Not thread-safe.
+    """A voice of hibari-tts: English, 24 kHz. Not thread-safe.
 
     Parameters
     ----------
+    name
+        Of its list: American or British, whatever the variety of the text.
     run
         Runs the model; None: within the call.
     """
 
-    def __init__(self, own_words: PronunciationMap, run: NativeRun | None = None) -> None:
+    def __init__(self, own_words: PronunciationMap, run: NativeRun | None = None, *, name: str = USUAL_VOICE) -> None:
         self._own_words = own_words
         disable_telemetry()
         with import_of_extra("the voice heart needs hibari-tts; run: pip install hibari-tts"):
             import_hibari()
             from hibari.tts import ASSETS
-            from hibari.voices import voice_path
         self._numbers = read_json(Path(ASSETS, "vocab.json"))
-        self._network = HeartNetwork(Path(voice_path("heart")).read_bytes(), run)
-        pronounce_content("Hello.", LANGUAGE, {})  # reads the dictionary while other models are loaded
+        voice = hibari_voice(name)
+        self._language = voice.language
+        self._alphabet = BRITISH_LETTERS if voice.is_british else LETTERS_OF_PHONE
+        self._network = HeartNetwork(read_model(name), run)
+        pronounce_content("Hello.", voice.language, {})  # reads the dictionary while other models are loaded
 
     @cached_property
     def _classifier(self) -> "PhoneClassifier":
@@ -108,7 +119,7 @@ class NeuralVoice:
 
     def parts(self, content: SpeechInput, prosody: Prosody = PLAIN_PROSODY, seed: int = 0) -> Iterator[SpokenPart]:
         """Parts that the model synthesises in one call."""
-        for part in lettered_parts(pronounce_content(content, LANGUAGE, self._own_words)):
+        for part in lettered_parts(pronounce_content(content, self._language, self._own_words), self._alphabet):
             yield self._spoken(part, prosody, seed)
 
     def _spoken(self, part: LetteredPart, prosody: Prosody, seed: int) -> SpokenPart:

