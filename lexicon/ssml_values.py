@@ -28,7 +28,7 @@ ALPHABETS: Mapping[str, Callable[[str], tuple[IpaPhone, ...]]] = MappingProxyTyp
     "ipa": parse_ipa, "x-arpabet": arpabet_segments, "arpabet": arpabet_segments, "x-cmu": arpabet_segments,
 })  # fmt: skip
 # Voices that a document may name, as in tts2face.sound; Piper voices are files, which a document cannot open.
-VOICES = ("heart", "kore", "fenrir", "emma", "fable", "joe", "espeak", "espeak-female")
+VOICES = ("heart", "kore", "fenrir", "emma", "fable", "joe", "mei", "espeak", "espeak-female")
 _ENGLISH_VOICES = frozenset(VOICES[:6])
 GENDERS = ("female", "male", "neutral")
 MAX_PHONES_CHARACTERS = 500  # characters of ``ph``

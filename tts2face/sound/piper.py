@@ -17,14 +17,13 @@ from lexicon.errors import DataError, InputError, import_of_extra
 from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.ipa import IpaPhone
 from lexicon.languages import language_code
-from lexicon.nominal_durations import NOMINAL_S
 from lexicon.normalize import spoken_form
 from lexicon.pauses import SIMPLE_MARKS
 from lexicon.phones import PHONES, nearest_phones
 from lexicon.pronounce import Word
-from lexicon.sequence import PhoneSequence, WordSpan
 from lexicon.values.json_text import read_json
 from tts2face.numeric.telemetry import disable_telemetry
+from tts2face.sound.aligned_speech import AlignedWord, aligned_speech
 from tts2face.sound.alignment import Align, Aligner
 from tts2face.sound.voice import (
     PronunciationMap,
@@ -50,7 +49,6 @@ _ARTICLES = frozenset({("ə",), ("ə", "n")})
 WORD = re.compile(r"[^\W_]+(?:['’-][^\W_]+)*")
 WORD_AND_MARKS = re.compile(rf"({WORD.pattern})([.,;:!?]*)")
 ESPEAK_PHONES = "espeak"  # type of the supported voices; others need letters, or models that piper downloads
-AlignedWord = tuple[str, list[tuple[str, ...]]]  # a written word with its phones, for the aligner
 SAMPLE_RATES_HZ = (8_000, 48_000)
 
 
@@ -233,13 +231,7 @@ class PiperVoice:
     def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
         """Synthesise a sentence; see `tts2face.sound.voice.Voice`. The model runs without noise: `seed` is unused."""
         words, sentences = self._spoken(content)
-        sound = self._synthesise(sentences, rate)
-        try:
-            found = self._align(sound, words)
-        # hundreds of equal words have no alignment, but their sound is right
-        except DataError:
-            return Speech(sound, *nominal_phones_in(words, sound.duration))
-        return Speech(sound, found.phones, found.words)
+        return aligned_speech(self._synthesise(sentences, rate), words, self._align)
 
     def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
         """Sound without the alignment of its phones."""
@@ -291,17 +283,6 @@ class PiperVoice:
     def _known_marks(self, marks: str) -> str:
         simple = (SIMPLE_MARKS.get(mark, mark) for mark in marks)
         return "".join(mark for mark in simple if mark in self._network.letters)
-
-
-def nominal_phones_in(words: Sequence[AlignedWord], seconds: float) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
-    """Phones with nominal durations scaled to a sound, for sound that cannot be aligned (hundreds of equal words)."""
-    labels = [phone for _, (phones,) in words for phone in phones]
-    shares = np.cumsum([0.0, *(NOMINAL_S[PHONES[phone].kind] for phone in labels)])
-    spans, first = [], 0
-    for text, (phones,) in words:
-        spans.append(WordSpan(text, first, first + len(phones)))
-        first += len(phones)
-    return PhoneSequence(labels, seconds * shares / shares[-1]), tuple(spans)
 
 
 def _check_settings(path: Path, content: Any) -> None:

@@ -40,6 +40,12 @@ def _joe(setting: VoiceSetting) -> Voice:
     return piper_voice(_packaged_voice("joe", JOE_PACKAGE), setting)
 
 
+def _mei(setting: VoiceSetting) -> Voice:
+    from tts2face.sound.mei import MeiVoice
+
+    return MeiVoice(setting)
+
+
 def _espeak(setting: VoiceSetting, *, is_female: bool = False) -> Voice:
     from tts2face.sound.espeak import EspeakVoice
 
@@ -94,6 +100,10 @@ SHIPPED_VOICES: Mapping[str, VoiceInfo] = MappingProxyType({
     "joe": VoiceInfo(
         "neural, American English (extra [voices])", _joe, "piper", JOE_PACKAGE, "male", "CC0, finetuned (NOTICE)",
         ENGLISH_CODES, "en-us",
+    ),
+    "mei": VoiceInfo(
+        "hidden Markov models, Japanese (extra [japanese])", _mei, "open-jtalk", "pyopenjtalk", "female",
+        "CC BY 3.0 (NOTICE)", ("ja",), "ja",
     ),
     "espeak": VoiceInfo(
         "formant synthesis, every language of espeak-ng", _espeak, "espeak-ng", "espeakng_loader", "male",

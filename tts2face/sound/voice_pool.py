@@ -36,7 +36,8 @@ from tts2face.types import Speech, Waveform, YieldTurn, keep_on
 if TYPE_CHECKING:
     from tts2face.sound.alignment import Align, Aligner
 
-BRITISH = MappingProxyType({"en-gb": ("emma", "fable")})  # voices of an accent, the preferred one first
+# voices of languages whose usual one is not that of every installation, the preferred one first
+WHERE_INSTALLED = MappingProxyType({"en-gb": ("emma", "fable"), "ja": ("mei",)})
 MAX_VOICES = 2  # unused voices in memory; about 100 MB each
 MAX_UTTERANCES = 8  # of at most some ten seconds; one second of sound takes 100 kB
 
@@ -93,9 +94,8 @@ def speaks(name: str, language: str) -> bool:
 
 def default_voice(language: str) -> str:
     """Name of the voice that speaks a language code where none is chosen."""
-    if language in BRITISH:
-        return next((name for name in BRITISH[language] if is_installed(name)), "espeak")
-    return "heart" if language in ENGLISH_CODES[:2] else "espeak"
+    usual = "heart" if language in ENGLISH_CODES[:2] else "espeak"
+    return next((name for name in WHERE_INSTALLED.get(language, ()) if is_installed(name)), usual)
 
 
 def is_installed(name: str) -> bool:

@@ -23,8 +23,8 @@ import numpy as np
 from lexicon.errors import BackendError, DataError, InputError, SilentTextError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan, enforce_increasing
 from lexicon.values.json_text import parse_json
+from tts2face.sound.aligned_speech import aligned_speech, written_text
 from tts2face.sound.alignment import Align, Aligner
-from tts2face.sound.piper import nominal_phones_in
 from tts2face.sound.received_sound import decode_sound
 from tts2face.sound.voice import PronunciationMap, SpeechInput, VoiceSetting, apply_volume, pronounce_content
 from tts2face.sound.voice_urls import KEY_VARIABLE, ServerAddress, parse_voice_url
@@ -241,7 +241,7 @@ class ServerVoice:
 
     def expect(self, content: SpeechInput, rate: float) -> None:
         """Ask for the sound of a sentence that will be spoken soon."""
-        text = written(content)
+        text = written_text(content)
         if text and (text, rate) not in self._asked:
             self._asked[(text, rate)] = self._threads.submit(self._client.sound, text, _speed(rate))
             while len(self._asked) > N_AHEAD:
@@ -252,14 +252,10 @@ class ServerVoice:
         words = [
             (word.text, [tuple(word.phones)]) for word in pronounce_content(content, self._language, self._own_words)
         ]
-        sound, stated = self._sound_of(written(content), rate)
+        sound, stated = self._sound_of(written_text(content), rate)
         times = matched_times([word for word, _ in words], stated)
-        # hundreds of equal words have no alignment, but their sound is right
-        try:
-            found = self._align(sound, words)
-            phones, spans = found.phones, found.words
-        except DataError:
-            phones, spans = nominal_phones_in(words, sound.duration)
+        speech = aligned_speech(sound, words, self._align)
+        phones, spans = speech.phones, speech.words
         starts = phones.edges[[word.first for word in spans]]
         if times and times[-1][1] <= sound.duration and np.abs(starts - [start for start, _ in times]).max() > AGREES_S:
             phones, spans = _moved(phones, spans, times)
@@ -267,7 +263,7 @@ class ServerVoice:
 
     def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
         """Sound without the alignment of its phones."""
-        return self._sound_of(written(content), rate)[0]
+        return self._sound_of(written_text(content), rate)[0]
 
     def _sound_of(self, text: str, rate: float) -> tuple[Waveform, list[tuple[str, float, float]]]:
         if not any(letter.isalnum() for letter in text):
@@ -282,13 +278,6 @@ class ServerVoice:
 
 def _speed(rate: float) -> float:
     return float(np.clip(round(rate, 4), *RATES_OF_SERVERS))
-
-
-def written(content: SpeechInput) -> str:
-    """Text of what a voice is given; a server has no phones of ours."""
-    if isinstance(content, str):
-        return content.strip()
-    return " ".join(word.text + word.after for word in content).strip()
 
 
 def matched_times(words: Sequence[str], stated: Sequence[tuple[str, float, float]]) -> list[tuple[float, float]]:
