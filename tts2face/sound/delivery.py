@@ -3,6 +3,7 @@
 from typing import Protocol, runtime_checkable
 
 from tts2face.sound.prosody import PLAIN_PROSODY, Prosody
+from tts2face.sound.retuned import intention, is_retuned, retuned
 from tts2face.sound.spacing import has_pauses, with_pauses
 from tts2face.sound.voice import SpeechInput, Voice
 from tts2face.types import Speech, Waveform
@@ -38,7 +39,10 @@ def speak_with(
     """
     if isinstance(voice, DeliveringVoice):
         return voice.deliver(content, prosody, seed)
-    return with_pauses(voice.speak(content, rate=prosody.rate, seed=seed), content, prosody.rate, language)
+    speech = voice.speak(content, rate=prosody.rate, seed=seed)
+    intended = intention(content, language)
+    speech = with_pauses(speech, content, prosody.rate, language)
+    return retuned(speech, prosody, intended) if is_retuned(prosody, intended) else speech
 
 
 def sound_with(
@@ -47,6 +51,7 @@ def sound_with(
     """Sound of `speak_with` alone, which some voices compute sooner; arguments and errors as there."""
     if isinstance(voice, DeliveringVoice):
         return voice.deliver_sound(content, prosody, seed)
-    if has_pauses(content):  # edges of words tell where they are
+    # edges of words tell where these are
+    if has_pauses(content) or is_retuned(prosody, intention(content, language)):
         return speak_with(voice, content, prosody, seed, language=language).waveform
     return voice.sound(content, rate=prosody.rate, seed=seed)

@@ -5,15 +5,17 @@ Phone edges are found in the sound as the network makes it, near the durations t
 
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import import_of_extra
+from lexicon.pauses import PAUSES_S
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from lexicon.values.json_text import read_json
 from tts2face.numeric.arrays import FloatArray
@@ -32,7 +34,7 @@ from tts2face.sound.hibari_voices import USUAL_VOICE, hibari_voice, read_model
 from tts2face.sound.prosody import PLAIN_PROSODY, Prosody
 from tts2face.sound.psola import even_stretch, resynthesize
 from tts2face.sound.transforms import import_hibari
-from tts2face.sound.tune import PlacedWord, Tune, shape_pitch
+from tts2face.sound.tune import EMPHASIS_LENGTH, SEMITONES, PlacedWord, Tune, shape_pitch
 from tts2face.sound.voice import NativeRun, PronunciationMap, SpeechInput, pronounce_content
 from tts2face.types import Speech, Waveform, concatenate_speech
 
@@ -42,8 +44,11 @@ if TYPE_CHECKING:
 
 SAMPLE_RATE = 24_000
 BOUNDARY_DELAY_S = 0.061  # delay of the model's own boundaries against its sound (56 ms when fast, 71 when slow)
+# silence that the letters beside a mark and its space have, median of twelve sentences each
+SILENT_BESIDE_S = MappingProxyType(
+    {",": 0.085, "—": 0.095, ":": 0.15, ";": 0.15, "…": 0.085, ".": 0.1, "!": 0.1, "?": 0.1}
+)
 FASTEST = 1.0  # rate of the network; above it its sound is shortened, in which less is lost (decision 251)
-EMPHASIS_LENGTH = 1.3  # factor of the durations of an emphasised word
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,7 +134,9 @@ class NeuralVoice:
         frames = self._network.frames(numbers, hidden, steps)
         plain = spectrum(frames, frames.f0, seed)
         unchanged = _limited(samples_of(plain))
-        tune = Tune(prosody, _placed(part, steps), part.movements)
+        # a sound that gets other formants gets its pitch with them, which is nearer (decision 252)
+        in_sound = prosody.pitch if prosody.formants != 1.0 else 0.0
+        tune = Tune(replace(prosody, pitch=prosody.pitch - in_sound), _placed(part, steps), part.movements)
         sound = unchanged
         if not tune.is_plain:
             shaped = shape_pitch(frames.f0, frame_times(len(frames.f0)), tune)
@@ -137,7 +144,9 @@ class NeuralVoice:
             changed = spectrum(frames, shaped.f0, seed)
             sound = _limited(samples_of(match_energy(changed, plain, shaped.moved)))
         stretch = even_stretch(max(prosody.rate / FASTEST, 1.0))
-        sound = resynthesize(sound, stretch, formants=prosody.formants)
+        shift = 2.0 ** (in_sound / SEMITONES)
+        shifted = (lambda _, hertz: hertz * shift) if in_sound else None
+        sound = resynthesize(sound, stretch, shifted, prosody.formants)
         return SpokenPart(sound, unchanged, part.words, stated_phones(part.words, steps))
 
     def _with_edges(self, part: SpokenPart) -> Speech:
@@ -175,6 +184,7 @@ def letter_steps(part: LetteredPart, durations: FloatArray, rate: float) -> NDAr
     At rate 1 each duration is rounded, as in the training of the network. Otherwise the remainder is carried on to the
     next letter, so that their sum is that at rate 1 over the rate.
     """
+    durations = _with_pauses(part, durations)
     steps = np.maximum(np.rint(durations), 1).astype(np.int64)
     factors = np.ones(len(steps))
     for word, start in zip(part.words, part.starts, strict=True):
@@ -185,6 +195,18 @@ def letter_steps(part: LetteredPart, durations: FloatArray, rate: float) -> NDAr
     total = max(round(float((inner * factors[1:-1]).sum()) / rate), len(inner))
     steps[1:-1] = carried_steps((durations[1:-1] if rate != 1.0 else inner) * factors[1:-1], total)
     return steps
+
+
+def _with_pauses(part: LetteredPart, durations: FloatArray) -> FloatArray:
+    """Durations of the letters whose marks within the part are as silent as `PAUSES_S` has them."""
+    found = durations.copy()
+    for word, start in zip(part.words[:-1], part.starts, strict=False):
+        mark = word.letters[word.n_spoken :]
+        if mark:
+            at = start + 1 + word.n_spoken
+            pause = (PAUSES_S[mark] - SILENT_BESIDE_S[mark]) / DURATION_STEP_S
+            found[at] = max(pause - max(round(durations[at + 1]), 1), 1.0)
+    return found
 
 
 def carried_steps(durations: FloatArray, total: int) -> NDArray[np.int64]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from lexicon.intonation import Movement, movements
-from lexicon.pauses import PAUSES_S
+from lexicon.pauses import DASH, ELLIPSIS, PAUSES_S
 from lexicon.phones import PHONES, nearest_phones
 from lexicon.pronounce import Word
 from lexicon.tones import EVEN, Tone
@@ -41,7 +41,7 @@ _ENDINGS = MappingProxyType(
 )  # -ed after a stop of the tongue, -es after a sibilant
 _BEFORE_FLAP = frozenset(phone for phone in LETTERS_OF_PHONE if PHONES[phone].is_vowel) | {"ɹ"}
 _ARTICLES = frozenset({("ə",), ("ə", "n"), ("ə", "m")})  # a, an, am
-CLAUSE_MARKS = frozenset({",", ";", ":"})
+CLAUSE_MARKS = frozenset({",", ";", ":", DASH, ELLIPSIS})
 MARKS = "".join(PAUSES_S)  # punctuation among the letters
 MAX_LETTERS = 400  # the model accepts at most this many letters in one call
 
@@ -126,7 +126,7 @@ class LetteredWord:
         """Index of the letter of the vowel with the main stress, or of the last vowel; else of the first phone."""
         vowels = [place for phone, place in zip(self.phones, self.places, strict=True) if PHONES[phone].is_vowel]
         mark = next(
-            (self.letters.index(mark) for mark in STRESS_MARKS.values() if mark in self.letters), len(self.letters)
+            (self.letters.rindex(mark) for mark in STRESS_MARKS.values() if mark in self.letters), len(self.letters)
         )
         return next((place for place in vowels if place > mark), (vowels or [self.places[0]])[-1])
 

@@ -74,8 +74,7 @@ def resynthesize(
 
         made = soxr.resample(made, sound.rate * formants, sound.rate)
     n = max(round(float(stretch.moved(np.array([sound.duration]))[0]) * sound.rate), 1)
-    made = np.pad(made, (0, max(0, n - len(made))))[:n]
-    return Waveform(np.clip(made, -1.0, 1.0), sound.rate)
+    return Waveform(np.clip(np.pad(made, (0, max(0, n - len(made))))[:n], -1.0, 1.0), sound.rate)
 
 
 def _replace_pitch(manipulation: Any, end: float, change_pitch: ChangePitch | None, formants: float) -> None:

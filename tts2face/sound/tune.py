@@ -14,9 +14,11 @@ from tts2face.numeric.arrays import FloatArray
 from tts2face.sound.prosody import PLAIN_PROSODY, Prosody
 
 VOICED_HZ = 40.0
-LIMITS_HZ = (65.0, 480.0)  # of changed F0 at the usual pitch
+LOWEST_HZ = 42.0  # of a voice whose pitch is lowered
+LIMITS_HZ = (50.0, 480.0)  # of changed F0 at the usual pitch
 SEMITONES = 12.0  # of an octave
 EMPHASIS_PEAK = 4.0  # semitones
+EMPHASIS_LENGTH = 1.3  # factor of the durations of its phones
 EMPHASIS_REACH_S, LEAST_REACH_S = 0.05, 0.1  # beyond half of the word
 AFTER_EMPHASIS, AFTER_S = 0.6, 0.1  # range above the median behind an emphasised word, and its onset
 WORD_RAMP_S = 0.04  # between words of different tones
@@ -97,7 +99,8 @@ def shape_pitch(f0: NDArray[np.floating], times: FloatArray, tune: Tune) -> Shap
         moved.append(span)
     low, high = LIMITS_HZ
     shift = 2.0 ** (tune.prosody.pitch / SEMITONES)
-    hertz = np.clip(2.0 ** ((middle + above + tune.prosody.pitch) / SEMITONES), low * min(shift, 1.0), high * shift)
+    lowest = max(low * min(shift, 1.0), LOWEST_HZ)
+    hertz = np.clip(2.0 ** ((middle + above + tune.prosody.pitch) / SEMITONES), lowest, max(high * shift, lowest))
     return ShapedPitch(np.where(voiced, hertz, f0), tuple(moved))
 
 
