@@ -166,7 +166,7 @@ def choose_voice(name: str, language: str | None, text: str, adjustments: Adjust
         spoken = next(voice.languages for voice in catalogue.voices() if voice.name == name)
         if language is None:
             guessed = guess_language(text)
-            language = guessed if guessed in spoken else DEFAULT_LANGUAGE
+            language = next((code for code in (guessed, DEFAULT_LANGUAGE) if code in spoken), spoken[0])
             adjustments.note_language(language)
         return name, KOKORO_LANGUAGES.get(language, language)
     if language is None:
