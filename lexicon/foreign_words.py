@@ -16,6 +16,7 @@ from lexicon.japanese import has_kanji, load_reader
 from lexicon.marked_text import Mark, MarkedText, PhoneMark, StyleRun
 from lexicon.scripts import SCRIPTS, blank_given_words, foreign_runs, letter_name, letter_script, run_name, script_name
 from lexicon.text_language import guess_language
+from lexicon.vowels import vowel_note
 from lexicon.written_forms import read_table
 
 _KANJI = re.compile(r"[^\W\d_\u3040-\u30ff]+|[\u3040-\u30ff]+")  # Chinese characters, or kana
@@ -66,7 +67,8 @@ def make_readable(text: MarkedText, language: str) -> tuple[MarkedText, tuple[st
                 runs.append(replace(run, start=words.start, language=words.language))
                 runs.append(replace(run, start=words.end))
     kept = [run for run, after in zip(runs, [*runs[1:], None], strict=True) if after is None or run.start < after.start]
-    return _rewritten(replace(text, runs=tuple(kept)), found), tuple(dict.fromkeys(word.note for word in found))
+    notes = [*(word.note for word in found), vowel_note(text.text, language)]
+    return _rewritten(replace(text, runs=tuple(kept)), found), tuple(dict.fromkeys(note for note in notes if note))
 
 
 def _foreign_words(text: str, span: tuple[int, int], language: str) -> Iterator[ForeignWords]:

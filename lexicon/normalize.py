@@ -18,6 +18,7 @@ from lexicon.japanese import has_kanji, to_kana
 from lexicon.number_words import MAX_CARDINAL_DIGITS
 from lexicon.pauses import MARKS
 from lexicon.scripts import name_foreign_letters, name_letters_in_words
+from lexicon.vowels import add_vowels
 
 _FULL_MONTH = "|".join(readings.MONTHS)
 _MONTH = rf"(?:{_FULL_MONTH}|(?:Jan|Feb|Mar|Apr|Jun|Jul|Aug|Sept?|Oct|Nov|Dec)\b\.?)"
@@ -239,7 +240,8 @@ def spoken_form(text: str, language: str) -> str:
     """Spoken form of a text.
 
     English is normalised, days of German dates are written as words, Japanese with Chinese characters is converted to
-    kana, and single letters of other writing systems are replaced by their names. A word of more than 100 letters is
+    kana, Arabic and Hebrew get vowels where a model of them is installed, and single letters of other writing systems
+    are replaced by their names. A word of more than 100 letters is
     divided, and the digits of a longer number than English names are separated.
 
     Raises
@@ -255,4 +257,4 @@ def spoken_form(text: str, language: str) -> str:
         text = read_german_dates(text)
     text = name_foreign_letters(text.translate(_AS_ESPEAK_READS), language)
     text = _LONG_NUMBER.sub(lambda number: " ".join(number.group()), text)
-    return _LONG_WORD.sub(r"\g<0> ", text)
+    return add_vowels(_LONG_WORD.sub(r"\g<0> ", text), language)

@@ -20,6 +20,7 @@ from lexicon.pauses import MARKS, PAUSES_S
 from lexicon.phones import PHONES, ipa_to_arpabet
 from lexicon.scripts import check_script
 from lexicon.tones import EVEN, Tone
+from lexicon.vowels import without_vowels
 
 NOTHING = "there is nothing to say in the text; add at least one word or number"
 _MARKS_BY_STRENGTH = tuple(PAUSES_S)  # of two adjacent marks the later one of this order is kept
@@ -125,7 +126,10 @@ def _split_words(forms: Iterator[tuple[str, str]]) -> list[_WordDraft]:
 def _words_by_espeak(text: str, language: str) -> list[_WordDraft]:
     """Words of a text, as far as it is no English, as they are written, with the phones that espeak-ng speaks."""
     spoken = spoken_form(text, language)
-    words = [_WordDraft(word.text, word.text, word.mark, own) for word, own in words_by_espeak(spoken, language)]
+    found = [
+        (without_vowels(word.text, language), word.mark, own) for word, own in words_by_espeak(spoken, language)
+    ]  # as they are written
+    words = [_WordDraft(written, written, mark, own) for written, mark, own in found]
     if language.partition("-")[0] == "en":
         normalised = _split_words((token.source, token.spoken) for token in split_tokens(text))
         if len(normalised) == len(words):

@@ -28,6 +28,7 @@ from lexicon.pauses import SIMPLE_MARKS
 from lexicon.phones import PHONES, nearest_phones, phone_distance
 from lexicon.pronounce import Word
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan, enforce_increasing
+from lexicon.vowels import without_vowels
 from tts2face.sound.voice import (
     PronunciationMap,
     SpeechInput,
@@ -192,7 +193,7 @@ class EspeakVoice:
         return " ".join(map(_word_mnemonic, written)), words
 
     def _look_up(self, word: str) -> tuple[IpaPhone, ...] | None:
-        return self._own_words.get(word.strip(".,;:!?\"'()").lower())
+        return self._own_words.get(without_vowels(word.strip(".,;:!?\"'()"), self._language).lower())
 
     def _pronounce(self, word: SpokenWord) -> SpokenWord:
         """A word with its phones in the user's dictionary, or without phones."""

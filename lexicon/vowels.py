@@ -1,0 +1,80 @@
+"""Vowels of Arabic and Hebrew text, which is written without them, by the models inside piper-tts (extra ``[piper]``).
+
+espeak-ng reads consonants alone where their marks are missing: عليكم as ʕlikm, with them as ʕalaikum.
+"""
+
+import functools
+import importlib.util
+import os
+import re
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+_ARABIC, _HEBREW = "ar", "he"
+PACKAGE = "piper"
+# harakat, and niqqud without the points that belong to a letter in some fonts
+_MARKS: Mapping[str, re.Pattern[str]] = MappingProxyType({
+    _ARABIC: re.compile("[\u064b-\u0652\u0670]"), _HEBREW: re.compile("[\u0591-\u05bd\u05bf\u05c1\u05c2\u05c4-\u05c7]"),
+})  # fmt: skip
+_LETTER = re.compile("[\u0621-\u064a\u05d0-\u05ea]")
+MAX_CHARACTERS = 2000  # of a text for a model
+NOTE = (
+    "the text is written without vowels, which are guessed letter by letter; pip install 'tts2face[piper]' reads them"
+)
+
+
+def add_vowels(text: str, language: str) -> str:
+    """A text with marks of its vowels, where the language is written without them and a model of it is installed.
+
+    A text with such marks stays as it is, as does one of another language. Letters do not change.
+    """
+    if not _lacks_vowels(text, language) or len(text) > MAX_CHARACTERS:
+        return text
+    model = _model(language)
+    if model is None:
+        return text
+    marked = model(text)
+    # the models leave out what they have not learnt
+    return marked if without_vowels(marked, language) == text else _by_word(text, language, model)
+
+
+def without_vowels(text: str, language: str) -> str:
+    """A text without the marks of its vowels; another one as it is."""
+    marks = _MARKS.get(language)
+    return text if marks is None else marks.sub("", text)
+
+
+def vowel_note(text: str, language: str) -> str:
+    """Sentence without its stop for a text whose vowels no model adds; empty for all others."""
+    return NOTE if _lacks_vowels(text, language) and _model(language) is None else ""
+
+
+def _lacks_vowels(text: str, language: str) -> bool:
+    marks = _MARKS.get(language)
+    return marks is not None and marks.search(text) is None and _LETTER.search(text) is not None
+
+
+def _by_word(text: str, language: str, model: Callable[[str], str]) -> str:
+    """Each word for itself, as it is where the model changes its letters."""
+    words = [(word, model(word) if _LETTER.search(word) else word) for word in re.split(r"(\s+)", text)]
+    return "".join(marked if without_vowels(marked, language) == word else word for word, marked in words)
+
+
+@functools.cache
+def _model(language: str) -> Callable[[str], str] | None:
+    """Model that adds the marks of a language; None where it is not installed."""
+    if importlib.util.find_spec(PACKAGE) is None:
+        return None
+    os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")  # it imports onnxruntime, which would send telemetry
+    try:
+        if language == _ARABIC:
+            from piper.tashkeel import TashkeelDiacritizer
+
+            model: Callable[[str], str] = TashkeelDiacritizer().diacritize
+        else:
+            from piper.hebrew import DEFAULT_MODEL_PATH, NakdimonDiacritizer
+
+            model = NakdimonDiacritizer(DEFAULT_MODEL_PATH).diacritize
+    except ImportError:  # Hebrew came with a later version
+        return None
+    return model
