@@ -171,12 +171,18 @@ def cmudict_words() -> tuple[str, ...]:
 
 
 @functools.cache
-def _own_table() -> dict[str, str]:
-    lines = resources.files("lexicon").joinpath("pronunciations.tsv").read_text(encoding="utf-8").splitlines()[1:]
-    return {word_key(word): names for word, names in (line.split("\t") for line in lines)}
+def _table(name: str) -> dict[str, str]:
+    lines = resources.files("lexicon").joinpath(name).read_text(encoding="utf-8").splitlines()[1:]
+    return {word_key(word): names for word, names, *_ in (line.split("\t") for line in lines)}
 
 
 def own_pronunciation(word: str) -> tuple[IpaPhone, ...] | None:
     """Pronunciation of a word in ``pronunciations.tsv``: words that CMUdict lacks, or reads otherwise."""
-    names = _own_table().get(word_key(word))
+    names = _table("pronunciations.tsv").get(word_key(word))
+    return None if names is None else arpabet_segments(names)
+
+
+def named_pronunciation(word: str) -> tuple[IpaPhone, ...] | None:
+    """Pronunciation of a word in ``names.tsv``: names, brands, food and loanwords that CMUdict lacks."""
+    names = _table("names.tsv").get(word_key(word))
     return None if names is None else arpabet_segments(names)

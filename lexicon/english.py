@@ -1,13 +1,15 @@
 """Phones of English words: CMUdict, spelled initialisms, and the parts of compounds and inflected words."""
 
 import unicodedata
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
-from lexicon.dictionary import cmudict_lookup, own_pronunciation, word_set
+from lexicon.dictionary import cmudict_lookup, named_pronunciation, own_pronunciation, word_set
 from lexicon.ipa import IpaPhone
+from lexicon.misaki import misaki_lookup
 from lexicon.phones import ARPABET, PHONES, nearest_phones
+from lexicon.word_parts import Lookup, add_s, read_parts
 
 _INVENTORY = frozenset(ARPABET.values())
 # espeak-ng's finer English phones in the inventory of CMUdict; phones that are not listed map to the nearest one.
@@ -26,10 +28,8 @@ CAPITALISED_WORDS = word_set(
     "OUR NEW NOW ONE TWO SIX TEN WHO WHY HOW GET GOT SEE SAY SHE HIM ITS LET MAN MEN DAY WAY OLD BIG BAD RED TOP WIN "
     "WON RUN HOT OUT OFF TOO ANY END FUN HI OH AH HEY WOW BYE MOM DAD SIR"
 )
-# after which -s is /s/, else /z/; after sibilants /ɪz/
-_VOICELESS_ENDINGS = frozenset({"p", "t", "k", "f", "θ"})
-_SIBILANTS = frozenset({"s", "z", "ʃ", "ʒ", "tʃ", "dʒ"})
-Lookup = Callable[[str], tuple[IpaPhone, ...] | None]
+# letters that are not those without their marks: Peña is no Pena
+_ACCENTS_WITH_SOUND = frozenset("ñłøćčšžśźżńęąřěůğışőűășțđðþãõ")
 
 
 def fold_to_arpabet(segments: tuple[IpaPhone, ...]) -> tuple[IpaPhone, ...]:
@@ -37,8 +37,8 @@ def fold_to_arpabet(segments: tuple[IpaPhone, ...]) -> tuple[IpaPhone, ...]:
     result: list[IpaPhone] = []
     for segment in segments:
         phone, stress = segment.phone, segment.stress
-        if phone == "ɹ" and result and result[-1].phone == "ɹ":
-            continue  # espeak-ng writes a linking r twice: ɑːɹ ɹ
+        if phone == "ɹ" and result and result[-1].phone in {"ɹ", "ɚ", "ɝ"}:
+            continue  # espeak-ng writes a linking r twice: ɑːɹ ɹ, ɚɹ
         phones = (phone,) if phone in _INVENTORY else _FOLDED_PHONES.get(phone) or nearest_phones(phone, _INVENTORY)
         if segment.is_syllabic and not PHONES[phone].is_vowel:
             result.append(IpaPhone("ə", stress, is_syllabic=True))
@@ -88,14 +88,6 @@ def _join_compound(parts: Sequence[str], spoken: Sequence[tuple[IpaPhone, ...]])
     )
 
 
-def add_s(base: tuple[IpaPhone, ...]) -> tuple[IpaPhone, ...]:
-    """Phones of a word with the ending -s."""
-    last = base[-1].phone
-    if last in _SIBILANTS:
-        return (*base, IpaPhone("ɪ", is_syllabic=True), IpaPhone("z"))
-    return (*base, IpaPhone("s" if last in _VOICELESS_ENDINGS else "z"))
-
-
 def is_read_by_letters(word: str) -> bool:
     """Whether CMUdict reads a word as the names of its letters: FBI, TV."""
     found, letters = cmudict_lookup(word), _spell_letters(word) if word.isascii() and word.isalpha() else None
@@ -106,12 +98,24 @@ def is_initialism(word: str) -> bool:
     """Whether a word in capitals is spelled letter by letter."""
     if not (word.isascii() and word.isalpha() and word.isupper()) or word in _ACRONYMS:
         return False
-    return len(word) <= MAX_SPELLED_LETTERS or (cmudict_lookup(word) is None and not set(word) & set("AEIOUY"))
+    if len(word) <= MAX_SPELLED_LETTERS:
+        return True
+    return not (set(word) & set("AEIOUY") or cmudict_lookup(word) or named_pronunciation(word))
+
+
+def _listed(word: str) -> tuple[IpaPhone, ...] | None:
+    """Phones of a word in the product's own table, CMUdict, or the table of names."""
+    return own_pronunciation(word) or cmudict_lookup(word) or named_pronunciation(word)
 
 
 def _look_up_without_accents(word: str) -> tuple[IpaPhone, ...] | None:
+    """Phones of a word without its accents, where these only show how it is read in its language."""
     plain = "".join(letter for letter in unicodedata.normalize("NFD", word) if not unicodedata.combining(letter))
-    return None if plain == word else own_pronunciation(plain) or cmudict_lookup(plain)
+    if plain == word:
+        return None
+    has_own_sound = _ACCENTS_WITH_SOUND & set(unicodedata.normalize("NFC", word.lower()))
+    named = own_pronunciation(plain) or named_pronunciation(plain)
+    return named or (None if has_own_sound else cmudict_lookup(plain) or misaki_lookup(plain))
 
 
 def look_up_word(word: str, *, is_letter: bool, own: Lookup) -> tuple[IpaPhone, ...] | None:
@@ -125,27 +129,27 @@ def look_up_word(word: str, *, is_letter: bool, own: Lookup) -> tuple[IpaPhone, 
         Lookup in the user's dictionary, which takes precedence for the whole word and for its parts.
     """
     entry = own(word)
-    if entry is not None:
-        return entry
-    if (len(word) == 1 and is_letter) or (len(word) > 1 and is_initialism(word)):
+    if entry is None and ((len(word) == 1 and is_letter) or (len(word) > 1 and is_initialism(word))):
         return _spell_letters(word)
     # DVDs, TVs
-    if word[-1:] == "s" and len(word) > 2 and is_initialism(word[:-1]):
+    if entry is None and word[-1:] == "s" and len(word) > 2 and is_initialism(word[:-1]):
         letters = _spell_letters(word[:-1])
         return None if letters is None else add_s(letters)
     stem = word[:-2] if word[-2:] in {"'s", "'S"} else ""
     own_stem = own_pronunciation(stem)
-    entry = (
-        (add_s(own_stem) if own_stem else own_pronunciation(word))
-        or cmudict_lookup(word)
-        or _look_up_without_accents(word)
-    )
-    if entry is not None:
-        return entry
-    if "-" in word:
+    entry = entry or (add_s(own_stem) if own_stem else _listed(word)) or _look_up_without_accents(word)
+    if entry is None and "-" in word:
         parts = [part for part in word.split("-") if part]
         spoken = [look_up_word(part, is_letter=part.isupper(), own=own) for part in parts]
         known = [segments for segments in spoken if segments]
-        return _join_compound(parts, known) if known and len(known) == len(parts) else None
-    base = look_up_word(stem, is_letter=False, own=own) if stem else None
-    return add_s(base) if base else None
+        entry = _join_compound(parts, known) if known and len(known) == len(parts) else None
+    if entry is None and stem:
+        base = look_up_word(stem, is_letter=False, own=own)
+        return add_s(base) if base else None
+    return entry or misaki_lookup(word) or read_parts(word, lambda part: _look_up_part(part, own))
+
+
+def _look_up_part(part: str, own: Lookup) -> tuple[IpaPhone, ...] | None:
+    if len(part) > 1 and is_initialism(part):
+        return _spell_letters(part)
+    return own(part) or _listed(part) or misaki_lookup(part)

@@ -20,15 +20,7 @@ Segments = tuple[IpaPhone, ...]
 
 
 def words_by_espeak(text: str, language: str) -> tuple[tuple[WrittenWord, Segments], ...]:
-    """Written words of a text with their phones; signs without phones are left out, words without are kept empty.
-
-    Raises
-    ------
-    InputError
-        The language does not exist.
-    BackendError
-        espeak-ng is not installed.
-    """
+    """Written words of a text with their phones; signs without phones are left out, words without are kept empty."""
     found: list[tuple[WrittenWord, Segments]] = []
     for sentence in split_chunks(text, MAX_SENTENCE_CHARACTERS, language):
         found += _words_of_sentence(sentence, language)

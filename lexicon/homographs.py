@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 from importlib import resources
 
 from lexicon.dictionary import arpabet_segments, word_set
-from lexicon.english import add_s
 from lexicon.ipa import IpaPhone
 from lexicon.part_of_speech import tag_words
 from lexicon.pauses import MARKS
 from lexicon.verb_tense import tense_tag
+from lexicon.word_parts import add_s
 
 NEAR_WORDS = 9  # words on each side that are searched for evidence
 # Weights of the evidence: a neighbour outweighs the tag, which outweighs the topic.

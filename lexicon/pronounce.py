@@ -11,7 +11,7 @@ from lexicon.english import CAPITALISED_WORDS, fold_to_arpabet, is_initialism, l
 from lexicon.errors import InputError, SilentTextError
 from lexicon.espeak_words import words_by_espeak
 from lexicon.function_words import reduced_segments
-from lexicon.g2p import DEFAULT_LANGUAGE, segments_by_rules
+from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.homographs import homograph_segments, is_homograph
 from lexicon.ipa import IpaPhone
 from lexicon.languages import language_code
@@ -20,6 +20,7 @@ from lexicon.pauses import MARKS, PAUSES_S
 from lexicon.phones import PHONES, ipa_to_arpabet
 from lexicon.scripts import check_script
 from lexicon.tones import EVEN, Tone
+from lexicon.unlisted_words import read_unlisted_words
 from lexicon.vowels import without_vowels
 
 NOTHING = "there is nothing to say in the text; add at least one word or number"
@@ -239,9 +240,8 @@ def english_segments(texts: Sequence[str], marks: Sequence[str], own: Dictionary
     for start, end in pairwise(sorted({0, *ends, len(texts)})):
         spoken += _sentence_segments(forms[start:end], marks[start:end], own)
     missing = [at for at, segments in enumerate(spoken) if segments is None]
-    by_rules = segments_by_rules([texts[at] for at in missing], DEFAULT_LANGUAGE)
-    for at, segments in zip(missing, by_rules, strict=True):
-        spoken[at] = fold_to_arpabet(segments)
+    for at, segments in zip(missing, read_unlisted_words([texts[at] for at in missing]), strict=True):
+        spoken[at] = segments
     return _reduce_function_words(texts, forms, marks, [segments or () for segments in spoken], own)
 
 
