@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
-from cli.flags import Hair, HairColor, Model, add_option_flags, options_from_flags, switch
+from cli.flags import Hair, HairColor, Model, Person, add_option_flags, options_from_flags, switch
 from cli.photo import Consent, Fit, Smile, Yes, agreed, make_face, warner
 from cli.process import write_message
 from cli.progress import progress_bar
 from lexicon.errors import InputError
+from tts2face.models.person import parse_person
 from tts2face.picture.options import Picture
 from tts2face.storage.output_paths import check_file_name, refuse_overwriting
 
@@ -54,11 +55,13 @@ def import_character(  # noqa: PLR0913 - one parameter a flag
     sheet: Annotated[Path | None, Parameter(help="Write a contact sheet of all shapes, with sources (.png).")] = None,
     write_landmarks: Annotated[Path | None, Parameter(help="Write the landmarks as a table to edit (.tsv).")] = None,
     write_mapping: Annotated[Path | None, Parameter(help="Write the used mapping as a table to edit (.tsv).")] = None,
+    person: Person = None,
     model: Model = None,
     yes: Yes = False,
     quiet: Annotated[bool, switch("Print no report.")] = False,
 ) -> None:
     """Make a .face file of a character; print which shapes are found, replaced and missing."""
+    _check_person(person)
     _check_outputs(
         {
             "--out": out,
@@ -91,6 +94,7 @@ def import_character(  # noqa: PLR0913 - one parameter a flag
     if write_mapping is not None:
         write_atomically(write_mapping, mapping_table(imported.report.mapping).encode())
     save_face(out, imported.face)
+    _state_person(out, person)
     if not quiet:
         print(report_text(imported.report), end="")  # noqa: T201 - the result
         write_message(f"wrote {out}")
@@ -108,6 +112,7 @@ def picture(  # noqa: PLR0913 - one parameter a flag
     fit: Fit = None,
     smile: Smile = None,
     write_fit: Annotated[Path | None, Parameter(help="Write what was found, to edit it for --fit (.json).")] = None,
+    person: Person = None,
     model: Model = None,
     yes: Yes = False,
     quiet: Annotated[bool, switch("Print no warnings and no summary.")] = False,
@@ -115,6 +120,7 @@ def picture(  # noqa: PLR0913 - one parameter a flag
     """Make a .face file of a picture of a person, who speaks in it."""
     from tts2face.photo.photograph import split_number
 
+    _check_person(person)
     _check_outputs(
         {"--out": out, "--preview": preview, "--write-fit": write_fit},
         {"the photo": split_number(photo)[0], "--fit": fit, "--smile": smile, "--model": model},
@@ -127,6 +133,7 @@ def picture(  # noqa: PLR0913 - one parameter a flag
     if write_fit is not None:
         write_fit_file(write_fit, made.metadata["fit"])
     save_face(out, made)
+    _state_person(out, person)
     if not quiet:
         write_message(f"wrote {out}: {made.metadata['name']}, {made.metadata['consent']['date']}")
 
@@ -149,6 +156,7 @@ def photo(  # noqa: PLR0913 - one parameter a flag
     ] = None,
     age_keep: Annotated[bool, switch("Keep the wrinkles of the skin, which are softened otherwise.")] = False,
     preview: Annotated[Path | None, Parameter(help="Write a picture of the head with its landmarks (.png).")] = None,
+    person: Person = None,
     model: Model = None,
     yes: Yes = False,
     quiet: Annotated[bool, switch("Print no warnings and no summary.")] = False,
@@ -156,6 +164,7 @@ def photo(  # noqa: PLR0913 - one parameter a flag
     """Make a .face file of the person in pictures: a head that turns, with shape, skin, eyes, hair and clothes."""
     from tts2face.photo.photograph import split_number
 
+    _check_person(person)
     inputs = {f"the photo {photo}": split_number(photo)[0] for photo in photos}
     _check_outputs({"--out": out, "--preview": preview}, inputs | {"--model": model})
     from corpus_tools.dense.avatar import build_avatar
@@ -166,6 +175,7 @@ def photo(  # noqa: PLR0913 - one parameter a flag
         photos, out, consent=consent, name=name, eye_color=eye_color, age_keep=age_keep, model=model,
         on_warning=warner(quiet=quiet),
     )  # fmt: skip
+    _state_person(out, person)
     if preview is not None:
         _write_preview(preview, load_face(str(out)))
     if not quiet:
@@ -263,6 +273,19 @@ def still(
     write_atomically(out, png_bytes(drawn, shown.synthetic_notice))
     if not quiet:
         write_message(f"wrote {out}: {drawn.shape[1]} x {drawn.shape[0]} pixels")
+
+
+def _check_person(person: str | None) -> None:
+    """Refuse an unknown person before the work."""
+    if person is not None:
+        parse_person(person)
+
+
+def _state_person(out: Path, person: str | None) -> None:
+    from tts2face.interchange.characters.saving import state_person
+
+    if person is not None:
+        state_person(out, person)
 
 
 def _check_outputs(outputs: Mapping[str, Path | None], inputs: Mapping[str, str | Path | None]) -> None:

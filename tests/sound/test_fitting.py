@@ -1,18 +1,27 @@
 """A face speaks in a voice of its sex and age: the one that is installed, else the language's in another pitch."""
 
+import json
+import shutil
 from dataclasses import replace
+from pathlib import Path
 from types import MappingProxyType
 
 import pytest
 
+from cli.main import run
 from lexicon.errors import InputError
+from tts2face.interchange.characters.saving import state_person
+from tts2face.models.face_loading import load_face
 from tts2face.models.person import FEMALE, MALE, SHIPPED_PEOPLE, Person, parse_person, person_of, seed_of
 from tts2face.request import Request, Spoken
 from tts2face.session.catalogue import shipped_names
 from tts2face.session.named_models import Models
+from tts2face.session.prepared import prepare
+from tts2face.session.shared_models import SessionModels
 from tts2face.sound import fitting, voice_pool
 from tts2face.sound.fitting import fitting_voice
 from tts2face.sound.prosody import PLAIN_PROSODY, Prosody
+from tts2face.storage.shipped import find_file
 
 WITHOUT = "a_module_that_nobody_has"
 
@@ -107,3 +116,41 @@ def test_faces_have_seeds_of_their_own() -> None:
 def test_auto_is_the_same_as_no_voice() -> None:
     assert Request(text="Hello.", voice="auto") == Request(text="Hello.") == Request(source=Spoken("Hello.", "auto"))
     assert Request(voice="auto", idle=2.0) == Request(idle=2.0)
+
+
+def test_a_face_file_holds_who_it_shows(tmp_path: Path) -> None:
+    path = Path(shutil.copy(find_file("head", "face"), tmp_path / "mine.face"))
+    assert Models(face=str(path)).shown_person() == Person(FEMALE, 30)
+    state_person(path, "man 70")
+    assert Models(face=str(path)).shown_person() == Person(MALE, 70)
+    assert load_face(str(path)).metadata["person"] == "man 70"
+    with pytest.raises(InputError, match="woman 70"):
+        state_person(path, "somebody")
+
+
+def test_sessions_speak_and_move_as_their_faces() -> None:
+    models = {name: SessionModels("grid_s1", load_face("head", name), None) for name in (None, "kofi")}
+    seeds = [one.seeded(Request(idle=1.0)).seed for one in models.values()]
+    assert seeds == [seed_of(Models(face="head", identity=name).description()) for name in models]
+    assert len(set(seeds)) == 2
+    assert models[None].person != models["kofi"].person
+    prepared = prepare(Request(text="Hello."))
+    assert prepared.with_seed(7).request.seed == 7
+    assert prepare(Request(text="Hello.", seed=3)).with_seed(7).request.seed == 3
+    assert prepared.fitting(Person(FEMALE, 75)).prosody.pitch == -2.0
+    assert prepare(Request(text="Hello.", voice="espeak")).fitting(Person(FEMALE, 75)) == fitting.Fitting("espeak")
+    assert prepare(Request(idle=1.0)).fitting(None) is None
+
+
+def test_the_command_line_says_who_speaks_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = ["Hello there. And here.", "--gestures", "none"]
+    assert run([*text, "--face", "noor", "--explain", str(tmp_path / "a.txt")]) == 0
+    said = capsys.readouterr().err
+    assert said.count("the face shows an old woman and speaks as heart, lowered by 2 semitones") == 1
+    assert (tmp_path / "a.txt").read_text(encoding="utf-8").startswith("voice: heart, lowered by 2 semitones")
+    assert run([*text, "--person", "girl", "--out", str(tmp_path / "a.wav"), "--export", str(tmp_path / "a.vtt")]) == 0
+    assert "a girl of 9 and speaks as heart, raised" in capsys.readouterr().err
+    assert run([*text, "--voice", "espeak", "--explain", str(tmp_path / "a.json")]) == 0
+    assert "speaks as" not in capsys.readouterr().err
+    explained = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
+    assert {phone["voice"] for phone in explained} == {"espeak"}

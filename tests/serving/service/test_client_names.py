@@ -14,6 +14,7 @@ from tts2face.serving.service.client_names import (
     voice_kind,
 )
 from tts2face.serving.service.errors import RefusedError
+from tts2face.session.named_models import Models
 
 MEN = ("joe", "espeak")  # joe if its package is installed
 
@@ -38,6 +39,15 @@ def test_names_promise_a_language_and_a_sex(name: str, language: str, sex: str) 
 )
 def test_other_names_promise_nothing(name: str) -> None:
     assert voice_kind(name) is None or name == "af_bella("
+
+
+def test_the_voice_of_a_face_is_named_where_it_is_not_the_usual_one() -> None:
+    adjustments = Adjustments()
+    adjustments.note_fitted(Models(), "en")
+    assert adjustments.made == []
+    adjustments.note_fitted(Models(face="zuri"), "en")
+    adjustments.note_fitted(Models(person="man"), "de")
+    assert adjustments.made == ["voice auto is heart, raised by 2.9 semitones with formants times 1.164"]
 
 
 def test_each_name_has_the_nearest_voice() -> None:

@@ -6,6 +6,7 @@ from lexicon.errors import BackendError, DataError
 from tts2face.interchange.characters.binding import KEY, character_file, read_binding
 from tts2face.models.face import Face
 from tts2face.models.face_file import FORMAT_VERSION, KIND, read_face, write_face
+from tts2face.models.person import PERSON, parse_person
 from tts2face.storage.temporary import Temporary
 from tts2face.storage.tensors import read_tensors, write_tensors
 
@@ -50,6 +51,24 @@ def relink_face(path: str | Path, character: str | Path) -> Path:
     header["metadata"][KEY]["file"] = str(place)
     write_tensors(path, KIND, FORMAT_VERSION, arrays, header, is_packed=True)
     return place
+
+
+def state_person(path: str | Path, person: str) -> None:
+    """Write sex and age of who is shown into a ``.face`` file, by which a voice is chosen.
+
+    Raises
+    ------
+    InputError
+        There is no such face or person (`tts2face.models.person.parse_person`).
+    DataError
+        The face is damaged.
+    BackendError
+        The file cannot be written.
+    """
+    parse_person(person)
+    arrays, header = read_tensors(Path(path), KIND, FORMAT_VERSION)
+    header["metadata"][PERSON] = person
+    write_tensors(Path(path), KIND, FORMAT_VERSION, arrays, header, is_packed=True)
 
 
 def _check(written: Path, path: Path) -> None:

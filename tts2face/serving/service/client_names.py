@@ -18,6 +18,7 @@ from lexicon.languages import language_code
 from lexicon.marked_text import RATE_LIMITS
 from lexicon.spoken_words import reading_notes
 from lexicon.text_language import guess_language
+from tts2face.request import AUTO
 from tts2face.serving.service.clip_options import check_voice, resolve_models
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
@@ -25,6 +26,9 @@ from tts2face.serving.service.kokoro_text import with_marks
 from tts2face.serving.service.library import CLIENT_MODELS
 from tts2face.serving.service.state import ServiceState
 from tts2face.session import catalogue
+from tts2face.session.named_models import Models
+from tts2face.sound.fitting import fitting_voice
+from tts2face.sound.voice_pool import find_voice
 
 ADJUSTED = "X-Tts2face-Adjusted"
 FEMALE, MALE = "female", "male"
@@ -66,6 +70,12 @@ class Adjustments:
         """Note what is done with words of other writing systems."""
         state.results.check_length(text)
         self.made += await asyncio.to_thread(reading_notes, text, language_code(language))
+
+    def note_fitted(self, models: Models, language: str) -> None:
+        """Note the voice that fits the face, unless it is the usual one of the language."""
+        fitting = fitting_voice(models.shown_person(), language_code(language))
+        if fitting.sentence:
+            self.note("voice", AUTO, fitting.described)
 
     def note_sounds(self, notes: Sequence[str]) -> None:
         """Note what is guessed of sounds that were sent; semicolons divide notes in the header."""
@@ -138,9 +148,12 @@ def combined_name(voices: str | list[str]) -> str:
 
 
 def nearest_voice(kind: _Kind, language: str) -> str:
-    """The installed voice that speaks a language, of the sex if there is one; neural ones come first."""
+    """The installed voice that speaks a language, of the sex and accent if there is one; neural ones come first."""
     spoken = [voice for voice in catalogue.voices() if voice.is_installed and language in voice.languages]
-    return min(spoken, key=lambda voice: voice.sex != kind.sex).name if spoken else "espeak"
+    near = sorted(
+        spoken, key=lambda voice: (voice.sex != kind.sex, find_voice(voice.name).accent not in ("", language))
+    )
+    return near[0].name if near else "espeak"
 
 
 def choose_voice(name: str, language: str | None, text: str, adjustments: Adjustments) -> tuple[str, str]:

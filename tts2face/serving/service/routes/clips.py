@@ -1,5 +1,6 @@
 """Clips with all options of a request and of its picture."""
 
+import asyncio
 from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from typing import Any
 
@@ -12,6 +13,7 @@ from starlette.datastructures import FormData
 
 from lexicon.g2p import DEFAULT_LANGUAGE
 from tts2face.picture.streamed_movie import MOVIE_KINDS
+from tts2face.request import AUTO
 from tts2face.serving.service.client_names import Adjustments
 from tts2face.serving.service.clip_options import ClipRequest, divide_options
 from tts2face.serving.service.errors import RefusedError
@@ -19,6 +21,7 @@ from tts2face.serving.service.results import stream_work
 from tts2face.serving.service.state import service_state
 from tts2face.serving.service.uploads import MAX_TEXT_BYTES, UploadFolder, upload_folder
 from tts2face.session.encoded_stream import media_types
+from tts2face.session.named_models import Models
 
 router = APIRouter(prefix="/v1", tags=["clips"])
 FILES = ("audio", "background", "partner", "timeline")
@@ -118,4 +121,6 @@ async def _answer(
     work = state.results.work(
         models=fields.models, request=spoken, picture=picture, format=format, keeps_pace=keeps_pace
     )
+    if given.get("text") and given.get("voice") in (None, AUTO):
+        await asyncio.to_thread(adjustments.note_fitted, Models(**work.models), given.get("language", DEFAULT_LANGUAGE))
     return adjustments.on(await stream_work(request, work, media_types()[format], resources=resources))
