@@ -19,8 +19,10 @@ from tts2face.session.named_models import Models
 from tts2face.session.prepared import prepare
 from tts2face.session.shared_models import SessionModels
 from tts2face.sound import fitting, voice_pool
+from tts2face.sound.delivery import sound_with
 from tts2face.sound.fitting import fitting_voice
 from tts2face.sound.prosody import PLAIN_PROSODY, Prosody
+from tts2face.sound.voice_pool import load_voice
 from tts2face.storage.shipped import find_file
 
 WITHOUT = "a_module_that_nobody_has"
@@ -154,3 +156,11 @@ def test_the_command_line_says_who_speaks_once(tmp_path: Path, capsys: pytest.Ca
     assert "speaks as" not in capsys.readouterr().err
     explained = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
     assert {phone["voice"] for phone in explained} == {"espeak"}
+
+
+@pytest.mark.parametrize("name", ["heart", "espeak"])
+def test_a_changed_voice_gives_the_same_bytes_again(name: str) -> None:
+    voice = load_voice(name, "en-us")
+    changed = Prosody(1.2, -3.0, 1.0, 0.9)
+    one, other = (sound_with(voice, "She sells sea shells.", changed, 1, language="en-us") for _ in range(2))
+    assert one.samples.tobytes() == other.samples.tobytes()

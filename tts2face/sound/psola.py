@@ -1,5 +1,6 @@
 """Duration, F0 and formants of a finished sound by Praat's overlap-add (PSOLA)."""
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -13,6 +14,8 @@ FLOOR_HZ, CEILING_HZ = 50.0, 600.0  # of F0; with a floor of 75 a voice of 70 Hz
 LEAST_S = 3.0 / FLOOR_HZ  # of a sound that Praat analyses
 STEP_S = 0.8 / FLOOR_HZ  # of the analysis, as in Praat's own command; with 10 ms fast speech is understood less well
 LEAST_CHANGE = 0.002  # of a factor
+SAME_NUMBERS = "random_initializeWithSeedUnsafelyButPredictably (1)"
+_RANDOM = threading.Lock()
 ChangePitch = Callable[[FloatArray, FloatArray], FloatArray]  # times and F0 (N,) of voiced points to F0 (N,)
 
 
@@ -68,7 +71,10 @@ def resynthesize(
     call([durations, manipulation], "Replace duration tier")
     if change_pitch is not None or not _is_small(formants):
         _replace_pitch(manipulation, played.xmax, change_pitch, formants)
-    made = call(manipulation, "Get resynthesis (overlap-add)").values[0].astype(np.float32)
+    # Praat places periods of voiceless parts by random numbers of the whole process
+    with _RANDOM:
+        parselmouth.praat.run(SAME_NUMBERS)
+        made = call(manipulation, "Get resynthesis (overlap-add)").values[0].astype(np.float32)
     if not _is_small(formants):
         import soxr
 

@@ -27,7 +27,7 @@ from tts2face.serving.service.library import CLIENT_MODELS
 from tts2face.serving.service.state import ServiceState
 from tts2face.session import catalogue
 from tts2face.session.named_models import Models
-from tts2face.sound.fitting import fitting_voice
+from tts2face.sound.fitting import FORMANT_SYNTHESIS, fitting_voice
 from tts2face.sound.voice_pool import find_voice
 
 ADJUSTED = "X-Tts2face-Adjusted"
@@ -150,10 +150,12 @@ def combined_name(voices: str | list[str]) -> str:
 def nearest_voice(kind: _Kind, language: str) -> str:
     """The installed voice that speaks a language, of the sex and accent if there is one; neural ones come first."""
     spoken = [voice for voice in catalogue.voices() if voice.is_installed and language in voice.languages]
-    near = sorted(
-        spoken, key=lambda voice: (voice.sex != kind.sex, find_voice(voice.name).accent not in ("", language))
-    )
-    return near[0].name if near else "espeak"
+
+    def distance(voice: catalogue.VoiceEntry) -> tuple[bool, bool, bool]:
+        accent = find_voice(voice.name).accent
+        return voice.sex != kind.sex, voice.engine == FORMANT_SYNTHESIS, accent not in ("", language)
+
+    return min(spoken, key=distance).name if spoken else "espeak"
 
 
 def choose_voice(name: str, language: str | None, text: str, adjustments: Adjustments) -> tuple[str, str]:
