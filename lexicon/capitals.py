@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 from lexicon import written_forms as readings
 from lexicon.dictionary import cmudict_lookup, own_pronunciation, word_set
-from lexicon.english import CAPITALISED_WORDS, is_read_by_letters
+from lexicon.english import CAPITALISED_WORDS, is_acronym, is_read_by_letters
 from lexicon.form_readers import BEFORE_ROMAN, NEVER_LETTERS, RULERS, TITLES
 from lexicon.number_words import roman_value
 from lexicon.sentence_ends import abbreviations
@@ -35,6 +35,13 @@ _ENDINGS = frozenset({"S", "ST", "ND", "RD", "TH", "AM", "PM"})  # after digits
 _TITLES_ALONE = frozenset({"Dr", "Mr", "Mrs", "Ms", "St"})  # also without a name after them
 # as `english.MAX_SPELLED_LETTERS`: FBI is spelled, NASA is not
 _MAX_SPELLED_LETTERS = 3
+# Abbreviations of four letters and more that dictionaries read as words.
+_READ_ACRONYMS = word_set(
+    "ADAC AIPAC ARPA ASCAP ASCII ASEAN AWACS AWOL BAFTA BIOS CERN CMOS COBOL COVID DARPA DEFCON DRAM EBITDA EPCOT ESPN "
+    "FAFSA FEMA FICA FIFA FLOTUS FOMO GATT HAMAS HIPAA ICANN IKEA INTERPOL JPEG JSON LASER LEGO LIBOR LINUX MENSA MERS "
+    "MPEG NAFTA NASCAR NASDAQ NIMBY NORAD OECD OPEC OSHA OXFAM PAYPAL POTUS RADAR RICO SARS SCOTUS SCUBA SONAR SONY "
+    "SWAT UEFA UNESCO UNICEF UNIX USAID VISA YAML YMCA YOLO"
+)
 _MIN_WORD_LETTERS = 4  # a text with such a word in capitals holds more than initialisms
 
 
@@ -71,6 +78,27 @@ def is_in_capitals(texts: Iterable[str]) -> bool:
     words = [word for text in texts for word in _WORD.findall(text) if len(word) > 1 and word.lower() != word.upper()]
     n_capital = sum(map(_is_capital, words))
     return len(words) > 1 and n_capital >= 0.9 * len(words) and _is_shouted(words)
+
+
+def is_word_in_capitals(word: str, before: str) -> bool:
+    """Whether an English word in capitals, beside words in small letters, is a word: NEVER and SO, but not FBI or NASA.
+
+    Parameters
+    ----------
+    before
+        The word before it: what *the WHO* is, *WHO* is not.
+    """
+    plain = word.replace("’", "'")
+    if (
+        plain in _initialisms()
+        or is_acronym(plain)
+        or plain in _READ_ACRONYMS
+        or (plain == "WHO" and before.lower() == "the")
+    ):
+        return False
+    if len(plain) <= _MAX_SPELLED_LETTERS:
+        return plain in _function_words()
+    return _is_word(plain) and not is_read_by_letters(plain)
 
 
 def sentence_case(text: str, language: str = "en-us", *, is_shouted: bool = False) -> str:

@@ -94,6 +94,11 @@ def is_read_by_letters(word: str) -> bool:
     return found is not None and letters is not None and [s.phone for s in found] == [s.phone for s in letters]
 
 
+def is_acronym(word: str) -> bool:
+    """Whether a word in capitals is an abbreviation that is read as a word (NASA)."""
+    return word in _ACRONYMS
+
+
 def is_initialism(word: str) -> bool:
     """Whether a word in capitals is spelled letter by letter."""
     if not (word.isascii() and word.isalpha() and word.isupper()) or word in _ACRONYMS:

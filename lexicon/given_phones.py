@@ -1,9 +1,11 @@
-"""Words with phones given in the text (``<phoneme>``), within the normalised text."""
+"""Words with phones given in the text (``<phoneme>``), or with a tone, within the normalised text."""
 
 import re
 import string
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from types import MappingProxyType
 
 from lexicon.dictionary import Dictionary
@@ -28,6 +30,49 @@ class TextWord:
     tone: Tone = EVEN
 
 
+@dataclass(frozen=True, slots=True)
+class ToneSpan:
+    """How a half-open range of characters is said."""
+
+    start: int
+    end: int
+    tone: Tone
+
+
+def phrase_words(
+    written: str, phones: Sequence[PhoneMark], spans: Sequence[ToneSpan], language: str
+) -> tuple[TextWord, ...]:
+    """The normalised words of a text, some with given phones or a tone; arguments as of `words_with_given_phones`.
+
+    A span has the words that its beginning does not have: the text up to each end is normalised by itself, so that any
+    reading of numbers is followed, and words that its continuation changes belong to what follows.
+    """
+    words = words_with_given_phones(written, phones, language)
+    keys = [_letters(word.text) for word in words]
+    toned = [*words]
+    for span in spans:
+        first, last = (
+            _n_alike(
+                keys, words_with_given_phones(written[:end], [mark for mark in phones if mark.end <= end], language)
+            )
+            for end in (span.start, span.end)
+        )
+        for at in range(first, min(max(last, first + 1), len(words))):  # of a part of a word the whole
+            toned[at] = replace(toned[at], tone=span.tone)
+    return tuple(toned)
+
+
+def _n_alike(keys: Sequence[str], beginning: Sequence[TextWord]) -> int:
+    """Number of words with which two texts begin alike."""
+    pairs = zip(keys, (_letters(word.text) for word in beginning), strict=False)
+    return next((at for at, (key, other) in enumerate(pairs) if key != other), min(len(keys), len(beginning)))
+
+
+def _letters(text: str) -> str:
+    """Letters and digits, in small ones, by which a word is the same with and without punctuation."""
+    return "".join(filter(str.isalnum, text.casefold()))
+
+
 def words_with_given_phones(written: str, phones: Sequence[PhoneMark], language: str) -> tuple[TextWord, ...]:
     """The normalised words of a text, some with given phones.
 
@@ -36,6 +81,8 @@ def words_with_given_phones(written: str, phones: Sequence[PhoneMark], language:
     phones
         Their places are characters of `written`; in order, none within another.
     """
+    if not phones:
+        return tuple(TextWord(word) for word in spoken_form(written, language).split())
     names = _placeholders(written, len(phones))
     placeholder = re.compile(rf"{_placeholder_stem(written)}[a-z]+")
     spoken = spoken_form("".join(_pieces_of_phones(written, phones, names)), language).split()
@@ -76,7 +123,22 @@ def pronounce_words(words: Sequence[TextWord], language: str, dictionary: Dictio
     known = dict(dictionary.entries) if dictionary else {}
     known |= {name: word.segments for name, word in by_name.items()}
     spoken = pronounce(text, language, Dictionary(MappingProxyType(known))).words
+    if any(word.tone != EVEN for word in words):
+        spoken = _with_tones(spoken, pieces, [word.tone for word in words])
     return tuple(_restore_spelling(word, {name: given.text for name, given in by_name.items()}) for word in spoken)
+
+
+def _with_tones(spoken: Sequence[Word], pieces: Sequence[str], tones: Sequence[Tone]) -> tuple[Word, ...]:
+    """Spoken words with the tones of the pieces of text whose letters they have."""
+    letters = [_letters(piece) for piece in pieces]
+    whole, ends = "".join(letters), [*accumulate(map(len, letters))]
+    at, toned = 0, list[Word]()
+    for word in spoken:
+        key = _letters(word.text)
+        found = max(whole.find(key, at), at)
+        toned.append(replace(word, tone=tones[min(bisect_right(ends, found), len(tones) - 1)]))
+        at = found + len(key)
+    return tuple(toned)
 
 
 def _restore_spelling(word: Word, written: dict[str, str]) -> Word:

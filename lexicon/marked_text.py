@@ -1,4 +1,4 @@
-"""A text with its marks: runs of style, rate and volume, and pauses, nods and names at positions.
+"""A text with its marks: runs of style, rate, volume and tone, and pauses, nods and names at positions.
 
 Positions are character indices of the spoken text, which does not contain the marks themselves.
 """
@@ -7,20 +7,26 @@ from dataclasses import dataclass, replace
 
 from lexicon.errors import InputError
 from lexicon.ipa import IpaPhone
+from lexicon.tones import EVEN, Tone
 from lexicon.values.checks import check_limits
 
 RATE_LIMITS = (0.5, 2.0)  # speaking rate of marked words, as of a whole request
 VOLUME_LIMITS = (0.0, 2.0)
+PITCH_LIMITS = (-12.0, 12.0)  # semitones: an octave, as SSML services allow
+RANGE_LIMITS = (0.0, 2.0)
+EMPHASIS_DB = 3.0  # of strong emphasis: accented words are 2-5 dB louder (Krahmer and Swerts 2007)
 NOD_SIZE_LIMITS = (0.1, 2.0)  # above 12 degrees a nod is a bow
 MAX_PAUSE_S = 10.0  # s, at one position; speech services allow 10 to 20
 MAX_NESTING = 16  # levels of marks within marks
+MAX_NOTES = 20  # on one text
 
 
 @dataclass(frozen=True, slots=True)
 class StyleRun:
-    """Styles, outermost first, and factors of rate and volume from a character up to the next run.
+    """Styles, outermost first, factors of rate and volume, and the tone from a character up to the next run.
 
-    ``voice`` and ``language`` are set in a span of another voice or language, and None elsewhere.
+    ``voice`` and ``language`` are set in a span of another voice or language, and None elsewhere; ``pace``, seconds a
+    letter, in a span whose duration is given, where it replaces the rate.
     """
 
     start: int
@@ -29,11 +35,17 @@ class StyleRun:
     volume: float = 1.0
     voice: str | None = None
     language: str | None = None
+    tone: Tone = EVEN
+    pace: float | None = None
+
+    @property
+    def loudness(self) -> float:
+        """Factor of the sound: the volume, and the level of the emphasis."""
+        return self.volume * float(10.0 ** (EMPHASIS_DB * self.tone.emphasis / 20.0))
 
     def is_spoken_as(self, other: "StyleRun") -> bool:
         """Whether all but the start is that of another run."""
-        here, there = ((run.styles, run.rate, run.volume, run.voice, run.language) for run in (self, other))
-        return here == there
+        return replace(self, start=other.start) == other
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,19 +106,20 @@ class MarkedText:
         Ordered by position; at one position in the order of the source.
     language
         Language declared in the text (SSML), or None.
+    notes
+        What of the source is not followed, each a sentence without its stop.
     """
 
     text: str
     runs: tuple[StyleRun, ...] = (StyleRun(0),)
     marks: tuple[Mark, ...] = ()
     language: str | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def has_voice_changes(self) -> bool:
-        """Whether a pause, rate, volume, voice or language is marked, which a recording cannot follow."""
-        is_uniform = all(
-            run.rate == run.volume == 1.0 and run.voice is None and run.language is None for run in self.runs
-        )
+        """Whether a pause, rate, volume, tone, voice or language is marked, which a recording cannot follow."""
+        is_uniform = all(run.is_spoken_as(StyleRun(run.start, run.styles)) for run in self.runs)
         return not is_uniform or any(isinstance(mark, PauseMark) for mark in self.marks)
 
 
@@ -118,6 +131,8 @@ class _OpenSpan:
     shown: str
     start: int
     before: StyleRun
+    first_letter: int = 0
+    seconds: float | None = None
 
 
 class MarkedTextBuilder:
@@ -125,11 +140,12 @@ class MarkedTextBuilder:
 
     def __init__(self) -> None:
         self._pieces: list[str] = []
-        self._length = 0
+        self._length = self._n_letters = 0
         self._runs = [StyleRun(0)]
         self._marks: list[Mark] = []
         self._open_spans: list[_OpenSpan] = []
         self._last_pause: tuple[int, PauseMark | None] = (0, None)
+        self._notes: dict[str, int] = {}  # with the line of the first
 
     @property
     def at(self) -> int:
@@ -138,8 +154,13 @@ class MarkedTextBuilder:
 
     def add_text(self, text: str) -> None:
         """Append text."""
-        self._pieces.append(text)
+        self._pieces += [text] if text else []
         self._length += len(text)
+        self._n_letters += len("".join(text.split()))
+
+    def note(self, text: str, line: int) -> None:
+        """Note what is not followed, once."""
+        self._notes.setdefault(text, line)
 
     def add_mark(self, mark: Mark) -> None:
         """Add a mark at the current position; pauses at one position are added up."""
@@ -153,21 +174,41 @@ class MarkedTextBuilder:
             self._last_pause = (len(self._marks), mark)
         self._marks.append(mark)
 
-    def open(self, kind: str, shown: str, *, style: str | None = None, rate: float = 1.0, volume: float = 1.0) -> None:
-        """Begin a span that `close` ends; in nested spans factors multiply and styles accumulate.
-
-        Raises
-        ------
-        InputError
-            Spans are nested too deep, or their combined rate or volume is out of range.
-        """
+    def open_style(self, kind: str, shown: str, style: str) -> None:
+        """Begin a span of a style that `close` ends; nested styles accumulate."""
         before = self._begin(kind, shown)
+        self._start_run(replace(before, start=self._length, styles=(*before.styles, style)))
+
+    def open_prosody(
+        self, shown: str, *, rate: float = 1.0, volume: float = 1.0, tone: Tone = EVEN, seconds: float | None = None
+    ) -> None:
+        """Begin a span of another prosody that `close` ends; in nested spans factors multiply and pitches add up.
+
+        Parameters
+        ----------
+        tone
+            Its emphasis and contour replace those around it.
+        seconds
+            In which the words of the span are spoken, whatever the rate.
+        """
+        before = self._begin("prosody", shown, seconds)
+        whole = Tone(
+            before.tone.emphasis,
+            before.tone.pitch + tone.pitch,
+            before.tone.range * tone.range,
+            tone.contour or before.tone.contour,
+        )
         check_limits(f"the speaking rate within {shown}", before.rate * rate, RATE_LIMITS)
         check_limits(f"the volume within {shown}", before.volume * volume, VOLUME_LIMITS)
-        styles = (*before.styles, style) if style is not None else before.styles
-        self._start_run(
-            replace(before, start=self._length, styles=styles, rate=before.rate * rate, volume=before.volume * volume)
-        )
+        check_limits(f"the pitch within {shown}", round(whole.pitch, 6), PITCH_LIMITS, " semitones")
+        check_limits(f"the range within {shown}", whole.range, RANGE_LIMITS)
+        run = replace(before, start=self._length, rate=before.rate * rate, volume=before.volume * volume, tone=whole)
+        self._start_run(run, is_own=seconds is not None)
+
+    def open_emphasis(self, shown: str, emphasis: float) -> None:
+        """Begin a span of another emphasis (`Tone.emphasis`) that `close` ends; the innermost applies."""
+        before = self._begin("emphasis", shown)
+        self._start_run(replace(before, start=self._length, tone=replace(before.tone, emphasis=emphasis)))
 
     def open_voice(self, kind: str, shown: str, *, voice: str | None, language: str | None) -> None:
         """Begin a span of another voice or language that `close` ends; None keeps the current one."""
@@ -177,9 +218,14 @@ class MarkedTextBuilder:
         )
 
     @property
-    def language(self) -> str | None:
-        """Language of the span at the current position; None where it is that of the whole text."""
-        return self._runs[-1].language
+    def run(self) -> StyleRun:
+        """The run at the current position."""
+        return self._runs[-1]
+
+    @property
+    def last_character(self) -> str:
+        """The last character so far; empty at the beginning."""
+        return self._pieces[-1][-1:] if self._pieces else ""
 
     def close(self, kind: str, shown: str) -> None:
         """End the innermost open span.
@@ -196,6 +242,12 @@ class MarkedTextBuilder:
             raise InputError(f"{shown} comes before the end of {last.shown}; close {last.shown} first")
         if self._length == last.start and self._runs[-1].styles != last.before.styles:
             raise InputError(f"{last.shown[:200]} contains no text; add words before its end")
+        if last.seconds is not None and self._n_letters > last.first_letter:
+            pace = last.seconds / (self._n_letters - last.first_letter)
+            at = len(self._runs)
+            while at and self._runs[at - 1].start >= last.start:
+                at -= 1
+                self._runs[at] = replace(self._runs[at], pace=self._runs[at].pace or pace)
         self._start_run(replace(last.before, start=self._length))
 
     def build(self, language: str | None = None, *, base_language: str | None = None) -> MarkedText:
@@ -213,19 +265,21 @@ class MarkedTextBuilder:
             merged = replace(run, language=None) if run.language and run.language == base_language else run
             if not runs or not runs[-1].is_spoken_as(merged):
                 runs.append(merged)
-        return MarkedText("".join(self._pieces), tuple(runs), tuple(self._marks), language)
+        notes = [f"SSML, line {line}: {text}" for text, line in [*self._notes.items()][:MAX_NOTES]]
+        return MarkedText("".join(self._pieces), tuple(runs), tuple(self._marks), language, tuple(notes))
 
-    def _begin(self, kind: str, shown: str) -> StyleRun:
+    def _begin(self, kind: str, shown: str, seconds: float | None = None) -> StyleRun:
         """Open a span at the current position; the run before it."""
         if len(self._open_spans) >= MAX_NESTING:
             raise InputError(f"{shown} is nested in {MAX_NESTING} other marks; reduce the nesting")
         before = self._runs[-1]
-        self._open_spans.append(_OpenSpan(kind, shown, self._length, before))
+        self._open_spans.append(_OpenSpan(kind, shown, self._length, before, self._n_letters, seconds))
         return before
 
-    def _start_run(self, run: StyleRun) -> None:
+    def _start_run(self, run: StyleRun, *, is_own: bool = False) -> None:
+        """Begin a run; one that changes nothing yet only if it is one of its own."""
         if self._runs[-1].start == run.start:
             self._runs.pop()
         last = self._runs[-1] if self._runs else None
-        if last is None or not last.is_spoken_as(run):
+        if last is None or is_own or not last.is_spoken_as(run):
             self._runs.append(run)

@@ -56,6 +56,11 @@ def say_as(kind: str, text: str, written_format: str, language: str) -> str:
     return _OTHER_LANGUAGES[kind](content)
 
 
+def reads_kind(kind: str, language: str) -> bool:
+    """Whether texts of a language are read as a kind (`say_as`)."""
+    return kind in (KINDS if language.partition("-")[0] == "en" else _OTHER_LANGUAGES)
+
+
 def _reading_error(text: str, what: str, example: str) -> InputError:
     return InputError(f"cannot read {text[:40]!r} as {what}; write it as in {example}")
 

@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from lexicon.capitals import sentence_case
-from lexicon.given_phones import TextWord, words_with_given_phones
+from lexicon.given_phones import TextWord, ToneSpan, phrase_words
 from lexicon.ipa import IpaPhone
 from lexicon.marked_text import Mark, MarkedText, NodMark, PauseMark, PhoneMark, StyleRun
 from lexicon.normalize import spoken_form
 from lexicon.pauses import PARAGRAPH_S, pause_behind
 from lexicon.sentence_length import n_letters, overlapping_runs, pieces_of_text
+from lexicon.tones import EVEN
 
 _BLANK_LINE = re.compile(r"\n\s*\n")
 
@@ -36,7 +37,9 @@ class Phrase:
     voice, language
         Set in a span of another voice or language; None elsewhere.
     words
-        The words of `text` if phones are given for some of them; empty otherwise.
+        The words of `text` if phones are given for some of them, or a tone; empty otherwise.
+    seconds
+        In which it is spoken, whatever the rate; None: by the rate.
     """
 
     source: str
@@ -48,6 +51,7 @@ class Phrase:
     voice: str | None = None
     language: str | None = None
     words: tuple[TextWord, ...] = ()
+    seconds: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,8 +132,8 @@ def split_sentences(
         inside = pauses[bisect_right(pause_positions, start) : bisect_right(pause_positions, end)]
         utterances, silence = _phrases(chunk, start, runs, inside, language)
         given = phones[bisect_left(phone_positions, start) : bisect_left(phone_positions, end)]
-        if given:
-            utterances = [_add_given_phones(part, given, part.language or language) for part in utterances]
+        if given or any(run.tone != EVEN for run in runs):
+            utterances = [_add_words(part, given, runs, part.language or language) for part in utterances]
         if pending is not None:
             pending = _extend_last_pause(pending, silence)
         else:
@@ -161,7 +165,10 @@ def _paragraph_ends(text: str) -> Iterator[int]:
 
 def _continued_phrase(phrase: Phrase, *, is_cut: bool) -> Phrase:
     """A phrase whose spoken form ends with a comma if its sentence continues, so that the voice does not end it."""
-    return replace(phrase, text=f"{phrase.text},") if is_cut and phrase.text[-1:].isalnum() else phrase
+    if not is_cut or not phrase.text[-1:].isalnum():
+        return phrase
+    words = (*phrase.words[:-1], *(replace(word, after=word.after or ",") for word in phrase.words[-1:]))
+    return replace(phrase, text=f"{phrase.text},", words=words)
 
 
 def text_prefix(written: str, n: int) -> str:
@@ -221,7 +228,8 @@ def _phrases(
         text = spoken_form(written, run.language or language)
         pause = silences.get(last)
         if any(character.isalnum() for character in text):
-            found.append(Phrase(written, text, first, last, run.rate, pause, run.voice, run.language))
+            seconds = None if run.pace is None else run.pace * (last - first)
+            found.append(Phrase(written, text, first, last, run.rate, pause, run.voice, run.language, seconds=seconds))
         elif found:  # punctuation alone belongs to the phrase before it
             found[-1] = _extend_phrase(found[-1], written, last, pause, language)
         else:
@@ -236,19 +244,27 @@ def _extend_phrase(utterance: Phrase, written: str, last: int, pause: float | No
     return replace(utterance, source=whole, text=text, last=last, pause=sum(seconds) if seconds else None)
 
 
-def _speech_settings(run: StyleRun) -> tuple[float, str | None, str | None]:
-    return run.rate, run.voice, run.language
+def _speech_settings(run: StyleRun) -> tuple[float, float | None, str | None, str | None]:
+    """Settings that are the same within a phrase; tones change from word to word."""
+    return run.rate, run.pace, run.voice, run.language
 
 
-def _add_given_phones(part: Phrase, phones: Sequence[PhoneMark], language: str) -> Phrase:
-    """A phrase with the phones given for its words."""
+def _add_words(part: Phrase, phones: Sequence[PhoneMark], runs: Sequence[StyleRun], language: str) -> Phrase:
+    """A phrase with its words, if phones are given for some of them, or a tone."""
     places = [at for at, character in enumerate(part.source) if not character.isspace()]
+    last = min(part.last, part.first + len(places))
     inside = [
         replace(mark, at=places[mark.at - part.first], end=places[mark.end - part.first - 1] + 1)
         for mark in phones
-        if part.first <= mark.at < mark.end <= min(part.last, part.first + len(places))
+        if part.first <= mark.at < mark.end <= last
     ]
-    return replace(part, words=words_with_given_phones(part.source, inside, language)) if inside else part
+    ends = [*(run.start for run in runs[1:]), last]
+    spans = [
+        ToneSpan(places[max(run.start, part.first) - part.first], places[min(end, last) - part.first - 1] + 1, run.tone)
+        for run, end in zip(runs, ends, strict=True)
+        if run.tone != EVEN and max(run.start, part.first) < min(end, last)
+    ]
+    return replace(part, words=phrase_words(part.source, inside, spans, language)) if inside or spans else part
 
 
 def _extend_last_pause(sentence: Sentence, seconds: float) -> Sentence:

@@ -1,16 +1,16 @@
-"""Parser of the supported subset of SSML 1.1 (W3C 2010) and ``express-as``; other elements are refused by name.
+"""Parser of SSML 1.1 (W3C 2010) and ``express-as``; elements that are not followed are spoken around, with a note.
 
 ======================= ==============================================================================================
-``speak p s``           the text, its paragraphs and sentences; ``xml:lang`` of ``speak`` must be the request's language
-``break``               silence: ``time`` (``400ms``, ``0.4s``), or ``strength``
-``emphasis``            louder words and a nod; ``level`` strong, moderate (default), none, reduced (softer, no nod)
-``prosody``             ``rate`` and ``volume``; ``pitch`` and the rest are refused, as no voice supports them
+``speak p s w``         the text, its paragraphs, sentences and words; ``xml:lang`` of ``speak`` must be the request's
+``break``               silence: ``time`` (``400ms``, ``0.4s``), or ``strength``; also ``mstts:silence`` at both ends
+``emphasis``            F0, length and level of words, and a nod; ``level`` strong, moderate, none, reduced (no nod)
+``prosody``             ``rate``, ``volume``, ``pitch``, ``range``, ``contour``, ``duration`` (`lexicon.ssml_prosody`)
 ``mark``                a ``name`` whose time is reported
 ``sub``                 ``alias`` is spoken instead of the text
 ``phoneme``             ``ph`` is spoken instead of the text: IPA, or ARPABET with ``alphabet="x-arpabet"``
 ``say-as``              the text is read as ``interpret-as`` (`lexicon.say_as`)
 ``voice lang``          another voice (``name``, ``gender``, ``language``), another language (``xml:lang``)
-``express-as``          ``style`` of the gestures, as ``[style:...]``; also ``mstts:express-as``
+``express-as``          ``style`` of the gestures, as ``[style:...]``; also those of vendors
 ======================= ==============================================================================================
 """
 
@@ -23,43 +23,53 @@ from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.languages import language_code
 from lexicon.marked_text import MAX_NESTING, MarkedText, MarkedTextBuilder, NameMark, NodMark, PauseMark, PhoneMark
-from lexicon.say_as import say_as
-from lexicon.ssml_values import (
-    BREAKS_S,
-    check_attributes,
-    check_lengths,
-    choose_voice,
-    look_up_value,
-    parse_rate,
-    parse_volume,
-    phoneme_words,
-    primary_subtag,
+from lexicon.say_as import reads_kind, say_as
+from lexicon.ssml_leniency import (
+    LANGUAGE,
+    RENAMED,
+    TRANSPARENT,
+    UNSPOKEN,
+    known_attributes,
+    nearest_style,
+    with_plain_entities,
 )
+from lexicon.ssml_prosody import look_up_value, parse_contour, parse_pitch, parse_range, parse_rate, parse_volume
+from lexicon.ssml_values import ALPHABETS, BREAKS_S, check_lengths, choose_voice, phoneme_words, primary_subtag
+from lexicon.tones import Tone
 
 _MARK = re.compile(r"\[/?(?:style|nod|pause)\b")
 _TIME = re.compile(r"\+?([0-9]{1,9}(?:\.[0-9]{1,9})?|\.[0-9]{1,9})\s*(ms|s)")
-# Volume factor and nod size of each level: accented words are 2-5 dB louder than their neighbours, and nods are the
-# visual cue of stress (Krahmer and Swerts 2007, J. Memory and Language 57).
-EMPHASES = MappingProxyType({"strong": (1.6, 1.0), "moderate": (1.25, 0.6), "none": (1.0, 0.0), "reduced": (0.7, 0.0)})
+# Emphasis (`Tone.emphasis`) and nod size of each level: nods are the visual cue of stress (Krahmer and Swerts 2007,
+# J. Memory and Language 57).
+EMPHASES = MappingProxyType({"strong": (1.0, 1.0), "moderate": (0.6, 0.6), "none": (0.0, 0.0), "reduced": (-1.0, 0.0)})
 STRETCH_ENDS = MappingProxyType({"p": "\n\n", "s": "\u2028"})  # a blank line, and a line separator
 SPAN_KINDS = frozenset({"emphasis", "prosody", "express-as", "voice", "lang"})
 LEAF_KINDS = frozenset({"break", "mark", "sub", "phoneme", "say-as"})  # contain no elements
 REPLACED_KINDS = frozenset({"phoneme", "say-as"})  # speak other words than their text
-LANGUAGE = "xml:lang"
+TYPICAL_HZ = 165.0  # between the usual pitch of men and of women, for a voice of which it is not known
 Attributes = Mapping[str, str]
+VoiceHz = Callable[[str | None, str], float]  # usual pitch of a voice (None: that of the request) in a language
 
 
-def parse_ssml(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:
+def typical_hz(_: str | None, __: str) -> float:
+    """Pitch of a voice of which nothing is known, in Hz."""
+    return TYPICAL_HZ
+
+
+def parse_ssml(text: str, language: str = DEFAULT_LANGUAGE, voice_hz: VoiceHz = typical_hz) -> MarkedText:
     """Parse an SSML document into a marked text.
 
     Parameters
     ----------
     language
         Language of the text, where no element sets another.
+    voice_hz
+        By which pitches in Hz become semitones.
     """
-    # The parser is expat; a document type declaration is refused, and without one there are no entities to expand or
-    # fetch. Attributes are short (`MAX_ATTRIBUTE_CHARACTERS`), so that parsing is linear in the length of the document.
-    reader = _SsmlReader(language)
+    # The parser is expat; declarations in a document type are refused, and without them there are no entities to
+    # expand or fetch. Attributes are short (`MAX_ATTRIBUTE_CHARACTERS`), so that parsing is linear in the length of the
+    # document.
+    reader = _SsmlReader(language, voice_hz)
     try:
         return reader.read(text)
     except expat.ExpatError as broken:
@@ -76,13 +86,15 @@ def parse_ssml(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:
 class _SsmlReader:
     """Handlers of the elements of one document."""
 
-    def __init__(self, language: str) -> None:
+    def __init__(self, language: str, voice_hz: VoiceHz) -> None:
         self._builder = MarkedTextBuilder()
         self._elements: list[str] = []
         self._spans: list[str] = []  # for each element the kind of its span, or empty
+        self._final_pauses_s: list[float] = []  # of each element
+        self._n_unspoken = 0  # elements around whose text is not spoken
         self._replaced_text: list[str] = []  # text of a phoneme or say-as
         self._replaced_attributes: Attributes = {}
-        self._base = language
+        self._base, self._voice_hz = language, voice_hz
         self._language: str | None = None
         parser = expat.ParserCreate()
         # else expat gives the words between two tags in several parts, and a mark may be cut
@@ -97,7 +109,9 @@ class _SsmlReader:
             "speak": self._speak,
             "p": self._stretch,
             "s": self._stretch,
+            "w": self._word,
             "break": self._break,
+            "mstts:silence": self._silence,
             "emphasis": self._emphasis,
             "prosody": self._prosody,
             "mark": self._mark,
@@ -117,34 +131,54 @@ class _SsmlReader:
     def read(self, text: str) -> MarkedText:
         """Parse the whole document."""
         # XML allows nothing before its declaration
-        self._parser.Parse(text.removeprefix("\ufeff").lstrip(), True)
+        self._parser.Parse(with_plain_entities(text.removeprefix("\ufeff").lstrip()), True)
         return self._builder.build(self._language, base_language=self._base)
 
-    def _doctype(self, *_: object) -> None:
-        raise InputError("a document type declaration is not supported; remove <!DOCTYPE ...>")
+    def _note(self, text: str) -> None:
+        self._builder.note(text, self.line)
+
+    def _doctype(self, _: str, __: str | None, ___: str | None, has_declarations: int) -> None:
+        if has_declarations:
+            raise InputError("declarations in a document type are not supported; remove [...] from <!DOCTYPE ...>")
 
     def _instruction(self, target: str, _: str) -> None:
-        raise InputError(f"the instruction <?{target}?> is not supported; remove it")
+        self._note(f"the instruction <?{target[:40]}?> is not followed")
 
     def _start(self, tag: str, attributes: Attributes) -> None:
-        name = tag.removeprefix("mstts:") if tag == "mstts:express-as" else tag
-        if name not in self._starts:
-            raise InputError(f"the element <{tag[:40]}> is not supported; use {', '.join(self._starts)}")
+        name, renamed = RENAMED.get(tag, (tag, {}))
         if (name == "speak") != (not self._elements):
             raise InputError("<speak> must be the only root element; put everything into one")
         if len(self._elements) > 2 * MAX_NESTING:
-            raise InputError(f"<{tag}> is nested in {len(self._elements)} others; reduce the nesting")
+            raise InputError(f"<{tag[:40]}> is nested in {len(self._elements)} others; reduce the nesting")
         if self._elements and self._elements[-1] in LEAF_KINDS:
-            raise InputError(f"<{self._elements[-1]}> cannot contain elements; close it before <{tag}>")
-        check_lengths(name, attributes)
+            raise InputError(f"<{self._elements[-1]}> cannot contain elements; close it before <{tag[:40]}>")
+        check_lengths(tag, attributes)
         self._elements.append(name)
-        self._spans.append(name if name in SPAN_KINDS else "")
-        self._starts[name](attributes)
+        self._spans.append("")
+        self._final_pauses_s.append(0.0)
+        self._n_unspoken += self._n_unspoken > 0 or name in UNSPOKEN
+        if self._n_unspoken > 1:
+            return
+        if name not in self._starts:
+            shown = f"<{tag[:40]}> is not supported; its text is spoken"
+            self._note(UNSPOKEN.get(name) or TRANSPARENT.get(name, shown))
+            return
+        read, unread = known_attributes(name, {renamed.get(key, key): value for key, value in attributes.items()})
+        for attribute in unread:
+            self._note(f"the attribute {attribute[:40]} of <{tag}> is not followed")
+        self._spans[-1] = name if name in SPAN_KINDS else ""
+        self._starts[name](read)
 
     def _end(self, tag: str) -> None:
         name, span = self._elements.pop(), self._spans.pop()
+        pause_s = self._final_pauses_s.pop()
+        if self._n_unspoken:
+            self._n_unspoken -= 1
+            return
         if name in REPLACED_KINDS:
             self._speak_replacement(name)
+        if pause_s:
+            self._builder.add_mark(PauseMark(self._builder.at, pause_s))
         if span:
             self._builder.close(span, f"</{tag}>")
         if name in {"p", "s"}:
@@ -152,7 +186,7 @@ class _SsmlReader:
 
     def _words(self, text: str) -> None:
         inside = self._elements[-1]
-        if inside == "sub":
+        if inside == "sub" or self._n_unspoken:
             return
         if inside in {"break", "mark"} and text.strip():
             raise InputError(f"<{inside}> cannot contain text; close it before {text.strip()[:20]!r}")
@@ -166,12 +200,20 @@ class _SsmlReader:
             self._builder.add_text(text)
 
     def _speak(self, attributes: Attributes) -> None:
-        known = {name: value for name, value in attributes.items() if not name.startswith("xmlns")}
-        self._language = check_attributes("speak", known, "version", LANGUAGE, "xsi:schemaLocation").get(LANGUAGE)
+        self._language = attributes.get(LANGUAGE)
 
     def _stretch(self, attributes: Attributes) -> None:
-        tag = check_attributes(self._elements[-1], attributes, LANGUAGE).get(LANGUAGE)
         self._builder.add_text(STRETCH_ENDS[self._elements[-1]])
+        self._open_language(attributes)
+
+    def _word(self, attributes: Attributes) -> None:
+        if self._builder.last_character.isalnum():  # words may stand side by side
+            self._builder.add_text(" ")
+        self._open_language(attributes)
+
+    def _open_language(self, attributes: Attributes) -> None:
+        """Begin a span of another language, if an element names one."""
+        tag = attributes.get(LANGUAGE)
         if tag is not None and primary_subtag(tag) != primary_subtag(self._current_language):
             self._spans[-1] = "lang"
             self._builder.open_voice("lang", f"<{self._elements[-1]}>", voice=None, language=language_code(tag))
@@ -179,80 +221,105 @@ class _SsmlReader:
     @property
     def _current_language(self) -> str:
         """Language at the current position."""
-        return self._builder.language or self._base
+        return self._builder.run.language or self._base
 
     def _lang(self, attributes: Attributes) -> None:
-        tag = check_attributes("lang", attributes, LANGUAGE).get(LANGUAGE, "")
-        self._builder.open_voice("lang", "<lang>", voice=None, language=language_code(tag))
+        self._builder.open_voice("lang", "<lang>", voice=None, language=language_code(attributes.get(LANGUAGE, "")))
 
     def _voice(self, attributes: Attributes) -> None:
-        known = check_attributes("voice", attributes, "name", "gender", "language", "languages", LANGUAGE, "required")
-        voice, language = choose_voice(known, self._current_language)
+        voice, language = choose_voice(attributes, self._current_language, self._note)
         self._builder.open_voice("voice", "<voice>", voice=voice, language=language)
 
     def _open_replaced(self, attributes: Attributes) -> None:
         kind = self._elements[-1]
-        known = ("alphabet", "ph") if kind == "phoneme" else ("interpret-as", "format", "detail")
-        self._replaced_attributes = check_attributes(kind, attributes, *known)
-        needed = known[1] if kind == "phoneme" else known[0]
+        needed = "ph" if kind == "phoneme" else "interpret-as"
         if not attributes.get(needed, "").strip():
             raise InputError(f'a <{kind}> needs {needed}; write <{kind} {needed}="...">')
-        self._replaced_text = []
+        self._replaced_attributes, self._replaced_text = attributes, []
 
     def _speak_replacement(self, kind: str) -> None:
         attributes, text = self._replaced_attributes, "".join(self._replaced_text)
-        if kind == "say-as":
-            self._builder.add_text(
-                say_as(attributes["interpret-as"].strip(), text, attributes.get("format", ""), self._current_language)
-            )
-            return
-        _add_phonemes(self._builder, text, attributes["ph"], attributes.get("alphabet", "ipa"))
+        alphabet, wanted = attributes.get("alphabet", "ipa"), attributes.get("interpret-as", "").strip()
+        if kind == "phoneme" and alphabet in ALPHABETS:
+            _add_phonemes(self._builder, text, attributes["ph"], alphabet)
+        elif kind == "say-as" and reads_kind(wanted, self._current_language):
+            self._builder.add_text(say_as(wanted, text, attributes.get("format", ""), self._current_language))
+        else:
+            what = f"alphabet {alphabet[:40]!r}" if kind == "phoneme" else f"kind {wanted[:40]!r}"
+            self._note(f"the {what} of <{kind}> is not read in {self._current_language}; its text is spoken as written")
+            self._builder.add_text(text)
 
     def _break(self, attributes: Attributes) -> None:
-        known = check_attributes("break", attributes, "time", "strength")
-        seconds = look_up_value("strength", known.get("strength", "medium"), BREAKS_S)
-        if "time" in known:
-            match = _TIME.fullmatch(known["time"].strip())
-            if match is None:
-                raise InputError(f'cannot read the time {known["time"][:40]!r} of a <break>; write "400ms" or "0.4s"')
-            seconds = float(match[1]) / (1000 if match[2] == "ms" else 1)
+        seconds = look_up_value("strength", attributes.get("strength", "medium"), BREAKS_S)
+        if "time" in attributes:
+            seconds = _parse_time(attributes["time"], "<break>")
         if seconds > 0:
             self._builder.add_mark(PauseMark(self._builder.at, seconds))
 
+    def _silence(self, attributes: Attributes) -> None:
+        kind = attributes.get("type", "").strip().casefold().removesuffix("-exact")
+        if kind not in {"leading", "tailing"}:
+            self._note(f"<mstts:silence> of the type {attributes.get('type', '')[:40]!r} is not followed; use <break>")
+            return
+        seconds = _parse_time(attributes.get("value", ""), "<mstts:silence>")
+        if kind == "tailing":
+            self._final_pauses_s[-2] += seconds
+        elif seconds > 0:
+            self._builder.add_mark(PauseMark(self._builder.at, seconds))
+
     def _emphasis(self, attributes: Attributes) -> None:
-        level = check_attributes("emphasis", attributes, "level").get("level", "moderate")
+        level = attributes.get("level", "moderate")
         if level not in EMPHASES:
             raise InputError(f"<emphasis> has no level {level[:40]!r}; use {', '.join(EMPHASES)}")
-        volume, size = EMPHASES[level]
+        emphasis, size = EMPHASES[level]
         if size:
             self._builder.add_mark(NodMark(self._builder.at, size))
-        self._builder.open("emphasis", "<emphasis>", volume=volume)
+        self._builder.open_emphasis("<emphasis>", emphasis)
 
     def _prosody(self, attributes: Attributes) -> None:
-        for name in ("pitch", "contour", "range", "duration"):
-            if attributes.get(name, "default") not in {"medium", "default"}:
-                raise InputError(f"no voice supports {name}; remove it, and use rate and volume")
-        known = check_attributes("prosody", attributes, "rate", "volume", "pitch", "contour", "range", "duration")
-        rate, volume = parse_rate(known.get("rate", "medium")), parse_volume(known.get("volume", "medium"))
-        self._builder.open("prosody", "<prosody>", rate=rate, volume=volume)
+        now = self._builder.run
+        hz = self._voice_hz(now.voice, self._current_language)
+        pitch = parse_pitch(attributes.get("pitch", "medium"), hz, now.tone.pitch)
+        contour = attributes.get("contour", "").strip()
+        self._builder.open_prosody(
+            "<prosody>",
+            rate=parse_rate(attributes.get("rate", "medium")),
+            volume=parse_volume(attributes.get("volume", "medium")),
+            tone=Tone(
+                pitch=pitch,
+                range=parse_range(attributes.get("range", "medium"), hz),
+                contour=parse_contour(contour, hz, now.tone.pitch + pitch) if contour else (),
+            ),
+            seconds=_parse_time(attributes["duration"], "<prosody>") or None if "duration" in attributes else None,
+        )
 
     def _mark(self, attributes: Attributes) -> None:
-        name = check_attributes("mark", attributes, "name").get("name", "")
+        name = attributes.get("name", "")
         if not name.strip():
             raise InputError('a <mark> needs a name; write <mark name="here"/>')
         self._builder.add_mark(NameMark(self._builder.at, name))
 
     def _sub(self, attributes: Attributes) -> None:
-        alias = check_attributes("sub", attributes, "alias").get("alias", "")
+        alias = attributes.get("alias", "")
         if not alias.strip():
             raise InputError('a <sub> needs an alias; write <sub alias="doctor">Dr</sub>')
         self._builder.add_text(alias)
 
     def _express_as(self, attributes: Attributes) -> None:
-        style = check_attributes("express-as", attributes, "style").get("style", "")
-        if not style.strip():
+        style = (attributes.get("style") or attributes.get("type", "")).strip()
+        if not style:
             raise InputError('<express-as> needs a style; write <express-as style="delighted">')
-        self._builder.open("express-as", f'<express-as style="{style}">', style=style.strip())
+        if nearest := nearest_style(style):
+            self._note(f"the style {style[:40]} is {nearest} here, unless the palette has one of its own")
+        self._builder.open_style("express-as", f'<express-as style="{style}">', style)
+
+
+def _parse_time(written: str, element: str) -> float:
+    """Seconds of a time such as 400ms."""
+    match = _TIME.fullmatch(written.strip())
+    if match is None:
+        raise InputError(f'cannot read the time {written[:40]!r} of a {element}; write "400ms" or "0.4s"')
+    return float(match[1]) / (1000 if match[2] == "ms" else 1)
 
 
 def _add_phonemes(builder: MarkedTextBuilder, text: str, phones: str, alphabet: str) -> None:

@@ -1,7 +1,4 @@
-"""Values of SSML attributes (break durations, rates, volumes), and checks common to all elements.
-
-Values of ``<phoneme>``, ``<voice>`` and ``<lang>``: phones, voices and languages.
-"""
+"""Values of SSML attributes other than those of ``<prosody>``: breaks, phones, voices and languages."""
 
 import re
 import unicodedata
@@ -15,15 +12,8 @@ from lexicon.languages import language_code
 
 Attributes = Mapping[str, str]
 MAX_ATTRIBUTE_CHARACTERS = 10_000  # longer text belongs between tags
-_PERCENT = re.compile(r"([+-]?)([0-9]{1,6}(?:\.[0-9]{1,9})?)%")
-_FACTOR = re.compile(r"[0-9]{1,6}(?:\.[0-9]{1,9})?")
-_DECIBEL = re.compile(r"([+-]?[0-9]{1,6}(?:\.[0-9]{1,9})?)\s*dB", re.IGNORECASE)
 # Seconds by strength: from pauses of read speech at commas (0.2-0.4 s) to those between paragraphs (1 s).
 BREAKS_S = MappingProxyType({"none": 0.0, "x-weak": 0.1, "weak": 0.2, "medium": 0.4, "strong": 0.7, "x-strong": 1.0})
-NAMED_RATES = MappingProxyType({"x-slow": 0.5, "slow": 0.75, "medium": 1.0, "default": 1.0, "fast": 1.3, "x-fast": 1.7})
-NAMED_VOLUMES = MappingProxyType(
-    {"silent": 0.0, "x-soft": 0.35, "soft": 0.6, "medium": 1.0, "default": 1.0, "loud": 1.4, "x-loud": 2.0}
-)
 ALPHABETS: Mapping[str, Callable[[str], tuple[IpaPhone, ...]]] = MappingProxyType({
     "ipa": parse_ipa, "x-arpabet": arpabet_segments, "arpabet": arpabet_segments, "x-cmu": arpabet_segments,
 })  # fmt: skip
@@ -33,6 +23,7 @@ _ENGLISH_VOICES = frozenset(VOICES[:6])
 GENDERS = ("female", "male", "neutral")
 MAX_PHONES_CHARACTERS = 500  # characters of ``ph``
 MAX_WORD_CHARACTERS = 60  # characters of a word with given phones
+_LOCALE = re.compile(r"([a-z]{2,3}-[A-Z]{2})-\w")  # de-DE-KatjaNeural, en-US-Neural2-C
 _NO_WORD = re.compile(r"[^\w'’-]+")
 PhonemeWord = tuple[str, tuple[IpaPhone, ...]]
 
@@ -50,44 +41,6 @@ def check_lengths(element: str, attributes: Attributes) -> None:
                 f"the attribute {name[:40]} of <{element}> has {len(value)} characters, but the maximum is "
                 f"{MAX_ATTRIBUTE_CHARACTERS}; put the text between tags"
             )
-
-
-def check_attributes(element: str, attributes: Attributes, *known: str) -> Attributes:
-    """The attributes, after a check that all of them are known."""
-    for name in attributes:
-        if name not in known:
-            raise InputError(f"<{element}> does not support the attribute {name[:40]!r}; use {', '.join(known)}")
-    return attributes
-
-
-def look_up_value(what: str, value: str, values: Mapping[str, float]) -> float:
-    """Value of a named setting."""
-    if value not in values:
-        raise InputError(f"there is no {what} {value[:40]!r}; use {', '.join(values)}")
-    return values[value]
-
-
-def parse_rate(written: str) -> float:
-    """Factor of the speaking rate from a name, a percentage (80%), a change (-20%), or a number."""
-    value = written.strip()
-    if match := _PERCENT.fullmatch(value):
-        share = float(match[2]) / 100
-        return {"": share, "+": 1 + share, "-": 1 - share}[match[1]]
-    if _FACTOR.fullmatch(value):
-        return float(value)
-    return look_up_value("rate", value, NAMED_RATES)
-
-
-def parse_volume(written: str) -> float:
-    """Factor of the volume from a name or decibels (+6dB)."""
-    if match := _DECIBEL.fullmatch(written.strip()):
-        # 1,000 dB is refused by the limits as well, and does not overflow
-        return float(10.0 ** (min(float(match[1]), 1e3) / 20))
-    if written.strip() not in NAMED_VOLUMES:
-        raise InputError(
-            f"cannot read the volume {written[:40]!r}; use decibels such as +6dB, or one of {', '.join(NAMED_VOLUMES)}"
-        )
-    return NAMED_VOLUMES[written.strip()]
 
 
 def phoneme_words(text: str, written: str, alphabet: str) -> list[PhonemeWord]:
@@ -117,28 +70,44 @@ def _phoneme_word(word: str, written: str, alphabet: str) -> PhonemeWord:
     return word, segments
 
 
-def choose_voice(attributes: Mapping[str, str], language: str) -> tuple[str | None, str | None]:
+def choose_voice(
+    attributes: Mapping[str, str], language: str, note: Callable[[str], None]
+) -> tuple[str | None, str | None]:
     """Voice and language of a ``<voice>`` element; None where they do not change.
 
-    Of several names the first available one is used; a gender selects among the voices of the language.
+    Of several names the first available one is used; a gender selects among the voices of the language. `note` is
+    called with what is not followed.
 
     Raises
     ------
     InputError
-        The voice, gender or language does not exist, or the voice does not speak the language.
+        The language does not exist, or the voice does not speak it.
     """
     tag = attributes.get("xml:lang") or attributes.get("language") or attributes.get("languages", "").split(" ")[0]
     spoken = language_code(tag) if tag else None
-    gender = attributes.get("gender", "neutral")
+    gender = attributes.get("gender", "neutral").strip() or "neutral"
     if gender not in GENDERS:
-        raise InputError(f"there is no gender {gender[:40]!r} of voices; use {', '.join(GENDERS)}")
+        note(f"there is no gender {gender[:40]!r} of voices")
     is_american = (spoken or language) in {"en-us", "en"}
-    by_gender = {"female": "heart" if is_american else "espeak-female", "male": "espeak", "neutral": None}[gender]
+    by_gender = {"female": "heart" if is_american else "espeak-female", "male": "espeak"}.get(gender)
     if "name" not in attributes:
         return by_gender, spoken
     name = next((name for name in attributes["name"].split() if name in VOICES), None)
     if name is None:
-        raise InputError(f"there is no voice {attributes['name'][:40]!r}; use {', '.join(VOICES)}, or a gender")
+        guessed = None if tag else _language_of_name(attributes["name"])
+        is_other = guessed is not None and primary_subtag(guessed) != primary_subtag(language)
+        said = f"; its words are taken for {guessed} by its name" if is_other else ""
+        note(f"there is no voice {attributes['name'][:40]!r}, another one speaks{said}; there are {', '.join(VOICES)}")
+        return by_gender, guessed if is_other else spoken
     if name in _ENGLISH_VOICES and not (spoken or language).startswith("en"):
         raise InputError(f"the voice {name} speaks English, not {spoken or language}; use espeak")
     return name, spoken
+
+
+def _language_of_name(name: str) -> str | None:
+    """Language that the name of a service's voice begins with: de of de-DE-KatjaNeural; None without one."""
+    match = _LOCALE.match(name.strip())
+    try:
+        return language_code(match[1]) if match else None
+    except InputError:
+        return None

@@ -1,14 +1,20 @@
 """Parse the marks in a text, or SSML; any other bracket is text.
 
-Marks: ``[pause 0.4]``, ``[nod]``, ``[style:delighted] ... [/style]``, ``[phoneme:təˈmɑtoʊ]tomato[/phoneme]``.
+Marks: ``[pause 0.4]``, ``[nod]``, ``[style:delighted] ... [/style]``, ``[phoneme:təˈmɑtoʊ]tomato[/phoneme]``, and words
+that are typed with emphasis (`lexicon.emphasis`). A further markup of texts: a function as those of `MARKUPS`, its row,
+and its name in `tts2face.request.MARKUPS`.
 """
 
 import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
 
+from lexicon.emphasis import EmphasisedWords, find_emphases
 from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.marked_text import MarkedText, MarkedTextBuilder, NodMark, PauseMark
-from lexicon.ssml import _add_phonemes, parse_ssml
+from lexicon.ssml import VoiceHz, _add_phonemes, parse_ssml, typical_hz
 
 # A bracket, one of the words, and the rest up to the closing bracket, which a mark must have; words with phones up to
 # their end. Each part ends where the next begins, so that the scan is linear.
@@ -26,30 +32,96 @@ def is_ssml(text: str) -> bool:
     return _SSML.match(text) is not None
 
 
-def parse_marks(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:
-    """Separate a text from its marks; a text that begins with ``<speak`` is parsed as SSML (`lexicon.ssml`).
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """How a text is read.
 
     Parameters
     ----------
     language
-        Language of the text, by which SSML reads numbers and selects voices.
+        Of the text, by which SSML reads numbers and selects voices.
+    has_emphasis
+        Whether words that are typed with emphasis are said so; not those of a recording.
+    voice_hz
+        By which SSML's pitches in Hz become semitones.
+    """
+
+    language: str = DEFAULT_LANGUAGE
+    has_emphasis: bool = True
+    voice_hz: VoiceHz = typical_hz
+
+
+def parse_marks(
+    text: str,
+    language: str = DEFAULT_LANGUAGE,
+    markup: str = "auto",
+    *,
+    has_emphasis: bool = True,
+    voice_hz: VoiceHz = typical_hz,
+) -> MarkedText:
+    """Separate a text from its marks.
+
+    Parameters
+    ----------
+    markup
+        One of `MARKUPS`: ``auto`` reads a text that begins with ``<speak`` as SSML (`lexicon.ssml`) and any other with
+        its marks, ``plain`` reads no marks, and ``ssml`` reads SSML also without ``<speak>`` around it.
+    language, has_emphasis, voice_hz
+        As for `Reading`.
 
     Raises
     ------
     InputError
         A mark is malformed, not closed, unmatched, nested too deep, or has a number out of range; the message names it
-        and its syntax.
+        and its syntax. There is no such markup.
     """
+    if markup not in MARKUPS:
+        raise InputError(f"there is no markup {markup[:40]!r}; choose {', '.join(MARKUPS)}")
+    return MARKUPS[markup](text, Reading(language, has_emphasis, voice_hz))
+
+
+def _read_plain(text: str, _: Reading) -> MarkedText:
+    return MarkedText(text)
+
+
+def _read_ssml(text: str, reading: Reading) -> MarkedText:
+    return parse_ssml(text if is_ssml(text) else f"<speak>{text}</speak>", reading.language, reading.voice_hz)
+
+
+def _read_auto(text: str, reading: Reading) -> MarkedText:
     if is_ssml(text):
-        return parse_ssml(text, language)
+        return _read_ssml(text, reading)
     builder = MarkedTextBuilder()
+    emphases = [*find_emphases(text, reading.language)] if reading.has_emphasis else []
+    emphases.reverse()
     at = 0
     for match in MARK_PATTERN.finditer(text):
-        builder.add_text(text[at : match.start()])
+        _add_text(builder, text, (at, match.start()), emphases)
         at = match.end()
         _read_mark(builder, match)
-    builder.add_text(text[at:])
+    _add_text(builder, text, (at, len(text)), emphases)
     return builder.build()
+
+
+MARKUPS: Mapping[str, Callable[[str, Reading], MarkedText]] = MappingProxyType(
+    {"auto": _read_auto, "plain": _read_plain, "ssml": _read_ssml}
+)
+
+
+def _add_text(builder: MarkedTextBuilder, text: str, span: tuple[int, int], emphases: list[EmphasisedWords]) -> None:
+    """Add a part of a text, with the emphases within it, which are taken from the end of the list."""
+    at, end = span
+    while emphases and emphases[-1].end <= end:
+        words = emphases.pop()
+        if words.start < at:  # a mark stands within it
+            continue
+        builder.add_text(text[at : words.start])
+        builder.add_mark(NodMark(builder.at, words.emphasis))
+        builder.open_emphasis(words.text, words.emphasis)
+        builder.add_text(words.text)
+        builder.close("emphasis", words.text)
+        at = words.end
+    builder.add_text(text[at:end])
 
 
 def _read_mark(builder: MarkedTextBuilder, match: "re.Match[str]") -> None:
@@ -64,7 +136,7 @@ def _read_mark(builder: MarkedTextBuilder, match: "re.Match[str]") -> None:
     elif name == "nod":
         builder.add_mark(NodMark(builder.at, _parse_number(rest, shown, name) if rest else 1.0))
     elif name == "style" and rest[:1] == ":" and rest[1:].strip():
-        builder.open("style", shown, style=rest[1:].strip())
+        builder.open_style("style", shown, rest[1:].strip())
     elif name == "/style" and not rest:
         builder.close("style", shown)
     else:

@@ -58,8 +58,9 @@ class LetterVoice:
         return self.speak(content, rate=rate, seed=seed).waveform
 
     def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
-        self.said.append((str(content), rate))
-        words = re.findall(r"\w+" if self._splits else r"[\w'-]+", str(content))
+        text = content if isinstance(content, str) else " ".join(word.text + word.after for word in content)
+        self.said.append((text, rate))
+        words = re.findall(r"\w+" if self._splits else r"[\w'-]+", text)
         return spoken([(word, ["a"] * len(word)) for word in words], rate, self._rate, has_tones=False)
 
 

@@ -18,6 +18,7 @@ class Exclusion(NamedTuple):
     without: str = ""
 
 
+OF_SPEECH = {"markup", "voice", "rate", "voice_pitch", "voice_range", "volume", "lead"}
 # In the order in which they are found.
 EXCLUSIONS = (
     Exclusion({"articulation"}, {"idle"}, "--articulation has no effect with --idle; remove one of them"),
@@ -33,15 +34,17 @@ EXCLUSIONS = (
         "--articulation needs the phones of a recording; remove it, or --audio-map",
     ),
     Exclusion(
-        {"voice", "rate", "lead"},
+        {"voice", "rate", "voice_pitch", "voice_range", "lead"},
         {"audio"},
-        "--voice, --rate and --lead have no effect on a recording; remove them or --audio",
+        "--voice, --rate, --voice-pitch, --voice-range and --lead have no effect on a recording; remove them or "
+        "--audio",
     ),
     Exclusion({"text", "audio"}, {"idle"}, "--idle cannot be combined with text or --audio; remove one of them"),
     Exclusion(
-        {"voice", "rate", "volume", "lead"},
+        OF_SPEECH,
         {"idle"},
-        "--voice, --rate, --volume and --lead have no effect with --idle; remove them",
+        "--markup, --voice, --rate, --voice-pitch, --voice-range, --volume and --lead have no effect with --idle; "
+        "remove them",
     ),
     Exclusion(
         {"partner"},
@@ -51,9 +54,10 @@ EXCLUSIONS = (
     ),
     Exclusion({"audio", "idle"}, {"listen"}, "--listen cannot be combined with --audio or --idle; remove one of them"),
     Exclusion(
-        {"voice", "rate", "volume", "lead"},
+        OF_SPEECH,
         {"listen"},
-        "--voice, --rate, --volume and --lead need a text after --listen; add one, or remove them",
+        "--markup, --voice, --rate, --voice-pitch, --voice-range, --volume and --lead need a text after --listen; add "
+        "one, or remove them",
         "text",
     ),
     Exclusion({"pitch"}, {"gestures=noise"}, "--pitch has no effect with --gestures noise; remove one of them"),

@@ -3,6 +3,7 @@
 from dataclasses import field, fields
 from typing import Any
 
+from lexicon.errors import InputError
 from lexicon.values.checks import check_limits
 
 
@@ -17,3 +18,12 @@ def check_option_limits(options: Any) -> None:
         value, limits = getattr(options, declared.name), declared.metadata.get("limits")
         if limits is not None and value is not None:
             check_limits(declared.name, value, limits)
+
+
+def check_choices(options: Any, *names: str) -> None:
+    """Refuse values of options, other than None, that are not among their choices (`InputError`)."""
+    for declared in fields(options):
+        value, choices = getattr(options, declared.name), declared.metadata.get("choices", ())
+        if declared.name in names and value is not None and value not in choices:
+            what = declared.name.replace("_", " ")
+            raise InputError(f"there is no {what} {value!r}; choose {', '.join(choices[:-1])} or {choices[-1]}")

@@ -11,18 +11,18 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from lexicon.errors import InputError
-from lexicon.marked_text import RATE_LIMITS, VOLUME_LIMITS
+from lexicon.marked_text import PITCH_LIMITS, RANGE_LIMITS, RATE_LIMITS, VOLUME_LIMITS
 from lexicon.values.checks import check_limits, format_value, is_number
 from lexicon.values.fields import check_fields
+from tts2face.articulation import parse_articulation
 from tts2face.exclusions import check_exclusions
-from tts2face.option import check_option_limits, option
+from tts2face.option import check_choices, check_option_limits, option
 
+AUTO_MARKUP = "auto"
+MARKUPS = (AUTO_MARKUP, "plain", "ssml")  # as `lexicon.text_marks.MARKUPS`, which is not loaded for flags
 RECOGNISED = "phones"
 AUDIO_MAP_NAMES = (RECOGNISED, "voices", "network", "linear")
 IDLE_LIMITS_S = (0.1, 3600.0)
-NATURAL, CLEAR = 1.0, 1.5  # factors of articulation
-ARTICULATIONS = {"natural": NATURAL, "clear": CLEAR}
-ARTICULATION_LIMITS = (0.5, 2.0)
 LEAD_S = 0.1  # from the start of a clip to its first sound: three frames at 30 Hz, in which the lips open
 TURN_S = 0.3  # at least, after listening: a breath of less is not seen; gaps between turns of people are .2 s
 LEAD_LIMITS_S = (0.0, 1.0)
@@ -36,9 +36,9 @@ OWN_FACE = "self"  # name of the talker's own face
 DRAWN_FACE, REALISTIC_FACE = "ada", "head"  # the shipped face that is shown by default, and the one with identities
 # Order of flags, of fields over HTTP and of lists in messages.
 ORDER = (
-    "text", "audio", "audio_map", "language", "voice", "rate", "lead", "plain_delivery", "volume", "seed", "dictionary",
-    "synthesis", "context", "exemplars", "articulation", "fps", "gestures", "style", "gain", "expression", "timeline",
-    "pitch", "gaze", "idle", "listen", "partner",
+    "text", "markup", "audio", "audio_map", "language", "voice", "rate", "voice_pitch", "voice_range", "lead",
+    "plain_delivery", "volume", "seed", "dictionary", "synthesis", "context", "exemplars", "articulation", "fps",
+    "gestures", "style", "gain", "expression", "timeline", "pitch", "gaze", "idle", "listen", "partner",
 )  # fmt: skip
 
 
@@ -47,6 +47,12 @@ class SourceOptions:
     """Options of all sources by name, as flags, files and clients give them: any may be given."""
 
     text: str = option("", "Text to speak.")
+    markup: str = option(
+        AUTO_MARKUP,
+        "How the text is read: auto (as SSML if it begins with <speak, else with its marks), plain (no marks), or ssml "
+        "(also without <speak> around it).",
+        choices=MARKUPS,
+    )
     audio: Path | None = option(
         None,
         "Recorded speech (any sound or video file) that the lips follow in place of a synthesised voice; most accurate "
@@ -64,12 +70,18 @@ class SourceOptions:
         "Voice: auto (fits the face), one of `tts2face voices`, a Piper voice (x.onnx), or a server's URL.",
     )
     rate: float = option(1.0, "Speaking rate as a factor, 0.5 to 2.", limits=RATE_LIMITS)
+    voice_pitch: float = option(0.0, "Semitones added to the pitch of the voice, -12 to 12.", limits=PITCH_LIMITS)
+    voice_range: float = option(
+        1.0, "Range of the voice's pitch as a factor, 0 (on one tone) to 2.", limits=RANGE_LIMITS
+    )
     lead: float | None = option(
         LEAD_S, "Seconds from the start of the clip to the first sound, in which the lips open, 0 to 1.",
         limits=LEAD_LIMITS_S,
     )  # fmt: skip
     plain_delivery: bool = option(
-        False, "Keep the voice's rate and loudness under every style; --rate and --volume do so for themselves."
+        False,
+        "Keep the voice's rate, pitch and loudness under every style; --rate, --voice-pitch, --voice-range and "
+        "--volume do so for themselves.",
     )
     volume: float = option(
         1.0,
@@ -99,30 +111,11 @@ class SourceOptions:
         check_option_limits(self)
         if self.articulation is not None:
             parse_articulation(self.articulation)
-        if self.audio_map not in {None, *AUDIO_MAP_NAMES}:
-            raise InputError(f"there is no audio map {self.audio_map!r}; choose {', '.join(AUDIO_MAP_NAMES)}")
+        check_choices(self, "audio_map", "markup")
         check_exclusions(self)
 
 
 SOURCE_OPTIONS = {declared.name: declared for declared in fields(SourceOptions)}
-
-
-def parse_articulation(given: str) -> float:
-    """Factor of an articulation: natural, clear, or a number.
-
-    Raises
-    ------
-    InputError
-        It is neither a name nor a number from 0.5 to 2.
-    """
-    if given in ARTICULATIONS:
-        return ARTICULATIONS[given]
-    try:
-        factor = float(given)
-    except ValueError:
-        raise InputError(f"articulation must be natural, clear or a factor from 0.5 to 2, not {given!r}") from None
-    check_limits("articulation", factor, ARTICULATION_LIMITS)
-    return factor
 
 
 class CheckedOptions:
@@ -155,10 +148,13 @@ class Spoken(CheckedOptions):
     text: str
     voice: str | None = None
     rate: float = 1.0
+    voice_pitch: float = 0.0
+    voice_range: float = 1.0
     lead: float | None = LEAD_S
     plain_delivery: bool = False
     volume: float = 1.0
     articulation: str | None = None
+    markup: str = AUTO_MARKUP
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,6 +163,7 @@ class FromPhones(CheckedOptions):
 
     text: str = ""
     articulation: str | None = None
+    markup: str = AUTO_MARKUP
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,7 +247,8 @@ def make_source(**options: Any) -> Source:
         return Idle(given.idle)
     if given.audio is not None:
         if given.audio_map in {None, RECOGNISED}:
-            return Recorded(given.audio, FromPhones("" if is_blank else given.text, given.articulation), given.volume)
+            lips = FromPhones("" if is_blank else given.text, given.articulation, given.markup)
+            return Recorded(given.audio, lips, given.volume)
         return Recorded(given.audio, FromSound(str(given.audio_map)), given.volume)
     spoken = Spoken(**{declared.name: getattr(given, declared.name) for declared in fields(Spoken)})
     if given.listen is None:
@@ -347,14 +345,11 @@ class Request:
         check_fields(self)
         object.__setattr__(self, "language", language_code(self.language))
         check_option_limits(self)
-        if self.synthesis not in SYNTHESIS_METHODS:
-            raise InputError(f"there is no synthesis {self.synthesis!r}; choose {' or '.join(SYNTHESIS_METHODS)}")
+        check_choices(self, "synthesis", "gaze")
         if self.seed is not None and self.seed < 0:
             raise InputError(f"seed must be 0 or more, not {self.seed}")
         if self.gestures not in GESTURES:
             raise InputError(f"gestures must be {', '.join(GESTURES[:-1])} or {GESTURES[-1]}, not {self.gestures!r}")
-        if self.gaze not in GAZES:
-            raise InputError(f"there is no gaze {self.gaze!r}; choose {' or '.join(GAZES)}")
         check_exclusions(self)
 
     if not TYPE_CHECKING:  # programs of users may read options by name; the package asks the source
@@ -375,6 +370,11 @@ class Request:
     def known_seed(self) -> int:
         """Seed; 0 until a session sets that of its face."""
         return self.seed or 0
+
+    @property
+    def markup(self) -> str:
+        """How the text is read."""
+        return str(self.source.as_options().get("markup", AUTO_MARKUP))
 
     @property
     def has_gestures(self) -> bool:

@@ -50,7 +50,7 @@ def test_every_kind_of_error_has_an_exit_code() -> None:
         (["Hi.", "--out", "x.mp4", "--language", "tlh"], 2, "no language 'tlh'"),
         (["Hi [pause x].", "--out", "x.mp4"], 2, "cannot read the mark [pause x]"),
         (["Hi [style:ears=a]you[/style].", "--out", "x.mp4"], 2, "no feature 'ears'"),
-        (["<speak><voice name='Jo'>Hi.</voice></speak>", "--out", "x.mp4"], 2, "SSML, line 1: there is no voice 'Jo'"),
+        (["<speak><break time='x'/>Hi.</speak>", "--out", "x.mp4"], 2, "SSML, line 1: cannot read the time 'x'"),
         (["<speak xml:lang='fr'>Salut.</speak>", "--out", "x.mp4"], 2, "the text names the language fr, not en-us"),
         (["Hi [pause 1] you.", "--audio", "latin.txt", "--out", "x.mp4"], 2, "have no effect on a recording"),
         (["Hi.", "--style", "ears=a", "--out", "x.mp4"], 2, "no feature 'ears'"),

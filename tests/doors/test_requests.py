@@ -35,6 +35,8 @@ CHANGES = {
     "language": "de",
     "voice": "espeak",
     "rate": 1.3,
+    "voice_pitch": 3.0,
+    "voice_range": 0.5,
     "volume": 0.5,
     "lead": 0.0,
     "seed": 7,
@@ -51,8 +53,8 @@ CHANGES = {
     "listen": 0.5,
     "expression": "happy=0.6@0.2-0.9",
 }
-# tests/doors/test_audio.py changes these; idle animation and delivery below
-ELSEWHERE = {"audio", "audio_map", "idle", "partner", "plain_delivery"}
+# tests/doors/test_audio.py changes these; idle animation, delivery and markup below
+ELSEWHERE = {"audio", "audio_map", "idle", "partner", "plain_delivery", "markup"}
 
 
 def test_an_option_of_a_source_is_a_field_of_one_with_the_same_default() -> None:
@@ -101,6 +103,14 @@ def test_a_plain_delivery_changes_the_clip_of_a_style(session: Session) -> None:
     plain, styled = (session.clip(Request(text=TEXT, style="depressed", plain_delivery=on)) for on in (True, False))
     assert styled.speech.waveform.duration > plain.speech.waveform.duration
     assert plain.speech.waveform.samples.tobytes() == session.clip(TEXT).speech.waveform.samples.tobytes()
+
+
+def test_a_markup_changes_what_is_spoken(session: Session) -> None:
+    text = 'Bob <break time="1s"/> may move.'
+    seconds = {markup: session.clip(text, markup=markup).speech.waveform.duration for markup in ("auto", "ssml")}
+    assert seconds["ssml"] == pytest.approx(1.0 + session.clip("Bob may move.").speech.waveform.duration, abs=0.4)
+    assert seconds["auto"] > seconds["ssml"]  # the brackets and what is in them are spoken
+    assert digest(session.clip("Bob may [nod] move.", markup="plain")) != digest(session.clip("Bob may [nod] move."))
 
 
 def test_the_same_request_gives_the_same_bytes_in_another_process(clip: Clip, tmp_path: Path) -> None:

@@ -1,4 +1,6 @@
-"""Rate and level of the voice under a style."""
+"""Rate, level, pitch and range of the voice under a style."""
+
+from dataclasses import replace
 
 import pytest
 
@@ -9,7 +11,8 @@ from tts2face.models.palette import PLAIN, Delivery
 from tts2face.models.palette_editing import StyleMix, add_derivation, mix_styles
 from tts2face.models.palette_file import load_palette
 from tts2face.request import Request
-from tts2face.session.speech import delivery_of, sentence_sound, speak_sentence
+from tts2face.session.phrase_delivery import delivery_of
+from tts2face.session.speech import sentence_sound, speak_sentence
 from tts2face.sound.voice_pool import VoicePool
 
 DELIVERIES = load_palette("starter").deliveries
@@ -40,8 +43,15 @@ def test_a_style_of_the_request_or_of_most_letters() -> None:
 
 def test_what_the_user_sets_replaces_the_style() -> None:
     assert delivery(style="depressed", plain_delivery=True) == PLAIN
-    assert delivery(style="depressed", rate=1.2) == Delivery(1.0, -2.0)
-    assert delivery(style="depressed", volume=0.5) == Delivery(0.9, 0.0)
+    sad = DELIVERIES["depressed"]
+    assert sad == Delivery(0.9, -2.0, -1.5, 0.7)
+    assert delivery(style="depressed", rate=1.2) == replace(sad, rate=1.0)
+    assert delivery(style="depressed", volume=0.5) == replace(sad, level_db=0.0)
+    assert delivery(style="depressed", voice_pitch=2.0) == replace(sad, pitch=0.0)
+    assert delivery(style="depressed", voice_range=0.5) == replace(sad, range=1.0)
+    marked = '<speak><prosody pitch="+2st" duration="2s">We were away.</prosody></speak>'
+    assert delivery(marked, style="depressed") == Delivery(1.0, -2.0, 0.0, 0.7)
+    assert delivery("We were *not* away.", style="depressed") == sad  # emphasis is beside the style
 
 
 def test_the_sound_is_slower_and_softer_and_the_motion_is_not_softer(voices: VoicePool) -> None:
@@ -64,6 +74,8 @@ def test_a_style_of_ones_own_speaks_as_those_that_it_is_mixed_of(world: World) -
     half = mix_styles(palette, StyleMix("grid_s1", {"depressed": 0.5}))
     assert half.delivery.rate == pytest.approx(0.9**0.5)
     assert half.delivery.level_db == pytest.approx(-1.0)
+    assert half.delivery.pitch == pytest.approx(-0.75)
+    assert half.delivery.range == pytest.approx(0.7**0.5)
     assert mix_styles(palette, StyleMix("grid_s1", tempo=2.0)).delivery == PLAIN
     seconds = []
     for name in ("sombre", "depressed", "neutral"):

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lexicon.sequence import PhoneSequence
+from tts2face.articulation import CLEAR, NATURAL
 from tts2face.face.landmarks import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.face.lip_constraints import MIDDLE_PAIR, LipConstraints, build_lip_constraints
 from tts2face.lips.articulation_tracks import articulation_tracks, pause_closure, seconds_from_closure
@@ -24,7 +25,6 @@ from tts2face.models.landmarks import (
     inner_lip_gaps,
 )
 from tts2face.numeric.arrays import FloatArray, ordered_product, smoothstep
-from tts2face.request import CLEAR, NATURAL
 from tts2face.types import Trajectory
 
 DEFAULT_ARTICULATION = CLEAR  # of a mesh: rounding is not seen otherwise (docs/decisions/102-articulation.md)

@@ -121,10 +121,24 @@ class FeatureChange:
 
 @dataclass(frozen=True, slots=True)
 class Delivery:
-    """How a voice speaks under a style: factor of the speaking rate, and gain of the sound in dB."""
+    """How a voice speaks under a style.
+
+    Parameters
+    ----------
+    rate
+        Factor of the speaking rate.
+    level_db
+        Gain of the sound.
+    pitch
+        Semitones added to F0.
+    range
+        Factor of the distances of F0 from its median.
+    """
 
     rate: float = 1.0
     level_db: float = 0.0
+    pitch: float = 0.0
+    range: float = 1.0
 
     @property
     def volume(self) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from lexicon.errors import InputError
 from lexicon.values.fields import check_fields
 from tts2face.models.palette import EXPRESSIONS, FEATURES, Delivery, Derivation, FeatureChange, Palette
-from tts2face.models.palette_file import LEVEL_DB, RATE_FACTORS
+from tts2face.models.palette_file import LEVEL_DB, PITCH, RANGE_FACTORS, RATE_FACTORS
 
 # characters
 MAX_NAME = 40
@@ -90,11 +90,15 @@ def mix_styles(palette: Palette, mix: StyleMix) -> Derivation:
 
 
 def _mixed_delivery(palette: Palette, mix: StyleMix) -> Delivery:
-    rate, level = 1.0, 0.0
+    rate = span = 1.0
+    level = pitch = 0.0
     for name, share in mix.shares.items():
         delivery = palette.derivations[name].delivery
-        rate, level = rate * delivery.rate**share, level + share * delivery.level_db
-    return Delivery(float(np.clip(rate, *RATE_FACTORS)), float(np.clip(level, -LEVEL_DB, LEVEL_DB)))
+        rate, span = rate * delivery.rate**share, span * delivery.range**share
+        level, pitch = level + share * delivery.level_db, pitch + share * delivery.pitch
+    limits = RATE_FACTORS, (-LEVEL_DB, LEVEL_DB), (-PITCH, PITCH), RANGE_FACTORS
+    mixed = np.array([rate, level, pitch, span])
+    return Delivery(*np.clip(mixed, *np.transpose(limits)).tolist())
 
 
 def _mixed_change(palette: Palette, mix: StyleMix, feature: str) -> FeatureChange:

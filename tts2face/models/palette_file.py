@@ -41,7 +41,9 @@ MAX_GAIN = 100.0
 # A tempo of 0.05 stretches 30 frames to 20 s; one of 20 gives 600 frames/s, the most that a clip can use.
 SLOWEST, FASTEST = 0.05, 20.0
 
-RATE_FACTORS, LEVEL_DB = (0.5, 2.0), 12.0  # of the voice; level of either sign
+# of the voice; level and pitch of either sign
+RATE_FACTORS, RANGE_FACTORS = (0.5, 2.0), (0.0, 2.0)
+LEVEL_DB = PITCH = 12.0
 
 _CHANGE = record(
     {},
@@ -51,7 +53,15 @@ _CHANGE = record(
         "tempo": number(SLOWEST, FASTEST),
     },
 )
-_DELIVERY = record({}, {"rate": number(*RATE_FACTORS), "level_db": number(-LEVEL_DB, LEVEL_DB)})
+_DELIVERY = record(
+    {},
+    {
+        "rate": number(*RATE_FACTORS),
+        "level_db": number(-LEVEL_DB, LEVEL_DB),
+        "pitch": number(-PITCH, PITCH),
+        "range": number(*RANGE_FACTORS),
+    },
+)
 METADATA: Mapping[str, Check] = {
     "metadata": free,
     "fps": number(1.0, 1000.0),

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
+from tts2face.articulation import NATURAL
 from tts2face.face.appearance_regression import AppearanceRegression, fit_appearance_regression
 from tts2face.face.gestures import SPEECH_GAINS, GestureFace, gesture_face
 from tts2face.face.landmarks import moved_landmarks
@@ -38,7 +39,6 @@ from tts2face.picture.frame_renderer import FrameRenderer
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import marked, mesh_renderer
 from tts2face.processes.shared import shared
-from tts2face.request import NATURAL
 from tts2face.types import Trajectory, YieldTurn, keep_on, resting_head
 
 if TYPE_CHECKING:

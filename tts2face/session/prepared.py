@@ -1,6 +1,6 @@
 """A request that is parsed and checked once: its text and marks, its timelines and its options of synthesis."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache
@@ -14,12 +14,15 @@ from lexicon.errors import InputError
 from lexicon.foreign_words import make_readable
 from lexicon.ipa import IpaPhone
 from lexicon.languages import language_code
-from lexicon.marked_text import RATE_LIMITS, VOLUME_LIMITS, MarkedText
+from lexicon.marked_text import PITCH_LIMITS, RANGE_LIMITS, RATE_LIMITS, VOLUME_LIMITS, MarkedText
 from lexicon.scripts import check_readable
 from lexicon.sentence_length import check_silence
 from lexicon.sentences import Sentence, split_sentences
 from lexicon.sequence import PhoneSequence
+from lexicon.ssml_leniency import nearest_style
+from lexicon.ssml_prosody import semitones_factor
 from lexicon.text_marks import parse_marks
+from lexicon.values.checks import check_limits
 from lexicon.values.files import is_file
 from tts2face.gestures.elements import ExpressionSpan, Gains, ListeningSpan
 from tts2face.gestures.listening import CUE_RATE, cue_times, responses
@@ -31,6 +34,7 @@ from tts2face.picture.options import Picture
 from tts2face.request import CAMERA, Listening, Recorded, Request, Source, Spoken, option_fields
 from tts2face.session.corrections import SentenceEdges, StaleEdgesError
 from tts2face.session.joining import Excerpt
+from tts2face.sound.voice_pool import usual_pitch_hz
 from tts2face.sound.voice_urls import is_voice_url
 from tts2face.storage.output_paths import AnyPath
 from tts2face.types import exact_rate
@@ -150,7 +154,7 @@ def prepare(request: Request) -> PreparedRequest:
     for path in recordings(source).values():
         if not is_file(path):
             raise InputError(f"there is no recording {path}; check the path")
-    written = parse_marks(source.text, request.language)
+    written = read_marks(request)
     text, notes = make_readable(written, request.language)
     prepared = PreparedRequest(
         request,
@@ -159,7 +163,7 @@ def prepare(request: Request) -> PreparedRequest:
         synthesis_options(request),
         read_dictionary(request.dictionary).entries if request.dictionary else {},
         listening=listening_timeline(request),
-        notes=(*notes, *_notes_on(source)),
+        notes=(*written.notes, *notes, *_notes_on(source)),
     )
     if not source.text and not isinstance(source, Spoken):
         return prepared
@@ -168,6 +172,18 @@ def prepare(request: Request) -> PreparedRequest:
     if next(prepared.sentences(), None) is None:
         raise InputError(f"there is nothing to say in {source.text[:40]!r}; give at least one word")
     return prepared
+
+
+def read_marks(request: Request) -> MarkedText:
+    """Text of a request with its marks; errors as `parse_marks`."""
+    source, spoken = request.source, request.spoken
+
+    def voice_hz(name: str | None, language: str) -> float:
+        of_request = spoken or Spoken("")
+        return usual_pitch_hz(name or of_request.voice, language) * semitones_factor(of_request.voice_pitch)
+
+    language, has_emphasis = request.language, spoken is not None
+    return parse_marks(source.text, language, request.markup, has_emphasis=has_emphasis, voice_hz=voice_hz)
 
 
 def recordings(source: Source) -> dict[str, Path]:
@@ -257,6 +273,16 @@ def marked_styles(text: MarkedText) -> tuple[str, ...]:
     return tuple(dict.fromkeys(style for styles in runs for style in innermost_styles(styles).values()))
 
 
+def with_styles_of(prepared: PreparedRequest, names: Sequence[str]) -> PreparedRequest:
+    """A request whose marks name styles of a palette, where they name those of a speech service that are none of it."""
+    text = prepared.text
+    runs = [
+        replace(run, styles=tuple(name if name in names else nearest_style(name) or name for name in run.styles))
+        for run in text.runs
+    ]
+    return replace(prepared, text=replace(text, runs=tuple(runs)))
+
+
 def check_marks(text: MarkedText, request: Request) -> None:
     """Reject marks that are invalid or do not go with the request, in time linear in the length of the text."""
     if isinstance(request.source, Recorded) and text.has_voice_changes:
@@ -273,6 +299,7 @@ def check_marks(text: MarkedText, request: Request) -> None:
     for what, marked, requested, (low, high) in (
         ("speed", {run.rate for run in text.runs}, spoken.rate, RATE_LIMITS),
         ("loudness", {run.volume for run in text.runs}, spoken.volume, VOLUME_LIMITS),
+        ("range of pitch", {run.tone.range for run in text.runs}, spoken.voice_range, RANGE_LIMITS),
     ):
         for factor in marked:
             if not low <= factor * requested <= high:
@@ -280,6 +307,9 @@ def check_marks(text: MarkedText, request: Request) -> None:
                     f"a {what} of {factor:g} in the text times {requested:g} of the request lies outside "
                     f"{low:g} to {high:g}; change one of them"
                 )
+    for pitch in {run.tone.pitch for run in text.runs}:
+        what = f"the pitch of the text ({pitch:.3g} semitones) and of the request together"
+        check_limits(what, round(pitch + spoken.voice_pitch, 6), PITCH_LIMITS)
 
 
 def _primary(language: str) -> str:

@@ -163,7 +163,7 @@ class Session:
 
         The last utterances are kept, so that a following `stream` of the same text does not speak it again.
         """
-        prepared = self._prepared(text, options)
+        prepared = self._models.with_own_styles(self._prepared(text, options))
         return measure_speech(prepared, self._models.for_request(prepared, keeps_utterances=True).speech)
 
     def stream_to_length(self, text: str | Request | PreparedRequest, n_frames: int, **options: Any) -> Iterator[Clip]:
@@ -182,7 +182,7 @@ class Session:
 
         Arguments and errors as `clip`; a recording is refused.
         """
-        prepared = self._prepared(text, options)
+        prepared = self._models.with_own_styles(self._prepared(text, options))
         return timed_speech(prepared, self._models.for_request(prepared).speech)
 
     def live(self, **options: Any) -> LiveSpeech:

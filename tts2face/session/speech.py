@@ -1,11 +1,9 @@
 """Synthesis of sentences with marks: sound with pauses, rate and level under styles, and the times of the marks."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from itertools import pairwise
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -17,10 +15,9 @@ from lexicon.sentence_length import n_letters
 from lexicon.sentences import Phrase, Sentence, index_by_letters
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.gestures.elements import Nod, StyleSpan, span_weights
-from tts2face.gestures.timeline import Timeline, parse_style
-from tts2face.models.palette import FEATURES, PLAIN, Delivery
+from tts2face.gestures.timeline import Timeline
 from tts2face.numeric.arrays import FloatArray
-from tts2face.request import Request, Spoken
+from tts2face.request import Request
 from tts2face.session.joining import (
     END_S,
     JOIN_LEAD_S,
@@ -33,60 +30,28 @@ from tts2face.session.joining import (
     resampled_speech,
     silent_speech,
 )
+from tts2face.session.phrase_delivery import (
+    NO_DELIVERIES,
+    Deliveries,
+    delivery_of,
+    phrase_content,
+    prosody_of,
+    speak_phrase,
+    text_of,
+)
 from tts2face.session.prepared import innermost_styles
-from tts2face.sound.delivery import sound_with, speak_with
+from tts2face.sound.delivery import sound_with
 from tts2face.sound.level import level_speech
-from tts2face.sound.prosody import Prosody
-from tts2face.sound.voice import ExpectingVoice, SpeechInput, SpokenWord, Voice, apply_volume
+from tts2face.sound.voice import ExpectingVoice, Voice, apply_volume
 from tts2face.sound.voice_pool import has_voice, speaks
 from tts2face.types import Speech, Waveform, YieldTurn, concatenate_speech, keep_on
 
-Deliveries = Mapping[str, Delivery]  # of a palette's styles, by name
-NO_DELIVERIES: Deliveries = MappingProxyType({})
 MIN_UTTERANCE_GAP_S = 0.02  # between utterances of a sentence; less would cut into speech (edges are exact to 16 ms)
 SPEED_CHANGE_PAUSE_S = 0.06  # between utterances that differ in speed only
 IDLE_PART_S = 10.0  # length of the parts of idle animation, similar to a long sentence
 IDLE_RATE = 48_000  # Hz, sample rate of idle animation
 LOUDNESS_RAMP_S = 0.03  # transition between two loudness levels
 Voices = Callable[[str | None, str], Voice]  # a voice by name (None: the best one) and language
-
-
-def text_of(request: Request) -> Spoken:
-    """The text of a request, of which there is one, with its options."""
-    assert request.spoken is not None
-    return request.spoken
-
-
-def delivery_of(part: Phrase, runs: Sequence[StyleRun], request: Request, deliveries: Deliveries) -> Delivery:
-    """Delivery of a phrase: that of the style of most of its letters, if the style is one of the whole face.
-
-    A rate or volume that the request or a mark sets replaces that of the style.
-    """
-    spoken = text_of(request)
-    if spoken.plain_delivery:
-        return PLAIN
-    found = deliveries.get(_whole_style(request.style, _longest_run(part, runs).styles), PLAIN)
-    has_volume = spoken.volume != 1.0 or any(run.volume != 1.0 for run in runs)
-    return Delivery(
-        1.0 if spoken.rate != 1.0 or part.rate != 1.0 else found.rate, 0.0 if has_volume else found.level_db
-    )
-
-
-def _longest_run(part: Phrase, runs: Sequence[StyleRun]) -> StyleRun:
-    """The run with most letters of a phrase; the first of equal ones."""
-    ends = [*(run.start for run in runs[1:]), part.last]
-    lengths = [min(end, part.last) - max(run.start, part.first) for run, end in zip(runs, ends, strict=True)]
-    return runs[lengths.index(max(lengths))]
-
-
-@lru_cache(maxsize=1000)
-def _whole_style(base: str | None, nested: tuple[str, ...]) -> str:
-    """Name of the style that all features have; empty if they differ or have none."""
-    chosen: dict[str, str] = {}
-    for written in ([base] if base is not None else []) + list(nested):
-        chosen |= parse_style(written)
-    names = {chosen.get(feature, "") for feature in FEATURES}
-    return names.pop() if len(names) == 1 else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,10 +135,9 @@ def speak_sentence(
     for part in sentence.utterances:
         speaker = speaker_of(part, voice, request, voices)
         delivery = delivery_of(part, sentence.runs, request, deliveries)
-        rate = text.rate * part.rate * delivery.rate
+        prosody = prosody_of(part, request, delivery)
         try:
-            language = part.language or request.language
-            speech = speak_with(speaker, phrase_content(part), Prosody(rate), request.known_seed, language=language)
+            speech = speak_phrase(speaker, part, request, prosody)
         except SilentTextError:  # signs, such as pictures, for which a voice has no words
             # a sentence of signs alone is an error, beside words they are left out
             if part is sentence.utterances[-1] and not spoken:
@@ -183,7 +147,7 @@ def speak_sentence(
         spoken.append(resampled_speech(speech, voice.sample_rate))
         volumes.append(text.volume * delivery.volume)
     spoken[0] = _led(spoken[0], request)
-    spoken[-1] = _ended(spoken[-1], sentence, rate)
+    spoken[-1] = _ended(spoken[-1], sentence, prosody.rate)
     sentence = replace(sentence, utterances=tuple(parts))
     word_times = [
         WordTimes(
@@ -211,8 +175,8 @@ def expect_sentence(voice: Voice, sentence: Sentence, request: Request, deliveri
     if isinstance(voice, ExpectingVoice):
         for part in sentence.utterances:
             if part.voice is None and part.language is None:
-                rate = text_of(request).rate * part.rate * delivery_of(part, sentence.runs, request, deliveries).rate
-                voice.expect(phrase_content(part), rate)
+                delivery = delivery_of(part, sentence.runs, request, deliveries)
+                voice.expect(phrase_content(part), prosody_of(part, request, delivery).rate)
 
 
 def sentence_sound(
@@ -226,15 +190,14 @@ def sentence_sound(
     """Sound of `speak_sentence`, byte for byte, without aligning the phones of a sentence that needs no edges."""
     part, text = sentence.utterances[0], text_of(request)
     # joins and gains need the edges of phones
-    if len(sentence.utterances) > 1 or any(run.volume != 1.0 for run in sentence.runs):
+    if len(sentence.utterances) > 1 or part.seconds is not None or any(run.loudness != 1.0 for run in sentence.runs):
         return speak_sentence(voice, sentence, request, voices, deliveries=deliveries).sound
     speaker = speaker_of(part, voice, request, voices)
     delivery = delivery_of(part, sentence.runs, request, deliveries)
-    rate = text.rate * part.rate * delivery.rate
-    language = part.language or request.language
-    sound = sound_with(speaker, phrase_content(part), Prosody(rate), request.known_seed, language=language)
+    prosody, language = prosody_of(part, request, delivery), part.language or request.language
+    sound = sound_with(speaker, phrase_content(part), prosody, request.known_seed, language=language)
     whole = _led(resampled_speech(Speech.without_phones(sound), voice.sample_rate), request)
-    whole = _ended(whole, sentence, rate)
+    whole = _ended(whole, sentence, prosody.rate)
     levelled = level_speech([whole], [text.volume * delivery.volume * np.ones(1)])
     return _join_sentence(levelled, sentence, voice.sample_rate)[0].waveform
 
@@ -249,11 +212,6 @@ def _ended(speech: Speech, sentence: Sentence, rate: float) -> Speech:
     """Speech with the silence behind a sentence."""
     tail = END_S if sentence.pause_s is None else sentence.pause_s / rate - JOIN_LEAD_S
     return end_after(speech, max(tail, LEAST_TAIL_S))
-
-
-def phrase_content(part: Phrase) -> SpeechInput:
-    """Words of a phrase with their phones, or its text."""
-    return [SpokenWord(word.text, word.segments, word.after, word.tone) for word in part.words] or part.text
 
 
 def speaker_of(part: Phrase, voice: Voice, request: Request, voices: Voices | None) -> Voice:
@@ -368,7 +326,7 @@ def _pause_after(utterance: Phrase) -> float:
 def _gain(sound: Waveform, runs: Sequence[StyleRun], part: Phrase, times: WordTimes) -> FloatArray:
     """(n,) or (1,) gain of an utterance's samples, from the loudness of its runs."""
     volumes = [
-        (run.volume, max(run.start, part.first), end)
+        (run.loudness, max(run.start, part.first), end)
         for run, end in zip(runs, [*(run.start for run in runs[1:]), part.last], strict=True)
         if run.start < part.last and end > part.first
     ]

@@ -19,10 +19,9 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.gestures.timeline import Timeline
 from tts2face.request import CONVERSATION, TURN_S, Idle, Listening, Recorded, Request, Spoken
 from tts2face.session.joining import JOIN_LEAD_S, Excerpt, excerpt_of_speech, shift_start, silent_speech, word_bounds
+from tts2face.session.phrase_delivery import NO_DELIVERIES, Deliveries, text_of
 from tts2face.session.prepared import IDLE_STEPS, PreparedRequest
 from tts2face.session.speech import (
-    NO_DELIVERIES,
-    Deliveries,
     MarkTime,
     Shortened,
     SpokenPart,
@@ -33,7 +32,6 @@ from tts2face.session.speech import (
     sentence_sound,
     silent_sentences,
     speak_sentence,
-    text_of,
     without_long_silence,
 )
 from tts2face.session.whole_frames import FramedPart, WholeFrames

@@ -91,7 +91,8 @@ def _packaged_voice(name: str, package: str) -> Path:
 
 SHIPPED_VOICES: Mapping[str, VoiceInfo] = MappingProxyType({
     "heart": VoiceInfo(
-        "neural, American English", _hibari, "hibari", "hibari", "female", "Apache-2.0", ENGLISH_CODES, "en-us"
+        "neural, American English", _hibari, "hibari", "hibari", "female", "Apache-2.0", ENGLISH_CODES, "en-us",
+        pitch_hz=198.8,
     ),
     "kore": _added("kore", "female", "en-us"),
     "fenrir": _added("fenrir", "male", "en-us"),
@@ -99,7 +100,7 @@ SHIPPED_VOICES: Mapping[str, VoiceInfo] = MappingProxyType({
     "fable": _added("fable", "male", "en-gb"),
     "joe": VoiceInfo(
         "neural, American English (extra [voices])", _joe, "piper", JOE_PACKAGE, "male", "CC0, finetuned (NOTICE)",
-        ENGLISH_CODES, "en-us",
+        ENGLISH_CODES, "en-us", pitch_hz=94.0,
     ),
     "mei": VoiceInfo(
         "hidden Markov models, Japanese (extra [japanese])", _mei, "open-jtalk", "pyopenjtalk", "female",
@@ -107,9 +108,9 @@ SHIPPED_VOICES: Mapping[str, VoiceInfo] = MappingProxyType({
     ),
     "espeak": VoiceInfo(
         "formant synthesis, every language of espeak-ng", _espeak, "espeak-ng", "espeakng_loader", "male",
-        "GPL-3.0-or-later",
+        "GPL-3.0-or-later", pitch_hz=100.9,
     ),
     "espeak-female": VoiceInfo(
-        "the same", _espeak_female, "espeak-ng", "espeakng_loader", "female", "GPL-3.0-or-later"
+        "the same", _espeak_female, "espeak-ng", "espeakng_loader", "female", "GPL-3.0-or-later", pitch_hz=194.1,
     ),
 })  # fmt: skip

@@ -140,6 +140,8 @@ class VoiceInfo:
         Code of the language whose accent it has; empty: that of each.
     has_files
         Whether the files that it needs beside its package are there; None: it needs none.
+    pitch_hz
+        Median of its F0 in read sentences, by which pitches in Hz become semitones; None: not known.
     """
 
     summary: str
@@ -151,6 +153,7 @@ class VoiceInfo:
     languages: tuple[str, ...] = ()
     accent: str = ""
     has_files: Callable[[], bool] | None = None
+    pitch_hz: float | None = None
 
 
 def apply_volume(samples: NDArray[np.floating], volume: float = 1.0) -> NDArray[np.float32]:

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
 # voices of languages whose usual one is not that of every installation, the preferred one first
 WHERE_INSTALLED = MappingProxyType({"en-gb": ("emma", "fable"), "ja": ("mei",)})
+TYPICAL_HZ = MappingProxyType({"female": 200.0, "male": 115.0, "-": 165.0})  # F0 of people who read aloud
 MAX_VOICES = 2  # unused voices in memory; about 100 MB each
 MAX_UTTERANCES = 8  # of at most some ten seconds; one second of sound takes 100 kB
 
@@ -96,6 +97,15 @@ def default_voice(language: str) -> str:
     """Name of the voice that speaks a language code where none is chosen."""
     usual = "heart" if language in ENGLISH_CODES[:2] else "espeak"
     return next((name for name in WHERE_INSTALLED.get(language, ()) if is_installed(name)), usual)
+
+
+def usual_pitch_hz(name: str | None, language: str) -> float:
+    """Median F0 of a voice, None for the default one of a language; of a voice that has none, that of its sex."""
+    chosen = name or default_voice(language)
+    if not has_voice(chosen):
+        return TYPICAL_HZ["-"]
+    info = find_voice(chosen)
+    return info.pitch_hz or TYPICAL_HZ.get(info.sex, TYPICAL_HZ["-"])
 
 
 def is_installed(name: str) -> bool:

@@ -220,7 +220,7 @@ def test_the_paper_s_six_moods_are_derived() -> None:
     assert list(made)[:6] == ["neutral", "depressed", "delighted", "annoyed", "exaggerated", "exasperated"]
     assert all(derived.source == "someone" and derived.summary for derived in made.values())
     assert made["depressed"].changes["expression"].offset == {"sad": 0.9}
-    assert made["depressed"].delivery == Delivery(0.9, -2.0)
+    assert made["depressed"].delivery == Delivery(0.9, -2.0, -1.5, 0.7)
     assert made["neutral"].delivery == PLAIN
 
 
@@ -237,7 +237,7 @@ def test_the_shipped_palette_has_the_derived_styles_of_the_table() -> None:
     [
         ("odd\tears\t1\t1\t\t", "odd changes 'ears', which is not a feature"),
         ("odd\thead\tfast\t1\t\t", "head of odd cannot be read"),
-        ("odd\tvoice\t\t\tpitch=1\t", "the voice of odd cannot be read"),
+        ("odd\tvoice\t\t\ttone=1\t", "the voice of odd cannot be read"),
         ("odd\thead\t1\t1\tsmile=1\t", "head of odd cannot be read .*no channel 'smile'"),
     ],
 )

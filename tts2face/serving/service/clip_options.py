@@ -37,7 +37,7 @@ MODEL_FIELDS, PICTURE_FIELDS = (frozenset(field.name for field in fields(record)
 DESCRIPTIONS: Mapping[str, str] = MappingProxyType({
     "language": "Language of the text.",
     "voice": "A voice of GET /v1/voices, or auto: the one that fits the face.",
-    "plain_delivery": "The style leaves rate and loudness of the voice unchanged.",
+    "plain_delivery": "The style leaves rate, pitch and loudness of the voice unchanged.",
     "dictionary": "A dictionary of GET /v1/dictionaries.",
     "talker": "A talker of GET /v1/talkers.",
     "face": "A face of GET /v1/faces, or self.",
@@ -57,7 +57,8 @@ EXAMPLES: Mapping[str, Any] = MappingProxyType({
     "palette": "starter", "size": "512x512", "background": "#204060", "quality": "draft", "expression": "happy=0.6",
     "person": "woman 70",
     "idle": 2.5, "listen": 2.5, "gaze": "camera", "context": 3, "exemplars": 10, "audio_map": "network",
-    "language": "en-us", "rate": 1.0, "lead": 0.1, "plain_delivery": False, "volume": 1.0, "seed": 0, "fps": 30.0,
+    "language": "en-us", "markup": "auto", "rate": 1.0, "voice_pitch": 0.0, "voice_range": 1.0, "lead": 0.1,
+    "plain_delivery": False, "volume": 1.0, "seed": 0, "fps": 30.0,
     "pitch": False, "camera": "front", "supersampling": 2, "visible_mark": False, "dictionary": None,
 })  # fmt: skip
 # Options that a door does not take, with the reason.

@@ -1,0 +1,127 @@
+"""Emphasis as people and language models type it: words in capitals, and words between asterisks.
+
+``It is NOT here`` and ``It is *not* here`` stress *not*. In a line without small letters capitals mean nothing; words
+that are read letter by letter, acronyms and labels of speakers keep them. What somebody does (``*sighs*``) may stand
+between asterisks, too, and is no emphasis.
+"""
+
+import functools
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from lexicon.capitals import is_word_in_capitals
+from lexicon.text_language import common_words
+from lexicon.written_forms import read_table
+
+STRONG, MODERATE = 1.0, 0.6  # `lexicon.tones.Tone.emphasis`
+MAX_STRONG_WORDS = 3  # of one span: a whole sentence said so has no accent
+MIN_FOREIGN_LETTERS = 7  # of a word in capitals in a language whose words are not known: hardly an abbreviation
+_STARRED = re.compile(r"(?<![\w*])(\*{1,3})(?![\s*(\[])([^*]{1,200})(?<!\s)\1(?![\w*])")
+# A word in capitals that is no part of a code, an address or an abbreviation.
+_CAPITALS = re.compile(r"(?<![\w.&/@#+'’-])[^\W\d_a-z]{2,}(?:['’][^\W\d_a-z]{1,2})?(?![\w&/@#+'’-]|\.\w)")
+_SMALL = re.compile(r"[^\W\d_A-Z]{2}")
+_WORD = re.compile(r"[^\W\d_]+")
+_SENTENCE_START = re.compile(r"(?:\A|[.!?:…]['\"”’)]{0,3}\s)\s*\Z")
+_BEFORE = 24  # characters before a word that hold the word before it
+
+
+@dataclass(frozen=True, slots=True)
+class EmphasisedWords:
+    """Words of a written text that are emphasised.
+
+    Parameters
+    ----------
+    start, end
+        Half-open range of characters, with asterisks around the words.
+    text
+        The words as ordinary writing has them.
+    emphasis
+        As `lexicon.tones.Tone.emphasis`.
+    """
+
+    start: int
+    end: int
+    text: str
+    emphasis: float
+
+
+def find_emphases(text: str, language: str) -> Iterator[EmphasisedWords]:
+    """Emphasised words of a text in order, none within another; in linear time."""
+    start = 0
+    for line in text.splitlines(keepends=True):
+        has_small_letters, at = _SMALL.search(line) is not None, 0
+        for match in _STARRED.finditer(line):
+            if has_small_letters:
+                yield from _in_capitals(line, start, (at, match.start()), language)
+            at = match.end()
+            if any(map(str.isalnum, match[2])) and not is_direction(match[2]):
+                yield _emphasised(match[2], start + match.start(), start + at)
+        if has_small_letters:
+            yield from _in_capitals(line, start, (at, len(line)), language)
+        start += len(line)
+
+
+def is_direction(words: str) -> bool:
+    """Whether words between asterisks say what somebody does, or how: a mood, a manner, a sound, or a verb (sighs)."""
+    found = _WORD.findall(words.casefold())
+    return bool(found) and (found[0] in _verbs() or all(word in _direction_words() for word in found))
+
+
+@functools.cache
+def _verbs() -> frozenset[str]:
+    """Verbs of directions, as they begin one: sighs, sighing."""
+    return frozenset(form for verb in read_table("directions.tsv")["verb"][0].split() for form in _forms(verb))
+
+
+def _forms(verb: str) -> tuple[str, str, str]:
+    third = verb + "es" if verb.endswith(("sh", "ch", "ss")) else verb + "s"
+    third = verb[:-1] + "ies" if verb[-1] == "y" and verb[-2] not in "aeiou" else third
+    stem = verb.removesuffix("e")
+    return third, stem + "ing", stem + stem[-1] + "ing"
+
+
+@functools.cache
+def _direction_words() -> frozenset[str]:
+    table = read_table("directions.tsv")
+    return _verbs() | frozenset(word for kind in ("noun", "mood", "manner") for word in table[kind][0].split())
+
+
+def _in_capitals(line: str, start: int, span: tuple[int, int], language: str) -> Iterator[EmphasisedWords]:
+    """Words in capitals in a part of a line that are emphasised; successive ones are one."""
+    waiting: list[re.Match[str]] = []
+    for match in _CAPITALS.finditer(line, *span):
+        if not _is_emphasised(line, match, language):
+            continue
+        if waiting and line[waiting[-1].end() : match.start()].strip(" "):
+            yield _in_ordinary_writing(line, start, waiting, language)
+            waiting = []
+        waiting.append(match)
+    if waiting:
+        yield _in_ordinary_writing(line, start, waiting, language)
+
+
+def _is_emphasised(line: str, match: "re.Match[str]", language: str) -> bool:
+    word, start = match.group(), match.start()
+    before = line[max(start - _BEFORE, 0) : start]
+    if not word.isupper() or (line[match.end() : match.end() + 1] == ":" and not before.strip()):
+        return False  # the second: WARNING: or ANNA: at the beginning of a line names what follows
+    if language.partition("-")[0] == "en":
+        words = _WORD.findall(before)
+        return is_word_in_capitals(word, words[-1] if words else "")
+    return word.casefold() in common_words(language) or len(word) >= MIN_FOREIGN_LETTERS
+
+
+def _in_ordinary_writing(line: str, start: int, words: "list[re.Match[str]]", language: str) -> EmphasisedWords:
+    """Successive words in capitals; in English with small letters, by which they are read as words."""
+    first, last = words[0].start(), words[-1].end()
+    written = line[first:last]
+    if language.partition("-")[0] == "en":
+        is_first = _SENTENCE_START.search(line[max(first - _BEFORE, 0) : first]) is not None
+        written = (written[0] if is_first else written[0].lower()) + written[1:].lower().replace("i'm", "I'm")
+    return _emphasised(written, start + first, start + last)
+
+
+def _emphasised(words: str, start: int, end: int) -> EmphasisedWords:
+    is_short = len(words.split()) <= MAX_STRONG_WORDS
+    return EmphasisedWords(start, end, words, STRONG if is_short else MODERATE)

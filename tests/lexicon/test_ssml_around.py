@@ -1,0 +1,152 @@
+"""SSML of other services: what is spoken around, and the notes on it."""
+
+import time
+
+import pytest
+
+from lexicon.errors import InputError
+from lexicon.marked_text import MAX_NOTES, MarkedText, NameMark, PauseMark
+from lexicon.ssml_leniency import nearest_style, with_plain_entities
+from lexicon.text_marks import parse_marks
+from tts2face.models.palette_file import load_palette
+
+
+def ssml(inside: str, language: str = "en-us") -> MarkedText:
+    return parse_marks(f"<speak>{inside}</speak>", language)
+
+
+@pytest.mark.parametrize(
+    ("inside", "text", "note"),
+    [
+        ('<lexicon uri="http://example.org/x.pls"/>a', "a", "<lexicon> is not loaded; give pronunciations"),
+        ('<meta name="x" content="y"/>a', "a", "<meta> is not read"),
+        ("<metadata><rdf:RDF>no <b>no</b></rdf:RDF></metadata>a", "a", "<metadata> is not read"),
+        (
+            "<audio src='x.wav'>bell<desc>a bell</desc></audio>",
+            "bell",
+            "the sound of <audio> is not played; the text in it",
+        ),
+        ("<lookup ref='x'>a</lookup>", "a", "<lookup> is not followed; its text is spoken"),
+        ("<b>a</b>", "a", "<b> is not supported; its text is spoken"),
+        ('<amazon:effect name="whispered">a</amazon:effect>', "a", "<amazon:effect> is not supported"),
+        ('<amazon:domain name="news">a <prosody rate="80%">b</prosody></amazon:domain>', "a b", "<amazon:domain> is"),
+        ("<mstts:ttsembedding speakerProfileId='1'>a</mstts:ttsembedding>", "a", "<mstts:ttsembedding> is not"),
+        ('<mstts:backgroundaudio src="x"/>a', "a", "the sound of <mstts:backgroundaudio> is not played"),
+        ('<mstts:audioduration value="20s"/>a', "a", "<mstts:audioduration> is not followed; <prosody duration>"),
+        ('<mstts:silence type="Sentenceboundary" value="2s"/>a', "a", "of the type 'Sentenceboundary' is not followed"),
+        ("<par><media><speak2>a</speak2></media></par>", "a", "<par> is not supported"),
+        ('<break size="1"/>a', "a", "the attribute size of <break> is not followed"),
+        ('<express-as style="neutral" styledegree="2">a</express-as>', "a", "attribute styledegree of <express-as> is"),
+        ('<prosody amazon:max-duration="2s">a</prosody>', "a", "amazon:max-duration of <prosody> is not followed"),
+        ('<phoneme alphabet="x-sampa" ph="k">a</phoneme>', "a", "alphabet 'x-sampa' of <phoneme> is not read in en-us"),
+        ('<say-as interpret-as="interjection">wow</say-as>', "wow", "the kind 'interjection' of <say-as> is not read"),
+        (
+            '<voice name="en-US-JennyNeural">a</voice>',
+            "a",
+            "there is no voice 'en-US-JennyNeural', another one speaks; ",
+        ),
+        ('<voice name="/etc/x.onnx">a</voice>', "a", "there is no voice '/etc/x.onnx'"),
+        ('<voice gender="robot">a</voice>', "a", "there is no gender 'robot' of voices"),
+        ('<voice age="9">a</voice>', "a", "the attribute age of <voice> is not followed"),
+        ("<?php a?>b", "b", r"the instruction <?php?> is not followed"),
+    ],
+)
+def test_what_is_not_followed_is_spoken_around_with_a_note(inside: str, text: str, note: str) -> None:
+    found = ssml(f"\n{inside} end")
+    assert found.text == f"\n{text} end"
+    assert any(noted.startswith("SSML, line 2: ") and note in noted for noted in found.notes), found.notes
+
+
+@pytest.mark.parametrize(
+    "inside",
+    [
+        '<p xml:id="x"><s xml:id="y">a</s></p>',
+        '<lang xml:lang="en" onlangfailure="ignore">a</lang>',
+        "<w role='x'>a</w>",
+    ],
+)
+def test_attributes_without_an_effect_need_no_note(inside: str) -> None:
+    assert ssml(inside).notes == ()
+
+
+def test_words_stand_apart() -> None:
+    assert ssml("<w>one</w><token>two</token>, <w>three</w>'s").text == "one two, three's"
+
+
+def test_a_word_may_have_a_language() -> None:
+    found = ssml('say <w xml:lang="de">Tag</w> now')
+    assert [run.language for run in found.runs] == [None, "de", None]
+
+
+def test_the_language_of_a_voice_that_is_missing_is_taken_from_its_name() -> None:
+    found = ssml('Hi. <voice name="de-DE-KatjaNeural">Guten Tag.</voice>')
+    assert [run.language for run in found.runs] == [None, "de", None]
+    assert "another one speaks; its words are taken for de by its name; there are heart, " in found.notes[0]
+
+
+def test_silence_and_bookmarks_of_vendors() -> None:
+    found = ssml(
+        '<voice name="heart"><mstts:silence type="Leading-exact" value="200ms"/>'
+        '<mstts:silence type="tailing" value="1s"/>a <bookmark mark="x"/>b</voice> c'
+    )
+    assert found.marks == (PauseMark(0, 0.2), NameMark(2, "x"), PauseMark(3, 1.0))
+    assert found.notes == ()
+
+
+@pytest.mark.parametrize(
+    ("source", "text"),
+    [
+        ("Q&A", "Q&A"),
+        ("AT&T &amp; more", "AT&T & more"),
+        ("10&nbsp;km &ndash; far", "10\xa0km – far"),
+        ("&lol;", "&lol;"),
+        ("caf&eacute; &LT;b&GT;", "café <b>"),
+        ("<![CDATA[a &nbsp; & b]]>", "a &nbsp; & b"),
+        ("a<!-- &x; -->b", "ab"),
+        ("&#65;&#x42;", "AB"),
+        ('<sub alias="R&D &QUOT;x&QUOT;">rd</sub>', 'R&D "x"'),
+    ],
+)
+def test_entities_of_html_and_bare_ampersands_are_read(source: str, text: str) -> None:
+    assert ssml(source).text == text
+
+
+@pytest.mark.parametrize("piece", ["&", "<![CDATA[", "<!--", "&nbsp;", "&a", "<![CDATA[a]]>"])
+def test_a_megabyte_of_entities_is_read_at_once(piece: str) -> None:
+    begin = time.perf_counter()
+    with_plain_entities(piece * (1_000_000 // len(piece)))
+    assert time.perf_counter() - begin < 10
+
+
+def test_notes_are_few() -> None:
+    found = ssml("".join(f"<x{n}>a</x{n}><x1>b</x1>" for n in range(100)))
+    assert len(found.notes) == MAX_NOTES == len(set(found.notes))
+
+
+def test_styles_of_services_are_the_nearest_of_the_palette() -> None:
+    names = load_palette("starter").names
+    for name in ("cheerful", "Angry", "sad", "newscast-casual", "GoodNews", "disgruntled"):
+        assert nearest_style(name) in names
+    assert nearest_style("delighted") is nearest_style("mine") is None
+    found = ssml(
+        '<mstts:express-as style="cheerful">a</mstts:express-as> <amazon:emotion name="excited">b</amazon:emotion>'
+    )
+    assert [run.styles for run in found.runs] == [("cheerful",), (), ("excited",), ()]
+    assert found.notes[0].endswith("the style cheerful is delighted here, unless the palette has one of its own")
+
+
+def test_a_fragment_is_ssml_where_the_markup_says_so() -> None:
+    whole, fragment = ssml('Hi <break time="1s"/>there.'), parse_marks('Hi <break time="1s"/>there.', markup="ssml")
+    assert fragment == whole == parse_marks('<speak>Hi <break time="1s"/>there.</speak>', markup="ssml")
+    assert parse_marks("just words & more", markup="ssml").text == "just words & more"
+    assert parse_marks('Hi <break time="1s"/>.').text == 'Hi <break time="1s"/>.'
+
+
+@pytest.mark.parametrize("text", ["<speak>a</speak>", "[pause 9] NOT *so*", "[style:", "a"])
+def test_a_plain_text_has_no_marks(text: str) -> None:
+    assert parse_marks(text, markup="plain") == MarkedText(text)
+
+
+def test_an_unknown_markup_is_refused() -> None:
+    with pytest.raises(InputError, match="there is no markup 'html'; choose auto, plain, ssml"):
+        parse_marks("a", markup="html")

@@ -1,0 +1,94 @@
+"""Pitch, range and duration that a request or a mark asks of the voice."""
+
+import numpy as np
+import pytest
+
+from lexicon.errors import InputError
+from lexicon.sentences import Phrase, Sentence, split_sentences
+from tests.tones import LetterVoice
+from tts2face.models.palette import PLAIN, Delivery
+from tts2face.request import Request
+from tts2face.session.prepared import prepare, read_marks
+from tts2face.session.speech import prosody_of, sentence_sound, speak_sentence
+from tts2face.sound.prosody import Prosody
+from tts2face.sound.voice_pool import SHIPPED_VOICES, TYPICAL_HZ, usual_pitch_hz
+
+TEXT = "We were away a year ago."
+
+
+def sentence(request: Request) -> Sentence:
+    return next(iter(split_sentences(read_marks(request), request.language)))
+
+
+def phrase(text: str, **options: object) -> tuple[Phrase, Request]:
+    request = Request(text=text, **options)  # type: ignore[arg-type]
+    return sentence(request).utterances[0], request
+
+
+def test_the_request_and_the_style_make_the_prosody() -> None:
+    assert prosody_of(*phrase(TEXT), PLAIN) == Prosody()
+    part, request = phrase(TEXT, rate=1.2, voice_pitch=-2, voice_range=0.5)
+    assert prosody_of(part, request, PLAIN) == Prosody(1.2, -2.0, 0.5)
+    assert prosody_of(*phrase(TEXT), Delivery(0.9, -2.0, -1.5, 0.7)) == Prosody(0.9, -1.5, 0.7)
+
+
+@pytest.mark.parametrize(("seconds", "rate"), [(1.0, 0.7), (0.4, 1.75), (0.2, 2.0), (4.0, 0.5)])
+def test_a_duration_sets_the_rate_as_far_as_rates_reach(seconds: float, rate: float) -> None:
+    request = Request(text=f'<speak><prosody duration="{seconds}s">hi there</prosody></speak>', rate=1.5, lead=None)
+    voice = LetterVoice()  # seven letters of 0.1 s
+    spoken = speak_sentence(voice, sentence(request), request)
+    assert [said for said, _ in voice.said] == ["hi there"] * 2
+    assert voice.said[1][1] == pytest.approx(rate, rel=1e-6)
+    sound = sentence_sound(voice, sentence(request), request)
+    assert sound.samples.tobytes() == spoken.sound.samples.tobytes()
+
+
+def test_pitches_in_hz_are_those_of_the_voice() -> None:
+    hz = '<prosody pitch="188Hz">a</prosody>'
+    text = f'<speak>{hz} <voice name="heart">{hz}</voice></speak>'
+    runs = read_marks(Request(text=text, voice="joe")).runs
+    pitches = [run.tone.pitch for run in runs if run.tone.pitch]
+    assert pitches == pytest.approx([12.0, 12 * np.log2(188 / 198.8)], abs=0.01)
+    shifted = read_marks(Request(text='<speak><prosody pitch="94Hz">a</prosody></speak>', voice="joe", voice_pitch=3))
+    assert shifted.runs[0].tone.pitch == pytest.approx(-3.0)
+
+
+def test_the_pitch_of_every_voice_is_known_or_that_of_its_sex() -> None:
+    assert {name for name, info in SHIPPED_VOICES.items() if info.pitch_hz} >= {
+        "heart",
+        "joe",
+        "espeak",
+        "espeak-female",
+    }
+    assert usual_pitch_hz("kore", "en-us") == TYPICAL_HZ["female"]
+    assert usual_pitch_hz(None, "en-us") == usual_pitch_hz("heart", "en-us") == 198.8
+    assert usual_pitch_hz("somebody.onnx", "de") == TYPICAL_HZ["-"]
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "reason"),
+    [
+        (
+            '<prosody pitch="+6st">a</prosody>',
+            {"voice_pitch": 8},
+            r"pitch of the text \(6 semitones\) and of the request",
+        ),
+        ('<prosody range="+60%">a</prosody>', {"voice_range": 1.5}, "a range of pitch of 1.6 in the text times 1.5 of"),
+        ("a", {"voice_pitch": 13}, "voice_pitch must lie between -12 and 12, not 13"),
+        ("a", {"voice_range": -1}, "voice_range must lie between 0 and 2, not -1"),
+    ],
+)
+def test_prosody_out_of_range_is_refused(text: str, options: dict, reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
+        prepare(Request(text=f"<speak>{text}</speak>", **options))
+
+
+def test_notes_on_a_document_are_those_of_its_request() -> None:
+    prepared = prepare(Request(text="<speak><b>a</b> 你好</speak>"))
+    assert prepared.notes[0] == "SSML, line 1: <b> is not supported; its text is spoken"
+    assert len(prepared.notes) == 2
+
+
+def test_emphasis_of_a_recordings_words_is_text() -> None:
+    words = read_marks(Request(text="It is NOT *here*.", audio="a.wav"))
+    assert (words.text, len(words.runs)) == ("It is NOT *here*.", 1)
