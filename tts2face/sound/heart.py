@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,6 +32,7 @@ from tts2face.sound.heart_spectrum import creak_to_harmonics, match_energy, samp
 from tts2face.sound.hibari_voices import USUAL_VOICE, hibari_voice, read_model
 from tts2face.sound.prosody import PLAIN_PROSODY, Prosody
 from tts2face.sound.psola import even_stretch, resynthesize
+from tts2face.sound.spacing import Cut, pause_cuts, respaced, respaced_times, sound_levels
 from tts2face.sound.transforms import import_hibari
 from tts2face.sound.tune import EMPHASIS_LENGTH, SEMITONES, PlacedWord, Tune, shape_pitch
 from tts2face.sound.voice import NativeRun, PronunciationMap, SpeechInput, pronounce_content
@@ -44,10 +44,7 @@ if TYPE_CHECKING:
 
 SAMPLE_RATE = 24_000
 BOUNDARY_DELAY_S = 0.061  # delay of the model's own boundaries against its sound (56 ms when fast, 71 when slow)
-# silence that the letters beside a mark and its space have, median of twelve sentences each
-SILENT_BESIDE_S = MappingProxyType(
-    {",": 0.085, "—": 0.095, ":": 0.15, ";": 0.15, "…": 0.085, ".": 0.1, "!": 0.1, "?": 0.1}
-)
+STATED_REACH_S = 0.15  # around a stated pause, in which the quiet part of the sound lies
 FASTEST = 1.0  # rate of the network; above it its sound is shortened, in which less is lost (decision 251)
 
 
@@ -143,11 +140,17 @@ class NeuralVoice:
             frames = creak_to_harmonics(frames, shaped.f0, shaped.moved) if shaped.moved else frames
             changed = spectrum(frames, shaped.f0, seed)
             sound = _limited(samples_of(match_energy(changed, plain, shaped.moved)))
+        stated = stated_phones(part.words, steps)
+        cuts = _pause_cuts(part, steps, unchanged, min(prosody.rate, FASTEST))
+        if cuts:
+            unchanged, sound = respaced(unchanged, cuts), respaced(sound, cuts)
+            starts = respaced_times(np.array([phone.start for phone in stated]), cuts)
+            stated = [replace(phone, start=float(start)) for phone, start in zip(stated, starts, strict=True)]
         stretch = even_stretch(max(prosody.rate / FASTEST, 1.0))
         shift = 2.0 ** (in_sound / SEMITONES)
         shifted = (lambda _, hertz: hertz * shift) if in_sound else None
         sound = resynthesize(sound, stretch, shifted, prosody.formants)
-        return SpokenPart(sound, unchanged, part.words, stated_phones(part.words, steps))
+        return SpokenPart(sound, unchanged, part.words, stated)
 
     def _with_edges(self, part: SpokenPart) -> Speech:
         from tts2face.sound.segments import find_edges
@@ -184,7 +187,6 @@ def letter_steps(part: LetteredPart, durations: FloatArray, rate: float) -> NDAr
     At rate 1 each duration is rounded, as in the training of the network. Otherwise the remainder is carried on to the
     next letter, so that their sum is that at rate 1 over the rate.
     """
-    durations = _with_pauses(part, durations)
     steps = np.maximum(np.rint(durations), 1).astype(np.int64)
     factors = np.ones(len(steps))
     for word, start in zip(part.words, part.starts, strict=True):
@@ -195,18 +197,6 @@ def letter_steps(part: LetteredPart, durations: FloatArray, rate: float) -> NDAr
     total = max(round(float((inner * factors[1:-1]).sum()) / rate), len(inner))
     steps[1:-1] = carried_steps((durations[1:-1] if rate != 1.0 else inner) * factors[1:-1], total)
     return steps
-
-
-def _with_pauses(part: LetteredPart, durations: FloatArray) -> FloatArray:
-    """Durations of the letters whose marks within the part are as silent as `PAUSES_S` has them."""
-    found = durations.copy()
-    for word, start in zip(part.words[:-1], part.starts, strict=False):
-        mark = word.letters[word.n_spoken :]
-        if mark:
-            at = start + 1 + word.n_spoken
-            pause = (PAUSES_S[mark] - SILENT_BESIDE_S[mark]) / DURATION_STEP_S
-            found[at] = max(pause - max(round(durations[at + 1]), 1), 1.0)
-    return found
 
 
 def carried_steps(durations: FloatArray, total: int) -> NDArray[np.int64]:
@@ -222,9 +212,32 @@ def carried_steps(durations: FloatArray, total: int) -> NDArray[np.int64]:
     return np.diff(ends, prepend=0.0).astype(np.int64)
 
 
+def _pause_cuts(part: LetteredPart, steps: NDArray[np.int64], sound: Waveform, rate: float) -> list[Cut]:
+    """Changes that make the pauses at marks within a part as long as the table has them."""
+    marks = [(word.letters[word.n_spoken :], start) for word, start in zip(part.words[:-1], part.starts, strict=False)]
+    if not any(mark for mark, _ in marks):
+        return []
+    levels, ends = sound_levels(sound), _letter_ends(steps)
+    silences = [
+        (PAUSES_S[mark] / rate, ends[start + word.n_spoken], ends[start + len(word.letters) + 1])
+        for word, (mark, start) in zip(part.words, marks, strict=False)
+        if mark
+    ]
+    return [
+        cut
+        for wanted, start, end in silences
+        for cut in pause_cuts(levels, (float(start), float(end)), wanted, STATED_REACH_S)
+    ]
+
+
+def _letter_ends(steps: NDArray[np.int64]) -> FloatArray:
+    """Ends (L + 2,) of the letters in the sound, in seconds."""
+    return np.asarray(np.cumsum(steps) * DURATION_STEP_S - BOUNDARY_DELAY_S, np.float64)
+
+
 def _placed(part: LetteredPart, steps: NDArray[np.int64]) -> tuple[PlacedWord, ...]:
     """Words at their times in the sound."""
-    ends = np.cumsum(steps) * DURATION_STEP_S - BOUNDARY_DELAY_S
+    ends = _letter_ends(steps)
     found = []
     for word, start in zip(part.words, part.starts, strict=True):
         vowel = start + word.stressed_vowel

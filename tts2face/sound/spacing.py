@@ -23,7 +23,7 @@ LEAST_CHANGE_S = 0.02  # edges and windows are not more exact
 FADE_S = 0.005  # at each cut, which avoids clicks
 
 
-class _Cut(NamedTuple):
+class Cut(NamedTuple):
     """A place within a silence in seconds, and the seconds that are added there; removed from there on if negative."""
 
     place: float
@@ -49,18 +49,36 @@ def with_pauses(speech: Speech, content: SpeechInput, rate: float, language: str
         Code of the content.
     """
     phones, edges = speech.phones.phones, speech.phones.edges
-    levels = _levels(speech.waveform)
-    cuts: list[_Cut] = []
+    levels = sound_levels(speech.waveform)
+    cuts: list[Cut] = []
     for (word, following), mark in zip(pairwise(speech.words), _marks(speech, content, language), strict=False):
         if not mark or SILENCE not in phones[word.last : following.first]:
             continue
-        silence = float(edges[word.last]), float(edges[following.first])
-        begin, end = _quiet_span(levels, silence)
-        change = PAUSES_S[mark] / rate - (end - begin)
-        if abs(change) >= LEAST_CHANGE_S:
-            middle = min(max((begin + end) / 2, silence[0] + WINDOW_S), silence[1])
-            cuts.append(_Cut(middle if change > 0.0 else min(max(middle + change / 2, begin), end + change), change))
-    return _respaced(speech, cuts) if cuts else speech
+        cuts += pause_cuts(levels, (float(edges[word.last]), float(edges[following.first])), PAUSES_S[mark] / rate)
+    if not cuts:
+        return speech
+    sound = respaced(speech.waveform, cuts)
+    edges = enforce_increasing(respaced_times(edges, cuts))
+    edges[-1] = sound.duration
+    return Speech(sound, PhoneSequence(phones, edges), speech.words)
+
+
+def pause_cuts(levels: FloatArray, silence: tuple[float, float], wanted: float, reach: float = REACH_S) -> list[Cut]:
+    """The change that makes a silence between two words as long as is wanted in seconds, if it is worth while.
+
+    Parameters
+    ----------
+    levels : (T,)
+        `sound_levels`.
+    silence
+        Begin and end in seconds; the sound decides what of it, and within `reach` around it, is quiet.
+    """
+    start, end = quiet_span(levels, silence, reach)
+    change = wanted - (end - start)
+    if abs(change) < LEAST_CHANGE_S:
+        return []
+    middle = min(max((start + end) / 2, silence[0] + WINDOW_S), silence[1])
+    return [Cut(middle if change > 0.0 else min(max(middle + change / 2, start), end + change), change)]
 
 
 def _marks(speech: Speech, content: SpeechInput, language: str) -> list[str]:
@@ -80,25 +98,24 @@ def _marks(speech: Speech, content: SpeechInput, language: str) -> list[str]:
     return marks[:-1]
 
 
-def _levels(sound: Waveform) -> FloatArray:
+def sound_levels(sound: Waveform) -> FloatArray:
     """Levels (T,) of windows in dB, relative to the loudest one."""
     powers = np.square(sound_windows(sound, WINDOW_S), dtype=np.float64).mean(axis=1)
     levels: FloatArray = 10.0 * np.log10(np.maximum(powers, 1e-12) / max(powers.max(initial=0.0), 1e-12))
     return levels
 
 
-def _quiet_span(levels: FloatArray, silence: tuple[float, float]) -> tuple[float, float]:
+def quiet_span(levels: FloatArray, silence: tuple[float, float], reach: float = REACH_S) -> tuple[float, float]:
     """Begin and end of the longest quiet part around a silence between two words; the silence where there is none."""
-    first = max(round((silence[0] - REACH_S) / WINDOW_S), 0)
-    runs = true_runs(levels[first : round((silence[1] + REACH_S) / WINDOW_S)] < QUIET_DB) + first
+    first = max(round((silence[0] - reach) / WINDOW_S), 0)
+    runs = true_runs(levels[first : round((silence[1] + reach) / WINDOW_S)] < QUIET_DB) + first
     longest = max(runs.tolist(), key=lambda run: run[1] - run[0], default=None)
     return silence if longest is None else (longest[0] * WINDOW_S, longest[1] * WINDOW_S)
 
 
-def _respaced(speech: Speech, cuts: Sequence[_Cut]) -> Speech:
-    """Speech with silence added and removed at places in the order of time, faded there."""
-    rate, samples = speech.waveform.rate, speech.waveform.samples
-    edges = speech.phones.edges.copy()
+def respaced(sound: Waveform, cuts: Sequence[Cut]) -> Waveform:
+    """Sound with silence added and removed at places in the order of time, faded there."""
+    rate, samples = sound.rate, sound.samples
     parts: list[NDArray[np.float32]] = []
     start = 0
     for place, change in cuts:
@@ -107,12 +124,17 @@ def _respaced(speech: Speech, cuts: Sequence[_Cut]) -> Speech:
         if change > 0.0:
             parts.append(np.zeros(round(change * rate), np.float32))
         start = at + round(max(-change, 0.0) * rate)
-        moved = change if change > 0.0 else place - np.clip(speech.phones.edges, place, place - change)
-        edges += np.where(speech.phones.edges >= place, moved, 0.0)
     parts.append(_faded(samples[start:], rate, starts=True, ends=False))
-    sound = Waveform(np.concatenate(parts), rate)
-    edges[-1] = sound.duration
-    return Speech(sound, PhoneSequence(speech.phones.phones, enforce_increasing(edges)), speech.words)
+    return Waveform(np.concatenate(parts), rate)
+
+
+def respaced_times(times: FloatArray, cuts: Sequence[Cut]) -> FloatArray:
+    """Seconds (N,) after cuts of times (N,) before them."""
+    moved = times.copy()
+    for place, change in cuts:
+        removed = np.clip(times, place, place - change) - place
+        moved += np.where(times >= place, change if change > 0.0 else -removed, 0.0)
+    return moved
 
 
 def _faded(samples: NDArray[np.float32], rate: int, *, starts: bool, ends: bool) -> NDArray[np.float32]:

@@ -86,13 +86,13 @@ def shape_pitch(f0: NDArray[np.floating], times: FloatArray, tune: Tune) -> Shap
     middle = float(np.median(tones[voiced]))
     above = (tones - middle) * tune.prosody.range
     above *= 1.0 + _by_words(times, [(word, word.tone.range - 1.0) for word in tune.words])
+    for word in tune.words:
+        above = _emphasised(above, times, word) if word.tone.emphasis else above
     above += _by_words(times, [(word, word.tone.pitch) for word in tune.words])
     for words, contour in _contours(tune.words):
         shares = (times - words[0].start) / max(words[-1].end - words[0].start, 1e-3)
         points = np.array(contour)
         above += np.interp(shares, points[:, 0], points[:, 1]) * _within(times, words[0].start, words[-1].end)
-    for word in tune.words:
-        above = _emphasised(above, times, word) if word.tone.emphasis else above
     moved = []
     for movement in tune.movements:
         above, span = _moved(above, times, voiced, tune, movement)
