@@ -56,7 +56,7 @@ CLIPS: dict[str, Golden] = {
     "ssml": Golden({"text": SSML, "style": "exaggerated"}),
     "realistic": Golden({"text": "Five ships shall measure joy.", "fps": 25.0}, Models(face="head")),
     "identity_transparent": Golden(
-        {"text": "Hello.", "rate": 1.2, "gestures": "noise"},
+        {"text": "Hello.", "voice": "heart", "rate": 1.2, "gestures": "noise"},  # his own would be joe, where it is
         Models(identity="kofi"),
         {"background": "transparent", "camera": "three-quarter"},
     ),
