@@ -4,6 +4,7 @@ Pronunciation of what a voice is given: text, or words some of which have phones
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
@@ -42,6 +43,8 @@ SpeechInput = str | Sequence[SpokenWord]  # text, or phones word by word
 PronunciationMap = Mapping[str, tuple[IpaPhone, ...]]  # pronunciations of a user's words, by lower-case spelling
 
 
+# Waits for the result of another thread.
+Wait = Callable[[Future[Any]], Any]
 # Runs a long computation of native code and returns its result; the second function ends it early, from another thread.
 NativeRun = Callable[[Callable[[], Any], Callable[[], None]], Any]
 
@@ -114,12 +117,15 @@ class VoiceSetting:
         (`tts2face.sound.alignment.Aligner`).
     run
         Runs the model of the voice, during which other requests have their turns; None: within the call.
+    wait
+        Waits for another machine, during which they have their turns, too.
     """
 
     language: str
     own_words: PronunciationMap = field(default_factory=dict)
     align: "Align | None" = None
     run: NativeRun | None = None
+    wait: Wait = Future.result
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,7 @@ from tts2face.sound.voice import (
     Voice,
     VoiceInfo,
     VoiceSetting,
+    Wait,
 )
 from tts2face.sound.voice_urls import is_voice_url, named_urls
 from tts2face.types import Speech, Waveform, YieldTurn, keep_on
@@ -120,6 +121,7 @@ def load_voice(
     own_words: PronunciationMap | None = None,
     align: "Align | None" = None,
     run: NativeRun | None = None,
+    wait: Wait = Future.result,
 ) -> Voice:
     """Load a voice by name, or the default voice of a language.
 
@@ -130,7 +132,7 @@ def load_voice(
         (`tts2face.sound.voice_server.parse_voice_url`), or None for the default.
     language
         Code, tag or English name, see `lexicon.languages.language_code`.
-    own_words, align, run
+    own_words, align, run, wait
         As for `VoiceSetting`.
 
     Raises
@@ -142,7 +144,7 @@ def load_voice(
     BackendError
         A package that the voice needs is not installed.
     """
-    setting = VoiceSetting(language_code(language), own_words or {}, align, run)
+    setting = VoiceSetting(language_code(language), own_words or {}, align, run, wait)
     chosen = name or default_voice(setting.language)
     if chosen.endswith(".onnx"):
         return piper_voice(Path(chosen), setting)
@@ -166,10 +168,15 @@ class VoicePool:
         voice.
     yield_turn
         Lets other requests take their turn, between two steps of a synthesis.
+    wait
+        As for `VoiceSetting`.
     """
 
-    def __init__(self, run: NativeRun | None = None, yield_turn: YieldTurn = keep_on) -> None:
-        self._native_run, self.yield_turn = run, yield_turn
+    def __init__(
+        self, run: NativeRun | None = None, yield_turn: YieldTurn = keep_on, wait: Wait = Future.result
+    ) -> None:
+        self._native_run, self._wait = run, wait
+        self.yield_turn = yield_turn
         self._lock = threading.Lock()
         self._unused: list[tuple[Hashable, Voice]] = []  # the newest at the end
         self._kept: OrderedDict[Hashable, Speech] = OrderedDict()
@@ -200,7 +207,7 @@ class VoicePool:
         """
         key = (name, language, frozenset(dictionary.items()))
         shared = _SharedVoice(
-            self, key, lambda: load_voice(name, language, dictionary, self._align, self._native_run),
+            self, key, lambda: self._load(name, language, dictionary),
             prosody, keeps_utterances,
         )  # fmt: skip
         with self.borrow(key, shared.load):  # an unknown voice is refused at once
@@ -213,11 +220,12 @@ class VoicePool:
             if key in self._loading or any(kept == key for kept, _ in self._unused):
                 return
             thread = ThreadPoolExecutor(1, "voice")
-            self._loading[key] = thread.submit(
-                lambda: self._put_back(key, load_voice(name, language, dictionary, self._align, self._native_run))
-            )
+            self._loading[key] = thread.submit(lambda: self._put_back(key, self._load(name, language, dictionary)))
             # the thread ends with its only task
             thread.shutdown(wait=False)
+
+    def _load(self, name: str | None, language: str, dictionary: PronunciationMap) -> Voice:
+        return load_voice(name, language, dictionary, self._align, self._native_run, self._wait)
 
     @cached_property
     def _aligner(self) -> "Aligner":

@@ -30,7 +30,7 @@ from tts2face.sound.voice import PronunciationMap, SpeechInput, VoiceSetting, ap
 from tts2face.sound.voice_urls import KEY_VARIABLE, ServerAddress, parse_voice_url
 from tts2face.types import Speech, Waveform
 
-SILENCE_S = 30.0  # without a byte from the server
+SILENCE_S = 60.0  # without a byte from the server, which may make all of a sentence before the first one
 LONGEST_S = 300.0  # of one answer: a slow machine needs minutes for a sentence of 400 characters
 LARGEST_BYTES = 64 << 20  # of one answer: eleven minutes at 48 kHz
 BLOCK_BYTES = 1 << 16
@@ -227,6 +227,7 @@ class ServerVoice:
         self._language = setting.language
         self._own_words: PronunciationMap = setting.own_words
         self._align: Align = setting.align or Aligner().align
+        self._wait = setting.wait
         self._rate_hz: int | None = None
         self._threads = ThreadPoolExecutor(N_AHEAD, "voice-server")
         self._asked: OrderedDict[tuple[str, float], Future[Any]] = OrderedDict()
@@ -243,9 +244,12 @@ class ServerVoice:
         """Ask for the sound of a sentence that will be spoken soon."""
         text = written_text(content)
         if text and (text, rate) not in self._asked:
-            self._asked[(text, rate)] = self._threads.submit(self._client.sound, text, _speed(rate))
+            self._asked[(text, rate)] = self._ask(text, rate)
             while len(self._asked) > N_AHEAD:
                 self._asked.popitem(last=False)[1].cancel()
+
+    def _ask(self, text: str, rate: float) -> Future[Any]:
+        return self._threads.submit(self._client.sound, text, _speed(rate))
 
     def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
         """Synthesise a sentence; see `tts2face.sound.voice.Voice`. What a server sends does not depend on `seed`."""
@@ -268,8 +272,8 @@ class ServerVoice:
     def _sound_of(self, text: str, rate: float) -> tuple[Waveform, list[tuple[str, float, float]]]:
         if not any(letter.isalnum() for letter in text):
             raise SilentTextError("there is nothing to say in the text; give at least one word")
-        asked = self._asked.pop((text, rate), None)
-        sound, stated = asked.result() if asked is not None else self._client.sound(text, _speed(rate))
+        asked = self._asked.pop((text, rate), None) or self._ask(text, rate)
+        sound, stated = self._wait(asked)
         self._rate_hz = self._rate_hz or sound.rate
         if sound.rate != self._rate_hz:
             sound = sound.resampled(self._rate_hz)

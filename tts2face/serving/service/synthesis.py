@@ -27,7 +27,7 @@ from tts2face.serving.service.messages import (
     Task,
     Work,
 )
-from tts2face.serving.service.scheduler import OneAtATime, Turns, give_turn, lead
+from tts2face.serving.service.scheduler import OneAtATime, Turns, give_turn, lead, wait_elsewhere
 from tts2face.session import warm_up
 from tts2face.session.named_models import Models
 from tts2face.session.session_cache import SessionCache
@@ -153,7 +153,8 @@ def handlers(
     """
     configure_logs(log_format, with_text=log_text)
     sessions = SessionCache(
-        n_sessions, voices=VoicePool(OneAtATime(), give_turn), max_bytes=memory_mb * 1_000_000 or None,
+        n_sessions, voices=VoicePool(OneAtATime(), give_turn, wait_elsewhere),
+        max_bytes=memory_mb * 1_000_000 or None,
         memory_mb=sentences_mb,
     )  # fmt: skip
     known = dict(TASKS)
