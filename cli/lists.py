@@ -27,8 +27,8 @@ def faces(*, as_json: AsJson = False) -> None:
     from tts2face.session.catalogue import faces
 
     entries = faces()
-    rows = ((entry.name, str(len(entry.identities)), entry.summary) for entry in entries)
-    print_entries(entries, ("face", "identities", "summary"), rows, as_json)
+    rows = ((entry.name, str(len(entry.identities)), entry.person or EMPTY_CELL, entry.summary) for entry in entries)
+    print_entries(entries, ("face", "identities", "person", "summary"), rows, as_json)
 
 
 def identities(
@@ -38,7 +38,8 @@ def identities(
     from tts2face.session.catalogue import identities
 
     entries = identities(face)
-    print_entries(entries, ("identity", "summary"), ((entry.name, entry.summary) for entry in entries), as_json)
+    rows = ((entry.name, entry.person or EMPTY_CELL, entry.summary) for entry in entries)
+    print_entries(entries, ("identity", "person", "summary"), rows, as_json)
 
 
 def haircuts(*, as_json: AsJson = False) -> None:

@@ -23,6 +23,10 @@ class Person:
     sex: str
     age: float = 30.0
 
+    def __str__(self) -> str:
+        """Sex and age as `parse_person` reads them."""
+        return f"{self.sex} {self.age:g}"
+
     @property
     def noun(self) -> str:
         """Words for such a person."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import BackendError, DataError
+from tts2face.models.person import SHIPPED_PEOPLE, person_of
 from tts2face.request import OWN_FACE, REALISTIC_FACE
 from tts2face.storage.shipped import SHIPPED_FOLDER, find_file
 
@@ -41,21 +42,23 @@ class LanguageEntry:
 
 @dataclass(frozen=True, slots=True)
 class FaceEntry:
-    """A face, the names of its identity presets, and whether haircuts fit it."""
+    """A face, the names of its identity presets, whether haircuts fit it, and sex and age of the person, if known."""
 
     name: str
     identities: tuple[str, ...]
     summary: str
     takes_haircuts: bool = False
+    person: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class IdentityEntry:
-    """A preset of a face's age, sex and ancestry."""
+    """A preset of a face's age, sex and ancestry; ``person`` as of a face."""
 
     name: str
     face: str
     summary: str
+    person: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +178,8 @@ def describe_face(path: Path) -> FaceEntry:
     header = _read(path, "face")
     names = tuple(name for name, _, _ in header["identities"])
     summary = header.get("metadata", {}).get("summary") or f"mesh with {len(header['shape_names'])} shapes"
-    return FaceEntry(path.stem, names, str(summary), bool(header.get("hairdos")))
+    person = person_of(header.get("metadata", {}))
+    return FaceEntry(path.stem, names, str(summary), bool(header.get("hairdos")), str(person or ""))
 
 
 def identities(face: str = "head") -> tuple[IdentityEntry, ...]:
@@ -191,7 +195,10 @@ def identities(face: str = "head") -> tuple[IdentityEntry, ...]:
     path = find_file(face, "face")
     header = _read(path, "face")
     try:
-        return tuple(IdentityEntry(name, face, summary) for name, _, summary in header["identities"])
+        return tuple(
+            IdentityEntry(name, face, summary, str(SHIPPED_PEOPLE.get((face, name), "")))
+            for name, _, summary in header["identities"]
+        )
     except (KeyError, TypeError, ValueError) as broken:
         raise DataError(f"{path} lacks its list of identities; build or copy it again") from broken
 

@@ -27,6 +27,13 @@ class FaceFacts(BaseModel):
     identities: Annotated[list[str], Field(description="Values of `identity`.", examples=[["erik", "amara"]])]
     summary: Annotated[str, Field(description="What it is.", examples=["mesh with 52 shapes"])]
     takes_haircuts: Annotated[bool, Field(description="Whether `hair` and `hair_color` apply.", examples=[True])] = True
+    person: Annotated[
+        str,
+        Field(
+            description="Sex and age of the person, for the voice; empty: unknown.",
+            examples=["female 25"],
+        ),
+    ] = ""
     licence: Annotated[str, Field(description="Licence that its file states.", examples=["CC0-1.0"])] = "not stated"
     notes: Annotated[list[str], Field(description="What the import of a character changed.", examples=[[]])] = []
 
