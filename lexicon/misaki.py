@@ -25,6 +25,7 @@ PHONE_OF_LETTER = MappingProxyType({
     "f": "f", "k": "k", "l": "l", "m": "m", "n": "n", "p": "p", "s": "s", "t": "t", "v": "v", "w": "w", "z": "z",
 })  # fmt: skip
 STRESSES = MappingProxyType({"ˈ": 1, "ˌ": 2})
+DEFAULT = "DEFAULT"  # reading of a word in other parts of speech than are named
 GRADES = ("gold", "silver")  # the first was checked by hand
 _VALUE = re.compile(rb'"[^"]*"|\{[^}]*\}')
 _RHOTIC = MappingProxyType({"ɝ": "ɝ", "ə": "ɚ", "ɚ": "ɚ"})
@@ -44,6 +45,11 @@ def _text(accent: str, grade: str) -> bytes:
         raise DataError(f"{path} is damaged ({broken}); reinstall hibari-tts") from broken
 
 
+def has_dictionary(accent: str) -> bool:
+    """Whether the dictionary of an accent is installed, ``us`` or ``gb``."""
+    return len(_text(accent, GRADES[0])) > len(b"{}")
+
+
 def _entry_before(text: bytes, low: int, middle: int) -> int:
     """Start of the last entry that begins between two places, the first of which is the start of one."""
     at = text.rfind(b',"', low, middle) + 1 or low
@@ -54,8 +60,8 @@ def _entry_before(text: bytes, low: int, middle: int) -> int:
     return at
 
 
-def _find(text: bytes, word: str) -> str | None:
-    """Letters of a word by bisection; of several readings the default one."""
+def _find(text: bytes, word: str) -> dict[str, str | None]:
+    """Letters of a word by part of speech, by bisection; DEFAULT where they are not told apart, none for no word."""
     key = word.encode()
     low, high = 1, len(text) - 1
     while low < high:
@@ -63,22 +69,22 @@ def _find(text: bytes, word: str) -> str | None:
         end = text.index(b'":', at)
         value = _VALUE.match(text, end + 2)
         if value is None:
-            return None
+            return {}
         if text[at + 1 : end] == key:
             found = json.loads(value[0])
-            return str(found["DEFAULT"] if isinstance(found, dict) else found)
+            return found if isinstance(found, dict) else {DEFAULT: found}
         if text[at + 1 : end] < key:
             low = value.end() + 1
         else:
             high = at
-    return None
+    return {}
 
 
 @functools.lru_cache(maxsize=50_000)
-def misaki_letters(
+def misaki_readings(
     word: str, accent: str = "us", grades: tuple[str, ...] = GRADES, *, is_exact: bool = False
-) -> str | None:
-    """A word in misaki's alphabet; None if it has none.
+) -> Mapping[str, str | None]:
+    """A word in misaki's alphabet by part of speech, of which DEFAULT is always one; empty if it has none.
 
     Parameters
     ----------
@@ -87,11 +93,11 @@ def misaki_letters(
     """
     forms = (word,) if is_exact else dict.fromkeys((word, word.lower(), word.lower().capitalize()))
     found = (_find(_text(accent, grade), form) for grade in grades for form in forms)
-    return next((letters for letters in found if letters), None)
+    return MappingProxyType(next((readings for readings in found if readings), {}))
 
 
 def letter_segments(letters: str, phones: Mapping[str, str] = PHONE_OF_LETTER) -> tuple[IpaPhone, ...]:
-    """Phones of a word in misaki's alphabet, with their stress; a vowel and /ɹ/ are one phone in bird and letter."""
+    """Phones of a word in misaki's alphabet, with their stress; American vowels with /ɹ/ are one phone (bird)."""
     segments: list[IpaPhone] = []
     stress = 0
     for letter in letters:
@@ -99,7 +105,7 @@ def letter_segments(letters: str, phones: Mapping[str, str] = PHONE_OF_LETTER) -
             stress = STRESSES[letter]
         elif letter in phones:
             phone = phones[letter]
-            if phone == "ɹ" and segments and segments[-1].phone in _RHOTIC:
+            if phone == "ɹ" and phones is PHONE_OF_LETTER and segments and segments[-1].phone in _RHOTIC:
                 segments[-1] = IpaPhone(_RHOTIC[segments[-1].phone], segments[-1].stress, is_syllabic=True)
                 continue
             is_vowel = PHONES[phone].is_vowel
@@ -111,6 +117,6 @@ def letter_segments(letters: str, phones: Mapping[str, str] = PHONE_OF_LETTER) -
 def misaki_lookup(
     word: str, grades: tuple[str, ...] = GRADES, *, is_exact: bool = False
 ) -> tuple[IpaPhone, ...] | None:
-    """Phones of an American English word, or None; arguments as of `misaki_letters`."""
-    letters = misaki_letters(word, "us", grades, is_exact=is_exact)
-    return letter_segments(letters) if letters else None
+    """Phones of an American English word, or None; arguments as of `misaki_readings`."""
+    readings = misaki_readings(word, "us", grades, is_exact=is_exact)
+    return letter_segments(readings[DEFAULT] or "") if readings else None

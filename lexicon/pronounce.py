@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
 
+from lexicon.british import LANGUAGE as BRITISH
+from lexicon.british import british_segments, has_british
 from lexicon.dictionary import Dictionary
 from lexicon.english import CAPITALISED_WORDS, fold_to_arpabet, is_initialism, look_up_word
 from lexicon.errors import InputError, SilentTextError
@@ -189,13 +191,19 @@ def _build_word(word: _WordDraft, language: str) -> Word:
     )
 
 
+def has_dictionary(language: str) -> bool:
+    """Whether a language is pronounced by dictionaries, and espeak-ng gets phones; else its phones are espeak-ng's."""
+    return language == DEFAULT_LANGUAGE or (language == BRITISH and has_british())
+
+
 def pronounce(text: str, language: str = DEFAULT_LANGUAGE, dictionary: Dictionary | None = None) -> Pronunciation:
     """Spoken words of a text with their phones, stress and syllables.
 
     Parameters
     ----------
     language
-        An espeak-ng code; ``en-us`` is pronounced by dictionaries and context, and where they fail by espeak-ng.
+        An espeak-ng code; ``en-us`` and ``en-gb`` are pronounced by dictionaries and context, and where they fail by
+        espeak-ng.
     dictionary
         The user's entries, which take precedence.
 
@@ -209,9 +217,13 @@ def pronounce(text: str, language: str = DEFAULT_LANGUAGE, dictionary: Dictionar
     language = language_code(language)
     check_script(text, language)
     own = dictionary or Dictionary(MappingProxyType({}))
-    if language == DEFAULT_LANGUAGE:
+    if has_dictionary(language):
         words = _split_words((token.source, token.spoken) for token in split_tokens(text))
-        spoken_segments = english_segments([word.text for word in words], [word.mark for word in words], own)
+        texts = [word.text for word in words]
+        marks = [word.mark for word in words]
+        spoken_segments = english_segments(texts, marks, own)
+        if language == BRITISH:
+            spoken_segments = british_segments(texts, marks, spoken_segments, own)
         for word, segments in zip(words, spoken_segments, strict=True):
             word.segments = segments
     else:

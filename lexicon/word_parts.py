@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from lexicon.dictionary import arpabet_segments, cmudict_lookup
 from lexicon.ipa import IpaPhone
-from lexicon.misaki import misaki_letters
+from lexicon.misaki import misaki_readings
 from lexicon.written_forms import read_table
 
 Segments = tuple[IpaPhone, ...]
@@ -139,7 +139,7 @@ def _compound(word: str) -> Segments | None:
 
 def _common(word: str) -> Segments | None:
     """Phones of a word of the checked dictionary that is no name."""
-    return cmudict_lookup(word) if misaki_letters(word, grades=("gold",), is_exact=True) else None
+    return cmudict_lookup(word) if misaki_readings(word, grades=("gold",), is_exact=True) else None
 
 
 def _joined(parts: list[Segments]) -> Segments:

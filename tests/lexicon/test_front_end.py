@@ -9,12 +9,13 @@ import pytest
 
 from lexicon.errors import InputError
 from lexicon.foreign_words import make_readable
+from lexicon.misaki import PHONE_OF_LETTER
 from lexicon.pronounce import pronounce
 from lexicon.sentences import split_sentences
 from lexicon.spoken_words import pronounce_marked
 from lexicon.text_marks import parse_marks
 from tts2face.session.phrase_delivery import phrase_content
-from tts2face.sound.heart_letters import PHONE_OF_LETTER, voice_phones, word_letters
+from tts2face.sound.heart_letters import voice_phones, word_letters
 from tts2face.sound.voice import pronounce_content
 
 DECIDED = Path(__file__).with_name("decided_sentences.tsv")

@@ -48,9 +48,9 @@ def test_misaki_is_searched_as_it_is_written(accent: str, grade: str) -> None:
     for word in [*list(table)[::400], *several[::20], next(iter(table)), next(reversed(table))]:
         letters = table[word]
         wanted = letters["DEFAULT"] if isinstance(letters, dict) else letters
-        assert misaki.misaki_letters(word, accent, (grade,), is_exact=True) == wanted
+        assert misaki.misaki_readings(word, accent, (grade,), is_exact=True)["DEFAULT"] == wanted
     for word in ("qqqq", "", "~", "'", "NOUN-", "zzzzz"):
-        assert misaki.misaki_letters(word, accent, (grade,), is_exact=True) is None
+        assert not misaki.misaki_readings(word, accent, (grade,), is_exact=True)
 
 
 def test_misaki_s_letters_become_phones() -> None:
@@ -131,7 +131,7 @@ def test_order_of_the_dictionaries() -> None:
 
 def test_without_misaki_words_are_read_by_rules(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(misaki, "_text", lambda accent, grade: b"{}")
-    misaki.misaki_letters.cache_clear()
+    misaki.misaki_readings.cache_clear()
     assert misaki_lookup("burrata") is None
     assert all(phone in PHONES for phone in pronounce("zymotechnic").phones)
-    misaki.misaki_letters.cache_clear()
+    misaki.misaki_readings.cache_clear()

@@ -3,7 +3,8 @@
 import pytest
 
 from lexicon.ipa import parse_ipa
-from tts2face.sound.heart_letters import LETTERS_OF_PHONE, PHONE_OF_LETTER, voice_phones, word_letters
+from lexicon.misaki import PHONE_OF_LETTER
+from tts2face.sound.heart_letters import LETTERS_OF_PHONE, voice_phones, word_letters
 
 
 def letters(ipa: str) -> str:

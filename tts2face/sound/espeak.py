@@ -20,13 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, SilentTextError
-from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word
+from lexicon.g2p import parse_espeak_word
 from lexicon.ipa import IpaPhone
 from lexicon.languages import language_code
 from lexicon.normalize import spoken_form
 from lexicon.pauses import SIMPLE_MARKS
 from lexicon.phones import PHONES, nearest_phones, phone_distance
-from lexicon.pronounce import Word
+from lexicon.pronounce import Word, has_dictionary
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan, enforce_increasing
 from lexicon.vowels import without_vowels
 from tts2face.sound.voice import (
@@ -60,6 +60,11 @@ MNEMONICS = MappingProxyType({
     "ð": "D", "f": "f", "ɡ": "g", "h": "h", "dʒ": "dZ", "k": "k", "l": "l", "m": "m", "n": "n", "ŋ": "N", "p": "p",
     "ɹ": "r", "s": "s", "ʃ": "S", "t": "t", "θ": "T", "v": "v", "w": "w", "j": "j", "z": "z", "ʒ": "Z",
 })  # fmt: skip
+BRITISH_MNEMONICS = MappingProxyType(
+    {phone: mnemonic for phone, mnemonic in MNEMONICS.items() if phone not in {"æ", "oʊ", "ɝ", "ɚ"}}
+    | {"a": "a", "ɒ": "0", "ɜ": "3:", "əʊ": "oU", "eə": "e@", "ɪə": "i@", "ʊə": "U@"}
+)
+_MNEMONICS = MappingProxyType({"en-us": MNEMONICS, "en-gb": BRITISH_MNEMONICS})
 STRESS_MARKS = MappingProxyType({1: "'", 2: ","})
 
 
@@ -159,7 +164,7 @@ class EspeakVoice:
         events = self._phoneme_events(header, sound)
         if not any(phone != SILENCE for event in events for phone in event.phones):
             raise SilentTextError(f"there is nothing to say in {text[:40]!r}; give at least one word")
-        if self._language == DEFAULT_LANGUAGE:
+        if has_dictionary(self._language):
             events = _assign_words_by_place(events, header, text)
         else:
             events = _assign_words_by_phones(events, [word.phones for word in words])
@@ -174,15 +179,15 @@ class EspeakVoice:
     def _espeak_text(self, content: SpeechInput) -> tuple[str, list[_SpokenWord]]:
         """Input text for espeak-ng, and its words with their phones.
 
-        American English is spoken by the phones of `lexicon`, other languages by those of espeak-ng, but for words
-        with given phones.
+        English is spoken by the phones of `lexicon`, other languages by those of espeak-ng, but for words with given
+        phones.
         """
         spoken = pronounce_content(content, self._language, self._own_words)
-        if self._language == DEFAULT_LANGUAGE:
+        if has_dictionary(self._language):
             parts = [part for word in spoken for part in _short_words(word)]
             given = [tuple(segment.phone for segment in part.segments) for part in parts]
             words = [_SpokenWord(part.text, phones) for part, phones in zip(parts, given, strict=True)]
-            return " ".join(map(_word_mnemonic, parts)), words
+            return " ".join(_word_mnemonic(part, _MNEMONICS[self._language]) for part in parts), words
         words = [_SpokenWord(word.text, word.phones) for word in spoken]
         if isinstance(content, str):
             plain = _without_brackets(spoken_form(content, self._language))
@@ -292,15 +297,15 @@ def _without_brackets(text: str) -> str:
     return text.replace("[[", " ").replace("]]", " ")
 
 
-def _word_mnemonic(word: SpokenWord) -> str:
+def _word_mnemonic(word: SpokenWord, mnemonics: Mapping[str, str] = MNEMONICS) -> str:
     if not word.segments:
         return word.text + word.after
-    return f"[[{''.join(_segment_mnemonic(segment) for segment in word.segments)}]]{word.after}"
+    return f"[[{''.join(_segment_mnemonic(segment, mnemonics) for segment in word.segments)}]]{word.after}"
 
 
-def _segment_mnemonic(segment: IpaPhone) -> str:
-    phones = nearest_phones(segment.phone, MNEMONICS.keys())
-    return STRESS_MARKS.get(segment.stress, "") + "".join(MNEMONICS[phone] for phone in phones)
+def _segment_mnemonic(segment: IpaPhone, mnemonics: Mapping[str, str]) -> str:
+    phones = nearest_phones(segment.phone, mnemonics.keys())
+    return STRESS_MARKS.get(segment.stress, "") + "".join(mnemonics[phone] for phone in phones)
 
 
 def _run_child(request: Mapping[str, Any]) -> tuple[dict[str, Any], NDArray[np.int16]]:

@@ -198,7 +198,7 @@ def items_to_ssml(items: Sequence[str | dict[str, Any]]) -> tuple[str, dict[str,
 
 def _phonetic(value: str) -> str:
     """A word by letters of the misaki alphabet, as IPA."""
-    from tts2face.sound.heart_letters import PHONE_OF_LETTER
+    from lexicon.misaki import PHONE_OF_LETTER
 
     ipa = "".join(PHONE_OF_LETTER.get(letter, letter if letter in "ˈˌ " else "") for letter in value)
     return f"<phoneme alphabet='ipa' ph={quoteattr(ipa.strip())}>word</phoneme>"
