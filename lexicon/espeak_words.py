@@ -6,14 +6,14 @@ phones alone, where words are joined.
 """
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from difflib import SequenceMatcher
 from itertools import accumulate, pairwise
 
 from lexicon.chunks import split_chunks
 from lexicon.g2p import parse_espeak_word, phonemize
 from lexicon.ipa import IpaPhone
-from lexicon.written_words import WrittenWord, written_words
+from lexicon.written_words import WrittenWord, is_unspaced, written_words
 
 MAX_SENTENCE_CHARACTERS = 1000  # of text that is read as a whole
 Segments = tuple[IpaPhone, ...]
@@ -35,13 +35,16 @@ def _words_of_sentence(sentence: str, language: str) -> list[tuple[WrittenWord, 
     kept = [at for at, parts in enumerate(alone) if parts or any(map(str.isalnum, words[at].text))]
     words, alone = tuple(words[at] for at in kept), [alone[at] for at in kept]
     flat = [segment for part in whole for segment in part]
+    ends = {0, *accumulate(map(len, whole))}
     if sum(map(len, alone)) == len(whole):
         n_phones = [0, *accumulate(map(len, whole))]
         cuts = [n_phones[at] for at in [0, *accumulate(map(len, alone))]]
     else:
-        cuts = _cuts(whole, [sum(parts, ()) for parts in alone])
+        cuts = _cuts(flat, ends, [sum(parts, ()) for parts in alone])
     parts = [tuple(flat[first:last]) for first, last in pairwise(cuts)]
-    return _joined(words, parts, [bool(own) for own in alone])
+    # characters that espeak-ng reads as a word are one: 你好
+    is_joined = [is_unspaced(language) and cut not in ends for cut in cuts[:-1]]
+    return _joined(words, parts, [bool(own) for own in alone], is_joined)
 
 
 @functools.lru_cache(maxsize=10_000)
@@ -51,31 +54,32 @@ def _alone(piece: str, language: str) -> tuple[Segments, ...]:
     return tuple(segments for segments in (parse_espeak_word(word, language) for word in spoken) if segments)
 
 
-def _cuts(whole: Sequence[Segments], alone: Sequence[Segments]) -> list[int]:
+def _cuts(sentence: Sequence[IpaPhone], ends: Collection[int], alone: Sequence[Segments]) -> list[int]:
     """Bounds of each word among the phones of a sentence, from its phones alone; near ends of words are preferred."""
-    said = [segment.phone for part in whole for segment in part]
+    said = [segment.phone for segment in sentence]
     expected = [segment.phone for part in alone for segment in part]
     blocks = SequenceMatcher(None, expected, said, autojunk=False).get_matching_blocks()
-    ends = {0, *accumulate(map(len, whole))}
     cuts = [0]
     for at in accumulate(map(len, alone)):
         # the gap between equal phones in which the cut lies; within equal phones there is none
         low = max((block.b + min(at - block.a, block.size) for block in blocks if block.a < at), default=0)
         high = min((block.b + max(at - block.a, 0) for block in blocks if block.a + block.size > at), default=len(said))
-        places = sorted(ends.intersection(range(low, high + 1)))
+        places = [place for place in range(low, high + 1) if place in ends]
         cuts.append(max(places[-1] if places else low, cuts[-1]))
     return [*cuts[:-1], len(said)]
 
 
 def _joined(
-    words: Sequence[WrittenWord], parts: Sequence[Segments], has_phones: Sequence[bool]
+    words: Sequence[WrittenWord], parts: Sequence[Segments], has_phones: Sequence[bool], is_joined: Sequence[bool]
 ) -> list[tuple[WrittenWord, Segments]]:
-    """Words with their phones; one that a neighbour absorbs is written with it."""
+    """Words with their phones; one that a neighbour absorbs, or that is joined to it, is written with it."""
     found: list[tuple[WrittenWord, Segments]] = []
-    for word, segments, is_spoken in zip(words, parts, has_phones, strict=True):
-        if found and is_spoken and not segments:
+    for word, segments, is_spoken, is_part in zip(words, parts, has_phones, is_joined, strict=True):
+        if found and (is_part or (is_spoken and not segments)):
             before, own = found[-1]
-            found[-1] = (WrittenWord(f"{before.text} {word.text}", f"{before.piece} {word.piece}", word.mark), own)
+            space = "" if is_part else " "
+            text, piece = f"{before.text}{space}{word.text}", f"{before.piece}{space}{word.piece}"
+            found[-1] = (WrittenWord(text, piece, word.mark), (*own, *segments))
         else:
             found.append((word, segments))
     return found

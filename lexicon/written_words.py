@@ -29,6 +29,11 @@ class WrittenWord:
     mark: str = ""
 
 
+def is_unspaced(language: str) -> bool:
+    """Whether a language is written without spaces, and each character is a word of its own here."""
+    return language.partition("-")[0] in _UNSPACED
+
+
 def written_words(text: str, language: str) -> tuple[WrittenWord, ...]:
     """Words of a text in order; signs that are spoken (€, %) are words, punctuation is none."""
     found: list[WrittenWord] = []
@@ -45,7 +50,7 @@ def written_words(text: str, language: str) -> tuple[WrittenWord, ...]:
 
 def _pieces(text: str, language: str) -> Iterator[tuple[int, str]]:
     for piece in _PIECE.finditer(text):
-        if language.partition("-")[0] in _UNSPACED:
+        if is_unspaced(language):
             yield from ((piece.start() + part.start(), part[0]) for part in _CHARACTERS.finditer(piece[0]))
         else:
             yield piece.start(), piece[0]

@@ -146,7 +146,7 @@ def test_a_server_that_is_not_there_is_said(listed: dict[str, Any], monkeypatch:
 
 @pytest.mark.usefixtures("listed")
 def test_an_added_voice_speaks_and_is_chosen(tmp_path: Path) -> None:
-    assert default_voice("en-gb") == "espeak"
+    assert default_voice("en-gb") == "heart"
     with pytest.raises(BackendError, match="voices add emma"):
         load_voice("emma", "en-gb")
     registry = hibari_voices._registry()

@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 
 from lexicon.languages import language_code
+from lexicon.pronounce import has_dictionary
 from tts2face.models.person import FEMALE, MALE, Person
 from tts2face.sound.prosody import PLAIN_PROSODY, Prosody
 from tts2face.sound.shipped_voices import SHIPPED_VOICES
@@ -74,16 +75,26 @@ def fitting_voice(person: Person | None, language: str) -> Fitting:
         Code of `lexicon.languages`.
     """
     usual = default_voice(language)
+    foreign = _foreign_accent(usual, language)
     if person is None:
-        return Fitting(usual)
+        return Fitting(usual, sentence=foreign)
     voices = _usable(language, usual)
     name = min(voices, key=lambda name: (voices[name].sex != person.sex, voices[name].accent not in ("", language)))
     prosody = _difference(Person(voices[name].sex), person)
     if name == usual and prosody == PLAIN_PROSODY:
-        return Fitting(name)
+        return Fitting(name, sentence=foreign)
     fitting = Fitting(name, prosody)
     sentence = f"the face shows {person.noun} and speaks as {fitting.described}; --voice sets another"
-    return replace(fitting, sentence=sentence)
+    return replace(fitting, sentence=f"{sentence}; {foreign}" if foreign else sentence)
+
+
+def _foreign_accent(name: str, language: str) -> str:
+    """What is said where the voice of a language has another accent; empty where it has not."""
+    if SHIPPED_VOICES[name].accent in {"", language} or not has_dictionary(language):
+        return ""
+    others = [other for other, info in SHIPPED_VOICES.items() if info.accent == language]
+    hint = f"; `tts2face voices add {others[0]}` adds one that was" if others else ""
+    return f"{name} was trained in {SHIPPED_VOICES[name].accent} and speaks the phones of {language}{hint}"
 
 
 def _usable(language: str, usual: str) -> dict[str, VoiceInfo]:
@@ -95,11 +106,13 @@ def _usable(language: str, usual: str) -> dict[str, VoiceInfo]:
         usual: SHIPPED_VOICES[usual]
     }
     is_synthetic = SHIPPED_VOICES[usual].engine == FORMANT_SYNTHESIS
+    usual_accent = SHIPPED_VOICES[usual].accent
     natural = {
         name: info
         for name, info in spoken.items()
         # a voice of another accent speaks only where the usual voice has that accent, too
-        if info.engine != FORMANT_SYNTHESIS and (info.accent in ("", language) or not is_synthetic)
+        if info.engine != FORMANT_SYNTHESIS
+        and (info.accent in ("", language) or (not is_synthetic and usual_accent == language) or name == usual)
     }
     return natural or spoken
 

@@ -13,13 +13,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from lexicon.british import LANGUAGE as BRITISH
 from lexicon.errors import import_of_extra
 from lexicon.pauses import PAUSES_S
+from lexicon.pronounce import has_dictionary
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from lexicon.values.json_text import read_json
 from tts2face.numeric.arrays import FloatArray
 from tts2face.numeric.telemetry import disable_telemetry
 from tts2face.sound.heart_letters import (
+    BRITISH_IN_AMERICAN,
     BRITISH_LETTERS,
     LETTERS_OF_PHONE,
     MARKS,
@@ -72,12 +75,17 @@ class NeuralVoice:
     Parameters
     ----------
     name
-        Of its list: American or British, whatever the variety of the text.
+        Of its list.
     run
         Runs the model; None: within the call.
+    language
+        Of the text. A British voice reads it as British; an American one reads British words in its own letters, as
+        far as these go.
     """
 
-    def __init__(self, own_words: PronunciationMap, run: NativeRun | None = None, *, name: str = USUAL_VOICE) -> None:
+    def __init__(
+        self, own_words: PronunciationMap, run: NativeRun | None = None, *, name: str = USUAL_VOICE, language: str = ""
+    ) -> None:
         self._own_words = own_words
         disable_telemetry()
         with import_of_extra("the voice heart needs hibari-tts; run: pip install hibari-tts"):
@@ -85,10 +93,11 @@ class NeuralVoice:
             from hibari.tts import ASSETS
         self._numbers = read_json(Path(ASSETS, "vocab.json"))
         voice = hibari_voice(name)
-        self._language = voice.language
-        self._alphabet = BRITISH_LETTERS if voice.is_british else LETTERS_OF_PHONE
+        self._language = BRITISH if language == BRITISH and has_dictionary(BRITISH) else voice.language
+        americanised = BRITISH_IN_AMERICAN if self._language == BRITISH else LETTERS_OF_PHONE
+        self._alphabet = BRITISH_LETTERS if voice.is_british else americanised
         self._network = HeartNetwork(read_model(name), run)
-        pronounce_content("Hello.", voice.language, {})  # reads the dictionary while other models are loaded
+        pronounce_content("Hello.", self._language, {})  # reads the dictionary while other models are loaded
 
     @cached_property
     def _classifier(self) -> "PhoneClassifier":

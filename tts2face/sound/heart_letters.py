@@ -24,6 +24,12 @@ BRITISH_LETTERS = MappingProxyType(
     | {"a": "a", "ɑ": "ɑː", "ɒ": "ɒ", "ɔ": "ɔː", "ɜ": "ɜː", "i": "iː", "u": "uː", "əʊ": "Q"}
     | {"eə": "ɛː", "ɪə": "ɪə", "ʊə": "ʊə"}
 )
+# British words in the letters of an American voice: 12.7 % phone errors by our recogniser for 19.8 % in the letters of
+# British ones, which it was not trained in (and 11.4 % of American words).
+BRITISH_IN_AMERICAN = MappingProxyType(
+    {phone: LETTERS_OF_PHONE.get(phone, letters) for phone, letters in BRITISH_LETTERS.items()}
+    | {"a": "æ", "ɒ": "ɑ", "ɜ": "ɜ", "əʊ": "O", "eə": "ɛ"}
+)
 BRITISH_OF_AMERICAN = MappingProxyType({"oʊ": "əʊ", "æ": "a", "ɝ": "ɜ", "ɚ": "ə"})
 STRESS_MARKS = MappingProxyType({1: "ˈ", 2: "ˌ"})
 _SYLLABIC, _SHORT_SCHWA = "ᵊ", "ɐ"
@@ -44,7 +50,7 @@ def voice_phones(phones: Sequence[str], alphabet: Alphabet = LETTERS_OF_PHONE) -
 
 
 def _own_phones(phone: str, alphabet: Alphabet) -> tuple[str, ...]:
-    if alphabet is BRITISH_LETTERS:
+    if alphabet is not LETTERS_OF_PHONE:
         phone = BRITISH_OF_AMERICAN.get(phone, phone)
     return nearest_phones(phone, alphabet.keys())
 
@@ -73,7 +79,7 @@ def word_letters(
     for at, (_, digit) in enumerate(pairs):
         letters += STRESS_MARKS.get(digit, "")
         places.append(len(letters))
-        letters += _variant(pairs, at) if alphabet is LETTERS_OF_PHONE else _british(pairs, at)
+        letters += _variant(pairs, at) if alphabet is LETTERS_OF_PHONE else _british(pairs, at, alphabet)
     is_article = alphabet is LETTERS_OF_PHONE and tuple(phone for phone, _ in pairs) in _ARTICLES and pairs[0][1] == 0
     return (_SHORT_SCHWA + letters[1:] if is_article else letters), tuple(places)
 
@@ -92,10 +98,10 @@ def _variant(pairs: Sequence[tuple[str, int]], at: int) -> str:
     return LETTERS_OF_PHONE[phone]
 
 
-def _british(pairs: Sequence[tuple[str, int]], at: int) -> str:
+def _british(pairs: Sequence[tuple[str, int]], at: int, alphabet: Alphabet) -> str:
     """British letters of the phone at an index; the vowel at the end of "happy" is short."""
     phone, digit = pairs[at]
-    return phone if phone == "i" and not digit and at == len(pairs) - 1 else BRITISH_LETTERS[phone]
+    return phone if phone == "i" and not digit and at == len(pairs) - 1 else alphabet[phone]
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ from lexicon.languages import language_code
 from lexicon.normalize import spoken_form
 from lexicon.pauses import SIMPLE_MARKS
 from lexicon.phones import PHONES, nearest_phones
-from lexicon.pronounce import Word
+from lexicon.pronounce import Word, has_dictionary
 from lexicon.values.json_text import read_json
 from tts2face.numeric.telemetry import disable_telemetry
 from tts2face.sound.aligned_speech import AlignedWord, aligned_speech
@@ -42,8 +42,10 @@ START = "^"
 PADDING = "_"
 END = "$"
 STRESS_MARKS = MappingProxyType({1: "ˈ", 2: "ˌ"})
-# espeak-ng's letters of American English, in which these voices are trained, where they differ from the phone table.
-ENGLISH_LETTERS = MappingProxyType({"i": "iː", "u": "uː", "ɑ": "ɑː", "ɔ": "ɔː", "ɝ": "ɜː"})
+# espeak-ng's letters of English, in which these voices are trained, where they differ from the phone table.
+ENGLISH_LETTERS = MappingProxyType({
+    "i": "iː", "u": "uː", "ɑ": "ɑː", "ɔ": "ɔː", "ɝ": "ɜː", "ɜ": "ɜː", "ɪə": "iə",
+})  # fmt: skip
 FLAP, SHORT_SCHWA = "ɾ", "ɐ"
 _ARTICLES = frozenset({("ə",), ("ə", "n")})
 WORD = re.compile(r"[^\W_]+(?:['’-][^\W_]+)*")
@@ -118,7 +120,7 @@ class PiperTextReader:
 
 
 def english_letters(segments: Sequence[IpaPhone], phones: Collection[str], letters: Collection[str]) -> str:
-    """Letters of an American English word as espeak-ng writes them: long vowels, flaps, the article a as ɐ.
+    """Letters of an English word as espeak-ng writes them: long vowels, flaps, the article a as ɐ.
 
     Parameters
     ----------
@@ -200,7 +202,7 @@ def onnx_errors() -> tuple[type[Exception], ...]:
 class PiperVoice:
     """A Piper voice (VITS in ONNX) with its settings file ``NAME.onnx.json`` in the same folder.
 
-    American English is spoken by the phones of `lexicon`; in other languages the text is spoken by piper-tts, whose
+    English is spoken by the phones of `lexicon`; in other languages the text is spoken by piper-tts, whose
     phones are those of espeak-ng.
     """
 
@@ -218,7 +220,7 @@ class PiperVoice:
         _check_language(path, content["espeak"]["voice"], language)
         self._language = language_code(content["espeak"]["voice"])
         self._network = PiperNetwork(path, content)
-        self._text_reader = None if self._language == DEFAULT_LANGUAGE else PiperTextReader(self._network, content)
+        self._text_reader = None if has_dictionary(self._language) else PiperTextReader(self._network, content)
         self._phones = tuple(phone for phone in PHONES if self._network.letters.issuperset(phone_letters(phone)))
         self._own_words = own_words
         self._align: Align = align or Aligner().align
@@ -257,7 +259,9 @@ class PiperVoice:
 
     def _sentence_letters(self, words: Sequence[Word]) -> list[str]:
         """Letters of a sentence; phones that the voice does not have are replaced by the nearest ones."""
-        spoken = (english_letters(word_segments(word), self._phones, self._network.letters) for word in words)
+        # flaps are American
+        letters = self._network.letters if self._language == DEFAULT_LANGUAGE else self._network.letters - {FLAP}
+        spoken = (english_letters(word_segments(word), self._phones, letters) for word in words)
         marks = (self._known_marks(word.mark) for word in words)
         return list(" ".join(letters + mark for letters, mark in zip(spoken, marks, strict=True)))
 

@@ -18,7 +18,7 @@ SERVER = "server"  # engine of voices by URL
 def _hibari(setting: VoiceSetting, *, name: str = "heart") -> Voice:
     from tts2face.sound.heart import NeuralVoice
 
-    return NeuralVoice(setting.own_words, setting.run, name=name)
+    return NeuralVoice(setting.own_words, setting.run, name=name, language=setting.language)
 
 
 def _added(name: str, sex: str, accent: str) -> VoiceInfo:

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from tts2face.sound.alignment import Align, Aligner
 
 # voices of languages whose usual one is not that of every installation, the preferred one first
-WHERE_INSTALLED = MappingProxyType({"en-gb": ("emma", "fable"), "ja": ("mei",)})
+WHERE_INSTALLED = MappingProxyType({"en-gb": ("emma", "fable", "heart"), "ja": ("mei",)})
 TYPICAL_HZ = MappingProxyType({"female": 200.0, "male": 115.0, "-": 165.0})  # F0 of people who read aloud
 MAX_VOICES = 2  # unused voices in memory; about 100 MB each
 MAX_UTTERANCES = 8  # of at most some ten seconds; one second of sound takes 100 kB
