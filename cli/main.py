@@ -99,6 +99,7 @@ def phones(
     language: Annotated[
         str, Parameter(help="Language of the text: a code, a BCP 47 tag or an English name.")
     ] = "en-us",
+    markup: Annotated[Literal["auto", "plain", "ssml"], Parameter(help="How the text is read.")] = "auto",
     dictionary: Annotated[
         Path | None, Parameter(help="File of pronunciations that take precedence over the built-in ones.")
     ] = None,
@@ -110,7 +111,7 @@ def phones(
     from tts2face.interchange.exports.pronunciation import FORMATS
 
     pronunciation = pronounce_marked(
-        parse_marks(text, language), language, read_dictionary(dictionary) if dictionary else None
+        parse_marks(text, language, markup), language, read_dictionary(dictionary) if dictionary else None
     )
     print(FORMATS[format](pronunciation), end="")  # noqa: T201 - the result
 

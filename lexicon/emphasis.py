@@ -104,8 +104,8 @@ def _in_capitals(line: str, start: int, span: tuple[int, int], language: str) ->
 def _is_emphasised(line: str, match: "re.Match[str]", language: str) -> bool:
     word, start = match.group(), match.start()
     before = line[max(start - _BEFORE, 0) : start]
-    if not word.isupper() or (line[match.end() : match.end() + 1] == ":" and not before.strip()):
-        return False  # the second: WARNING: or ANNA: at the beginning of a line names what follows
+    if not word.isupper() or line[match.end() : match.end() + 1] == ":":
+        return False  # the second: WARNING:, ANNA: or [EMOTION: calm] names what follows
     if language.partition("-")[0] == "en":
         words = _WORD.findall(before)
         return is_word_in_capitals(word, words[-1] if words else "")

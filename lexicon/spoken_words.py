@@ -13,7 +13,7 @@ from lexicon.marked_text import MarkedText
 from lexicon.normalize import split_tokens
 from lexicon.pronounce import NOTHING, Pronunciation, Word, pronounce
 from lexicon.sentences import Phrase, split_sentences
-from lexicon.text_marks import parse_marks
+from lexicon.text_marks import is_ssml, parse_marks
 
 
 def pronounce_marked(
@@ -37,9 +37,12 @@ def pronounce_marked(
     return Pronunciation(text.text, language, tuple(words))
 
 
-def reading_notes(text: str, language: str) -> tuple[str, ...]:
-    """How words are spoken that the language of a text does not read; raises as `parse_marks`."""
-    return () if text.isascii() else make_readable(parse_marks(text, language), language)[1]
+def reading_notes(text: str, language: str, markup: str = "auto") -> tuple[str, ...]:
+    """Notes on marks that are not followed, and on words that a language does not read; raises as `parse_marks`."""
+    if text.isascii() and markup != "ssml" and not is_ssml(text):
+        return ()
+    marked = parse_marks(text, language, markup)
+    return (*marked.notes, *make_readable(marked, language)[1])
 
 
 def pronounce_phrase(phrase: Phrase, language: str, dictionary: Dictionary | None = None) -> tuple[Word, ...]:

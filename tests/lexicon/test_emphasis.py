@@ -50,6 +50,7 @@ def test_words_are_emphasised(text: str, words: list[str]) -> None:
         "Henry VIII, King Charles III and Pope Leo XIV met.",
         "MAN: (whispering) get down",
         "WARNING: do it now",
+        "[EMOTION: angry] Stop that.",
         "PLEASE READ THIS BEFORE YOU START.",
         "Compute 3 * 4 * 5, or 2*3*4, f*ck it.",
         "*smiles warmly* It's good to see you. *sighs deeply* *winks* *nervously*",

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lexicon.errors import InputError
+from lexicon.growing_text import MAX_HELD_CHARACTERS, GrowingText
 from lexicon.marked_text import MAX_NESTING, MarkedText, NameMark, NodMark, PauseMark, StyleRun
 from lexicon.text_marks import parse_marks
 from lexicon.tones import Tone
@@ -206,3 +207,34 @@ def test_a_megabyte_of_ssml_is_read_at_once() -> None:
     found = ssml('<p>Hello <break time="1s"/> there.</p>' * 25_000)
     assert len(found.marks) == 25_000
     assert time.perf_counter() - begin < 10
+
+
+@pytest.mark.parametrize(
+    ("markup", "text", "sentences"),
+    [
+        ("auto", "[style:a]One is. Two is.[/style] Three is.", ["[style:a]One is. Two is.[/style] Three is."]),
+        ("auto", "<speak>One is. Two is.</speak>", ["<speak>One is. Two is.</speak>"]),
+        ("auto", "One <b>is. Two is.", ["One <b>is.", "Two is."]),
+        (
+            "ssml",
+            "One is. <prosody rate='80%'>Two is. Three is.</prosody> Four <break/> is. A <sub alias='e. F g'>x</sub>.",
+            [
+                "One is.", "<prosody rate='80%'>Two is. Three is.</prosody> Four <break/> is.",
+                "A <sub alias='e. F g'>x</sub>.",
+            ],
+        ),
+        ("plain", "[style:a]One is. Two is.", ["[style:a]One is.", "Two is."]),
+        ("ssml", "<p>One is. Two is.", ["<p>One is. Two is."]),
+    ],
+)  # fmt: skip
+def test_sentences_of_growing_text_stay_together_within_marks(markup: str, text: str, sentences: list[str]) -> None:
+    growing = GrowingText("en-us", markup)
+    found = [sentence for letter in text for sentence in growing.add(letter)]
+    assert [*found, *growing.flush()] == sentences
+
+
+def test_growing_text_waits_for_no_end_that_does_not_come() -> None:
+    growing = GrowingText("en-us", "ssml")
+    found = [sentence for _ in range(600) for sentence in growing.add("<p>This is a sentence. ")]
+    assert found
+    assert max(map(len, found)) < MAX_HELD_CHARACTERS + 100

@@ -268,6 +268,16 @@ class LiveSpeech:
         return self.seconds_of(self._n_frames)
 
     @property
+    def language(self) -> str:
+        """Language of the text."""
+        return self._request.language
+
+    @property
+    def markup(self) -> str:
+        """How the text is read."""
+        return self._request.markup
+
+    @property
     def fps(self) -> float:
         """Frames per second."""
         return self._request.fps

@@ -66,10 +66,11 @@ class Adjustments:
         if language != DEFAULT_LANGUAGE:
             self.made.append(f"the language is {language}")
 
-    async def note_words(self, state: ServiceState, text: str, language: str) -> None:
-        """Note what is done with words of other writing systems."""
+    async def note_words(self, state: ServiceState, text: str, language: str, markup: str = "auto") -> None:
+        """Note what of a text is not followed, and what is done with words of other writing systems."""
         state.results.check_length(text)
-        self.made += await asyncio.to_thread(reading_notes, text, language_code(language))
+        notes = await asyncio.to_thread(reading_notes, text, language_code(language), markup)
+        self.made += [_in_header(note) for note in notes]
 
     def note_fitted(self, models: Models, language: str) -> None:
         """Note the voice that fits the face, unless it is the usual one of the language."""
@@ -79,13 +80,18 @@ class Adjustments:
 
     def note_sounds(self, notes: Sequence[str]) -> None:
         """Note what is guessed of sounds that were sent; semicolons divide notes in the header."""
-        self.made += [note.replace(";", ",") for note in notes]
+        self.made += [_in_header(note) for note in notes]
 
     def on(self, response: Answer) -> Answer:
         """An answer with the header that names them, if there are any."""
         if self.made:
             response.headers[ADJUSTED] = "; ".join(self.made)
         return response
+
+
+def _in_header(note: str) -> str:
+    """A note as the header can hold it: semicolons divide notes, and other letters than ASCII are left out."""
+    return "".join(c if c.isascii() and c.isprintable() else "?" for c in note.replace(";", ","))
 
 
 def is_client_model(name: str) -> bool:

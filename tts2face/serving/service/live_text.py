@@ -69,6 +69,8 @@ class LiveText:
         Characters of the whole stream, and of each minute.
     count
         Counts a sentence.
+    markup
+        How it is read.
 
     Attributes
     ----------
@@ -76,9 +78,9 @@ class LiveText:
         Of the task: ``say`` with one sentence, ``listen``, ``heard`` with sound of the partner, ``cancel`` and ``end``.
     """
 
-    def __init__(self, language: str, limits: tuple[int, int], count: Count) -> None:
+    def __init__(self, language: str, limits: tuple[int, int], count: Count, markup: str = "auto") -> None:
         self.inputs: InputQueue = asyncio.Queue()
-        self._growing, self._count = GrowingText(language), count
+        self._growing, self._count = GrowingText(language, markup), count
         self._most, self._most_a_minute = limits
         self._n_characters, self._minute = 0, Bucket()
         self._sentences: deque[str] = deque()

@@ -85,7 +85,8 @@ def digest_of(parts: Iterable[bytes]) -> str:
 def _pieces(session: "Session", project: Project, have: frozenset[str]) -> Iterator[tuple[dict[str, Any], bytes]]:
     """Description and content of each piece; the content is empty if its digest is in `have`."""
     said: Counter[str] = Counter()
-    for number, piece in enumerate(session.stream(project.prepare())):
+    prepared = project.prepare()
+    for number, piece in enumerate(session.stream(prepared)):
         clip = piece.clip
         motion = clip.motion.values
         head = clip.head.values
@@ -97,7 +98,8 @@ def _pieces(session: "Session", project: Project, have: frozenset[str]) -> Itera
             "type": "piece", "number": number, "text": piece.text, "occurrence": said[piece.text],
             "seconds": clip.speech.waveform.duration, "rate": clip.speech.waveform.rate,
             "n_frames": len(motion), "n_samples": len(samples), "digest": digest,
-            **_timing(piece), "notes": [mismatch.sentence for mismatch in piece.mismatches],
+            **_timing(piece),
+            "notes": [*(prepared.notes if number == 0 else ()), *(miss.sentence for miss in piece.mismatches)],
         }  # fmt: skip
         if number == 0:
             event["channels"] = list(clip.motion.channels)

@@ -113,7 +113,8 @@ async def _answer(
     given: dict[str, Any] = clip.model_dump(exclude_none=True, exclude_defaults=True)
     format = given.pop("format", "mp4")
     state = service_state(request)
-    await adjustments.note_words(state, given.get("text", ""), given.get("language", DEFAULT_LANGUAGE))
+    language, markup = given.get("language", DEFAULT_LANGUAGE), given.get("markup", "auto")
+    await adjustments.note_words(state, given.get("text", ""), language, markup)
     fields = await divide_options(state, request.state.key, given)
     picture = fields.picture | {name: files[name] for name in ("background",) if name in files}
     spoken = fields.request | {name: files[name] for name in (*SOUNDS, "timeline") if name in files}

@@ -263,7 +263,7 @@ def _expected_speech_s(order: JobOrder) -> float:
     text = getattr(options, "text", "")
     silent_s = sum(getattr(options, name, None) or 0.0 for name in ("idle", "listen"))
     with suppress(InputError):  # of a text with wrong marks, which makes nothing
-        silent_s += marked_silence_s(parse_marks(text))
+        silent_s += marked_silence_s(parse_marks(text, markup=getattr(options, "markup", "auto")))
     return len(text) / CHARACTERS_PER_S + silent_s + CUE_S * order.upload.n_cues
 
 

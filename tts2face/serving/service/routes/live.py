@@ -91,7 +91,8 @@ async def stream(connection: WebSocket) -> None:
         receiver = _Sound(options.rate)
     else:
         limits = state.settings.live_characters, state.settings.live_characters_per_minute
-        receiver = LiveText(str(given.get("language", "en-us")), limits, lambda: state.permissions.count(key))
+        language, markup = str(given.get("language", "en-us")), str(given.get("markup", "auto"))
+        receiver = LiveText(language, limits, lambda: state.permissions.count(key), markup)
     kind = "listen" if isinstance(receiver, _Sound) else "live"
     work = state.results.work(kind=kind, models=models, request=given)
     sending = asyncio.create_task(_send(connection, state.results.messages(work, key, receiver.inputs), receiver))

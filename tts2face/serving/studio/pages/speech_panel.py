@@ -40,6 +40,8 @@ class SpeechPanel:
         if not is_recording:
             self._select("request", "voice", "Voice", voices())
             self._slider("rate", "Rate", 0.5, 2.0, 0.05)
+            self._slider("voice_pitch", "Pitch", -12.0, 12.0, 0.5)
+            self._slider("voice_range", "Range of pitch", 0.0, 2.0, 0.05)
         self._select("request", "language", "Language", languages(), with_filter=True)
         heading(2, "Head")
         found = await self._models()
