@@ -62,7 +62,8 @@ def run_request(request: Request, picture: Picture, options: SpeakOptions) -> No
     _check_options(request, picture, options)
     from tts2face.session.prepared import prepare
 
-    run_prepared(prepare(request), picture, options)  # a wrong request is refused before anything is loaded
+    # a wrong request is refused before anything is loaded
+    run_prepared(prepare(request, options.models.shown_person()), picture, options)
 
 
 def run_prepared(prepared: "PreparedRequest", picture: Picture, options: SpeakOptions) -> None:

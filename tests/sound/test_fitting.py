@@ -164,3 +164,16 @@ def test_a_changed_voice_gives_the_same_bytes_again(name: str) -> None:
     changed = Prosody(1.2, -3.0, 1.0, 0.9)
     one, other = (sound_with(voice, "She sells sea shells.", changed, 1, language="en-us") for _ in range(2))
     assert one.samples.tobytes() == other.samples.tobytes()
+
+
+@pytest.mark.usefixtures("only_heart")
+def test_pitches_in_hertz_are_those_of_the_voice_that_speaks() -> None:
+    text = '<speak><prosody pitch="150Hz">Hello.</prosody></speak>'
+    changes = {}
+    for person in (None, Person(FEMALE, 75), Person(MALE, 30)):
+        prepared = prepare(Request(text=text), person)
+        fitted = prepared.fitting(person)
+        assert fitted is not None
+        changes[person] = prepared.text.runs[0].tone.pitch + fitted.prosody.pitch
+    first, *others = changes.values()
+    assert others == pytest.approx([first] * 2, abs=0.01)

@@ -323,7 +323,7 @@ class LiveSpeech:
         self._pause_s = None
 
     def _append(self, request: Request, listening: Timeline | None = None) -> Iterator[Piece]:
-        prepared = self._models.with_own_styles(prepare(request))
+        prepared = self._models.with_own_styles(prepare(request, self._models.person))
         prepared = prepared if listening is None else replace(prepared, listening=listening)
         models = self._models.for_request(prepared)
         for piece in pieces_from(prepared, models, self._layer, self._n_frames, ends_on_frame=True):

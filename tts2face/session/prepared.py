@@ -34,13 +34,13 @@ from tts2face.picture.options import Picture
 from tts2face.request import CAMERA, Listening, Recorded, Request, Source, Spoken, option_fields
 from tts2face.session.corrections import SentenceEdges, StaleEdgesError
 from tts2face.session.joining import Excerpt
+from tts2face.sound.fitting import Fitting, fitting_voice
 from tts2face.sound.voice_pool import usual_pitch_hz
 from tts2face.sound.voice_urls import is_voice_url
 from tts2face.storage.output_paths import AnyPath
 from tts2face.types import exact_rate
 
 if TYPE_CHECKING:
-    from tts2face.sound.fitting import Fitting
     from tts2face.sound.voice_pool import VoicePool
 
 HEARING_STEPS, RECORDING_STEPS = 300, 700  # steps of progress of a recording: until its phones are known, and then
@@ -116,10 +116,8 @@ class PreparedRequest:
                 return corrected
         return phones
 
-    def fitting(self, person: Person | None) -> "Fitting | None":
+    def fitting(self, person: Person | None) -> Fitting | None:
         """Voice in which a person speaks the text; None for a recording and a request without text."""
-        from tts2face.sound.fitting import Fitting, fitting_voice
-
         spoken = self.request.spoken
         if spoken is None or not spoken.text:
             return None
@@ -139,8 +137,13 @@ class PreparedRequest:
         return replace(self, request=request, listening=listening_timeline(request) if has_partner else self.listening)
 
 
-def prepare(request: Request) -> PreparedRequest:
+def prepare(request: Request, person: Person | None = None) -> PreparedRequest:
     """Parse and check the text, marks and timeline of a request, in time linear in the length of the text.
+
+    Parameters
+    ----------
+    person
+        Who is shown, in whose voice a text is spoken that names none.
 
     Raises
     ------
@@ -154,7 +157,7 @@ def prepare(request: Request) -> PreparedRequest:
     for path in recordings(source).values():
         if not is_file(path):
             raise InputError(f"there is no recording {path}; check the path")
-    written = read_marks(request)
+    written = read_marks(request, person)
     text, notes = make_readable(written, request.language)
     prepared = PreparedRequest(
         request,
@@ -174,13 +177,17 @@ def prepare(request: Request) -> PreparedRequest:
     return prepared
 
 
-def read_marks(request: Request) -> MarkedText:
-    """Text of a request with its marks; errors as `parse_marks`."""
+def read_marks(request: Request, person: Person | None = None) -> MarkedText:
+    """Text of a request with its marks, whose pitches in Hz are those of a person's voice; errors as `parse_marks`."""
     source, spoken = request.source, request.spoken
 
     def voice_hz(name: str | None, language: str) -> float:
         of_request = spoken or Spoken("")
-        return usual_pitch_hz(name or of_request.voice, language) * semitones_factor(of_request.voice_pitch)
+        named, pitch = name or of_request.voice, of_request.voice_pitch
+        if named is None:
+            fitting = fitting_voice(person, language_code(language))
+            named, pitch = fitting.name, pitch + fitting.prosody.pitch
+        return usual_pitch_hz(named, language) * semitones_factor(pitch)
 
     language, has_emphasis = request.language, spoken is not None
     return parse_marks(source.text, language, request.markup, has_emphasis=has_emphasis, voice_hz=voice_hz)
@@ -207,19 +214,21 @@ def _notes_on(source: Source) -> tuple[str, ...]:
     return sound_notes(found)
 
 
-def prepare_request(text: str | Request | PreparedRequest, options: dict[str, Any]) -> PreparedRequest:
-    """Prepare a text with options by name, or a complete request, once."""
+def prepare_request(
+    text: str | Request | PreparedRequest, options: dict[str, Any], person: Person | None = None
+) -> PreparedRequest:
+    """Prepare a text with options by name, or a complete request, once; `person` as for `prepare`."""
     known = _option_names(Request)
     for name in options:
         if name not in known:
             raise InputError(f"there is no option {name!r}; the options are {', '.join(known)}")
     if isinstance(text, str):
-        return prepare(Request(text=text, **options))
+        return prepare(Request(text=text, **options), person)
     if options:
         raise InputError(
             f"the option {next(iter(options))!r} cannot be given with a complete request; set it in the request"
         )
-    return prepare(text) if isinstance(text, Request) else text
+    return prepare(text, person) if isinstance(text, Request) else text
 
 
 def split_picture(picture: Picture | None, options: dict[str, Any]) -> tuple[Picture, dict[str, Any]]:

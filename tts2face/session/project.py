@@ -108,7 +108,7 @@ class Project:
 
     def prepare(self) -> PreparedRequest:
         """The request with all that the project adds, for every method of a session; raises as `prepare`."""
-        prepared = prepare(self.request)
+        prepared = prepare(self.request, self.models.shown_person())
         if not self.request.has_gestures:
             return replace(prepared, dictionary=self._entries(prepared), edges=self.edges, excluded=self.excluded)
         silent = Timeline(gains=Gains(dict.fromkeys(self.silent_features, 0.0)))

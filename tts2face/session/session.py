@@ -356,7 +356,7 @@ class Session:
 
     def _prepared(self, text: str | Request | PreparedRequest, options: dict[str, Any]) -> PreparedRequest:
         """A request with the seed of the face, where it has none."""
-        return prepare_request(text, options).with_seed(self._models.seed)
+        return prepare_request(text, options, self._models.person).with_seed(self._models.seed)
 
     def _write(
         self,

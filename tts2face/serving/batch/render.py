@@ -267,12 +267,13 @@ class SegmentSpeech:
     def _prepared(self, spoken: Spoken, at: int, words: Sequence[str] | None = None) -> PreparedRequest:
         """The request of a part, of which only the first words may be kept."""
         if words is None and not self._segment.parts:
-            return prepare(replace(self._request, source=spoken))
+            return prepare(replace(self._request, source=spoken), self._segment.models.shown_person())
         part, first = self._parts[at], sum(part.n_letters for part in self._parts[:at])
         if self._segment.parts:
             spoken = replace(spoken, lead=part.lead_frames / self.fps)
         last = first + (part.n_letters if words is None else sum(map(n_letters, words)))
-        return replace(prepare(replace(self._request, source=spoken)), excerpt=Excerpt(first, last))
+        whole = prepare(replace(self._request, source=spoken), self._segment.models.shown_person())
+        return replace(whole, excerpt=Excerpt(first, last))
 
 
 @lru_cache(maxsize=1)
