@@ -346,5 +346,6 @@ def _gain(sound: Waveform, runs: Sequence[StyleRun], part: Phrase, times: WordTi
 def _scale_speech(speech: Speech, volume: float, gain: FloatArray) -> Speech:
     """Speech times a volume and a gain, limited to full scale, from which motion is computed."""
     samples = apply_volume(speech.waveform.samples, volume)
-    scaled = samples if len(gain) == 1 else apply_volume(samples * gain, 1.0)
+    # limited: scaled as a whole, what is not louder would become softer
+    scaled = samples if len(gain) == 1 else np.clip(samples * gain, -1.0, 1.0)
     return replace(speech, waveform=Waveform(scaled, speech.waveform.rate))

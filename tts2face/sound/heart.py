@@ -31,7 +31,7 @@ from tts2face.sound.heart_letters import (
     lettered_parts,
 )
 from tts2face.sound.heart_network import DURATION_STEP_S, FRAME_S, HeartNetwork
-from tts2face.sound.heart_spectrum import creak_to_harmonics, match_energy, samples_of, spectrum
+from tts2face.sound.heart_spectrum import creak_to_harmonics, is_heard, match_energy, samples_of, spectrum
 from tts2face.sound.hibari_voices import USUAL_VOICE, hibari_voice, read_model
 from tts2face.sound.prosody import PLAIN_PROSODY, Prosody
 from tts2face.sound.psola import even_stretch, resynthesize
@@ -145,7 +145,7 @@ class NeuralVoice:
         tune = Tune(replace(prosody, pitch=prosody.pitch - in_sound), _placed(part, steps), part.movements)
         sound = unchanged
         if not tune.is_plain:
-            shaped = shape_pitch(frames.f0, frame_times(len(frames.f0)), tune)
+            shaped = shape_pitch(frames.f0, frame_times(len(frames.f0)), tune, is_heard(plain))
             frames = creak_to_harmonics(frames, shaped.f0, shaped.moved) if shaped.moved else frames
             changed = spectrum(frames, shaped.f0, seed)
             sound = _limited(samples_of(match_energy(changed, plain, shaped.moved)))

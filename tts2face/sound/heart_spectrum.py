@@ -16,8 +16,10 @@ Spectrum = NDArray[np.complex64]
 MATCH_BINS, MATCH_FRAMES = 15, 3  # 300 Hz hold a harmonic of every F0
 MOST_MATCH_DB = 14.0
 SMOOTH_BINS = 9  # of 20 Hz, over old harmonics
-FREE_DOWN = 3.0  # nepers
+FREE_DOWN = 6.0  # nepers; with 3 the old period is heard in one of 56 ends
 CREAK_FRAMES = 4  # of the onset of both
+FRAMES_BEHIND, CREAK_BINS = 8, 50  # behind a movement creak goes on; up to 1 kHz, which leaves bursts of stops
+HEARD_DB = 30.0
 LEAST_POWER = 1e-8
 
 
@@ -53,15 +55,28 @@ def samples_of(spectrum_of_frames: Spectrum) -> NDArray[np.float32]:
 
 def creak_to_harmonics(frames: Frames, f0: FloatArray, spans: tuple[tuple[int, int], ...]) -> Frames:
     """Frames whose free branch gives its energy to the harmonics within spans of voiced frames."""
-    share = np.zeros(len(f0), np.float32)
+    share, behind = np.zeros(len(f0), np.float32), np.zeros(len(f0), np.float32)
     for first, end in spans:
         onset = np.clip((np.arange(first, end) - first) / CREAK_FRAMES, 0.0, 1.0)
         share[first:end] = np.maximum(share[first:end], onset)
+        behind[end : end + FRAMES_BEHIND] = 1.0
     share *= np.asarray(f0) > 0
     both = np.exp(2 * frames.harmonic) + np.exp(2 * frames.free)
     joint = np.log(_moving_mean(both, SMOOTH_BINS, 0) + 1e-9) / 2
     harmonic = frames.harmonic + share * (np.maximum(joint, frames.harmonic) - frames.harmonic)
-    return frames._replace(harmonic=harmonic.astype(np.float32), free=frames.free - share * np.float32(FREE_DOWN))
+    free = frames.free - share * np.float32(FREE_DOWN)
+    free[:CREAK_BINS] -= behind * np.float32(FREE_DOWN)
+    # phases that change between old harmonics are echoes of the old period
+    angle = np.pi * np.tanh(frames.harmonic_phase)
+    smooth = np.arctan2(_moving_mean(np.sin(angle), SMOOTH_BINS, 0), _moving_mean(np.cos(angle), SMOOTH_BINS, 0))
+    phase = np.where(share > 0.0, np.arctanh(np.clip(smooth / np.pi, -0.999, 0.999)), frames.harmonic_phase)
+    return frames._replace(harmonic=harmonic.astype(np.float32), harmonic_phase=phase.astype(np.float32), free=free)
+
+
+def is_heard(values: Spectrum) -> NDArray[np.bool_]:
+    """Whether each frame (T,) of a spectrum is loud enough to be heard beside the loudest one."""
+    power = _frames(_power(values))
+    return np.asarray(power > 10 ** (-HEARD_DB / 10) * power.max())
 
 
 def match_energy(changed: Spectrum, plain: Spectrum, spans: tuple[tuple[int, int], ...] = ()) -> Spectrum:

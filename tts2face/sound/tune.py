@@ -65,19 +65,23 @@ class Tune:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShapedPitch:
-    """F0 (T,) in Hz, and where its movements lie: pairs of frames, half-open."""
+    """F0 (T,) in Hz, and where the movement of its last word lies: pairs of frames, half-open."""
 
     f0: FloatArray
     moved: tuple[tuple[int, int], ...]
 
 
-def shape_pitch(f0: NDArray[np.floating], times: FloatArray, tune: Tune) -> ShapedPitch:
+def shape_pitch(
+    f0: NDArray[np.floating], times: FloatArray, tune: Tune, heard: NDArray[np.bool_] | None = None
+) -> ShapedPitch:
     """F0 with prosody, tones and movements.
 
     Parameters
     ----------
     f0, times : (T,)
         F0 in Hz, below `VOICED_HZ` where there is no voice, and its times in seconds.
+    heard : (T,)
+        Whether the voice is loud enough that movements end there; None: everywhere.
     """
     voiced = np.asarray(f0) > VOICED_HZ
     if tune.is_plain or not voiced.any():
@@ -95,8 +99,9 @@ def shape_pitch(f0: NDArray[np.floating], times: FloatArray, tune: Tune) -> Shap
         above += np.interp(shares, points[:, 0], points[:, 1]) * _within(times, words[0].start, words[-1].end)
     moved = []
     for movement in tune.movements:
-        above, span = _moved(above, times, voiced, tune, movement)
-        moved.append(span)
+        above, span = _moved(above, times, voiced if heard is None else voiced & heard, tune, movement)
+        # only there the voice creaks: elsewhere a changed spectrum is understood less well (20.4 for 14.9 %)
+        moved += [span] if movement.until + 1 == len(tune.words) else []
     low, high = LIMITS_HZ
     shift = 2.0 ** (tune.prosody.pitch / SEMITONES)
     lowest = max(low * min(shift, 1.0), LOWEST_HZ)
