@@ -73,7 +73,7 @@ def parse_pitch(written: str, voice_hz: float, added: float = 0.0) -> float:
     voice_hz
         Usual pitch of the voice.
     added
-        Semitones that are added to it already: a pitch in Hz replaces them.
+        Semitones that are added to it already: a pitch in Hz replaces them, as far as `PITCH_LIMITS` reach.
     """
     value = written.strip()
     match = _CHANGE.fullmatch(value)
@@ -96,7 +96,10 @@ def parse_pitch(written: str, voice_hz: float, added: float = 0.0) -> float:
         raise InputError(f"the pitch {written[:40]!r} has no unit; use semitones (+2st), per cent (-10%) or Hz (180Hz)")
     if factor <= 0.0:
         raise InputError(f"a pitch of {written[:40]!r} leaves none; use a smaller change, as -20%")
-    return SEMITONES_PER_OCTAVE * math.log2(factor)
+    semitones = SEMITONES_PER_OCTAVE * math.log2(factor)
+    if unit == "hz" and not match["sign"]:
+        return min(max(added + semitones, PITCH_LIMITS[0]), PITCH_LIMITS[1]) - added
+    return semitones
 
 
 def parse_range(written: str, voice_hz: float) -> float:

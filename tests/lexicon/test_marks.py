@@ -148,7 +148,7 @@ def test_speeds(written: str, rate: float) -> None:
         ("<prosody pitch='higher'>a</prosody>", "cannot read the pitch 'higher'; use semitones"),
         ("<prosody pitch='+2'>a</prosody>", "pitch '.2' has no unit; use semitones"),
         ("<prosody pitch='-100%'>a</prosody>", "a pitch of '-100%' leaves none"),
-        ("<prosody pitch='900Hz'>a</prosody>", "pitch within <prosody> must lie between -12 and 12 semitones, not 29"),
+        ("<prosody pitch='+900Hz'>a</prosody>", "pitch within <prosody> must lie between -12 and 12 semitones, not 32"),
         ("<prosody range='wide'>a</prosody>", "no range 'wide'; use x-low"),
         ("<prosody range='300%'>a</prosody>", "range within <prosody> must lie between 0 and 2, not 4"),
         ("<prosody contour='up'>a</prosody>", r"cannot read the contour 'up'; write up to 100 points"),

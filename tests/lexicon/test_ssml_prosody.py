@@ -21,7 +21,7 @@ def ssml(inside: str) -> MarkedText:
     [
         ("medium", 0.0), ("default", 0.0), ("x-low", -6.0), ("high", 3.0), ("+2st", 2.0), ("-1.5 st", -1.5),
         ("+2ST", 2.0), ("+10%", 1.6500), ("10%", 1.6500), ("-20%", -3.8631), ("+20Hz", 1.6500), ("-20hz", -1.8240),
-        ("100Hz", -12.0), ("400Hz", 12.0),
+        ("100Hz", -12.0), ("400Hz", 12.0), ("900Hz", 12.0), ("20Hz", -12.0),
     ],
 )  # fmt: skip
 def test_pitches(written: str, semitones: float) -> None:
