@@ -57,8 +57,10 @@ def phrase_words(
             )
             for end in (span.start, span.end)
         )
-        for at in range(first, min(max(last, first + 1), len(words))):  # of a part of a word the whole
-            toned[at] = replace(toned[at], tone=span.tone)
+        # of a part of a word the whole, but not of a sentence without spaces
+        if last <= first < len(words) and 2 * len(_letters(written[span.start : span.end])) >= len(keys[first]):
+            last = first + 1
+        toned[first:last] = (replace(word, tone=span.tone) for word in toned[first:last])
     return tuple(toned)
 
 

@@ -72,6 +72,13 @@ def test_other_languages_emphasise_common_and_long_words() -> None:
     assert emphasised("Das ist *sehr* gut.", "de") == [("sehr", 1.0)]
 
 
+def test_in_writing_without_spaces_asterisks_are_left_out() -> None:
+    assert emphasised("これは*とても*いい。", "ja") == [("とても", 1.0)]
+    (sentence,) = split_sentences(parse_marks("これは*とても*いい。", "ja"), "ja")
+    assert sentence.utterances[0].source == "これはとてもいい。"
+    assert not any(word.tone.emphasis for word in sentence.utterances[0].words)
+
+
 def test_emphasis_nods_and_a_mark_within_it_ends_it() -> None:
     found = parse_marks("It is *not* here, *so [pause 1] there*.")
     assert found.marks[0] == NodMark(6, 1.0)

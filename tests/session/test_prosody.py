@@ -11,7 +11,8 @@ from tts2face.request import Request
 from tts2face.session.prepared import prepare, read_marks
 from tts2face.session.speech import prosody_of, sentence_sound, speak_sentence
 from tts2face.sound.prosody import Prosody
-from tts2face.sound.voice_pool import SHIPPED_VOICES, TYPICAL_HZ, usual_pitch_hz
+from tts2face.sound.voice_pool import SHIPPED_VOICES, TYPICAL_HZ, VoicePool, usual_pitch_hz
+from tts2face.types import Waveform
 
 TEXT = "We were away a year ago."
 
@@ -81,6 +82,44 @@ def test_the_pitch_of_every_voice_is_known_or_that_of_its_sex() -> None:
 def test_prosody_out_of_range_is_refused(text: str, options: dict, reason: str) -> None:
     with pytest.raises(InputError, match=reason):
         prepare(Request(text=f"<speak>{text}</speak>", **options))
+
+
+def f0_of(sound: Waveform) -> np.ndarray:
+    """F0 of the voiced frames, in semitones over 1 Hz."""
+    from parselmouth import Sound
+
+    pitch = Sound(sound.samples.astype(float), sound.rate).to_pitch_ac(0.01, 50, very_accurate=True, pitch_ceiling=500)
+    hz = pitch.selected_array["frequency"]
+    return 12 * np.log2(hz[hz > 0])
+
+
+def test_a_real_voice_does_what_it_is_asked(voices: VoicePool) -> None:
+    voice = voices.voice("heart", "en-us", {})
+    said = {}
+    for name, text, options in (
+        ("plain", TEXT, {}),
+        ("high", TEXT, {"voice_pitch": 3}),
+        ("marked", f'<speak><prosody pitch="+3st">{TEXT}</prosody></speak>', {}),
+        ("even", TEXT, {"voice_range": 0.3}),
+        ("long", f'<speak><prosody duration="2s">{TEXT}</prosody></speak>', {}),
+        ("stressed", TEXT.replace("away", "AWAY"), {}),
+    ):
+        request = Request(text=text, seed=0, **options)
+        said[name] = speak_sentence(voice, sentence(request), request)
+    tones = {name: f0_of(spoken.sound) for name, spoken in said.items()}
+    middle = {name: np.median(tone) - np.median(tones["plain"]) for name, tone in tones.items()}
+    assert middle["high"] == pytest.approx(3.0, abs=0.5)
+    assert middle["marked"] == pytest.approx(3.0, abs=0.7)
+    spread = {name: np.ptp(np.percentile(tone, [10, 90])) for name, tone in tones.items()}
+    assert spread["even"] < 0.5 * spread["plain"]
+    words = {name: {word.text.strip("."): word for word in spoken.speech.words} for name, spoken in said.items()}
+    seconds = {
+        name: np.diff(said[name].speech.phones.edges[[found["away"].first, found["away"].last]])[0]
+        for name, found in words.items()
+    }
+    assert seconds["stressed"] > 1.1 * seconds["plain"]
+    edges = said["long"].speech.phones.edges
+    assert edges[words["long"]["ago"].last] - edges[words["long"]["We"].first] == pytest.approx(2.0, abs=0.1)
 
 
 def test_notes_on_a_document_are_those_of_its_request() -> None:
