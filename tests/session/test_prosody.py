@@ -7,9 +7,11 @@ from lexicon.errors import InputError
 from lexicon.sentences import Phrase, Sentence, split_sentences
 from tests.tones import LetterVoice
 from tts2face.models.palette import PLAIN, Delivery
+from tts2face.models.person import Person
 from tts2face.request import Request
 from tts2face.session.prepared import prepare, read_marks
 from tts2face.session.speech import prosody_of, sentence_sound, speak_sentence
+from tts2face.sound.fitting import fitting_voice
 from tts2face.sound.prosody import Prosody
 from tts2face.sound.voice_pool import SHIPPED_VOICES, TYPICAL_HZ, VoicePool, usual_pitch_hz
 from tts2face.types import Waveform
@@ -82,6 +84,14 @@ def test_the_pitch_of_every_voice_is_known_or_that_of_its_sex() -> None:
 def test_prosody_out_of_range_is_refused(text: str, options: dict, reason: str) -> None:
     with pytest.raises(InputError, match=reason):
         prepare(Request(text=f"<speak>{text}</speak>", **options))
+
+
+def test_pitches_in_hz_are_those_of_the_voice_that_fits_the_face() -> None:
+    request, child = Request(text='<speak><prosody pitch="150Hz">We were away.</prosody></speak>'), Person("female", 6)
+    pitches = [prepare(request, person).text.runs[0].tone.pitch for person in (None, child)]
+    shift = fitting_voice(child, "en-us").prosody.pitch
+    assert shift > 1.0
+    assert pitches == pytest.approx([12 * np.log2(150 / 198.8), 12 * np.log2(150 / 198.8) - shift])
 
 
 def f0_of(sound: Waveform) -> np.ndarray:
