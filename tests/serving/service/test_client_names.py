@@ -63,6 +63,7 @@ def test_each_name_has_the_nearest_voice() -> None:
     assert chosen("alloy", "Guten Morgen.") == ("espeak-female", "de")
     assert chosen("alloy", "Guten Morgen.", "en-us") == ("heart", "en-us")
     assert chosen("alloy", "Guten Morgen.", "b") == ("heart", "en-gb")
+    assert chosen("auto", "Guten Morgen.") == ("auto", "de")
     assert chosen("heart", "Guten Morgen.") == ("heart", "en-us")  # which speaks English only
     assert chosen("espeak", "Guten Morgen.") == ("espeak", "de")
     assert {chosen(name)[0] for name in OPENAI_VOICES} <= {"heart", *MEN}

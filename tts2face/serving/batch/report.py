@@ -57,7 +57,7 @@ def shown_face(models: Models) -> str:
 
 
 def _voice(casting: Casting) -> str:
-    return spoken_voice(casting.models, casting.request)
+    return spoken_voice(casting.models, casting.request).described
 
 
 def measure_plan(

@@ -13,7 +13,7 @@ from tts2face.request import AUTO, DRAWN_FACE, Request
 from tts2face.serving.batch.cast import MODEL_NAMES, REQUEST_NAMES, SILENT, Cast, Role
 from tts2face.serving.batch.lines import NO_SETTINGS, Lines, LineSettings
 from tts2face.session.named_models import Models
-from tts2face.sound.fitting import fitting_voice
+from tts2face.sound.fitting import Fitting, fitting_voice
 from tts2face.sound.shipped_voices import SHIPPED_VOICES
 from tts2face.sound.voice_pool import find_voice, has_voice, is_installed, speaks
 
@@ -146,12 +146,12 @@ def shown_name(speaker: str, casting: Casting | None) -> str:
     return f"{UNNAMED} {casting.other + 1}" if casting is not None and casting.other else UNNAMED
 
 
-def spoken_voice(models: Models, request: Mapping[str, Any]) -> str:
-    """Name of the voice of a speaker: the chosen one, or the one that fits the face."""
+def spoken_voice(models: Models, request: Mapping[str, Any]) -> Fitting:
+    """Voice of a speaker: the chosen one, or the one that fits the face."""
     voice = request.get("voice")
     if voice not in (None, AUTO):
-        return str(voice)
-    return fitting_voice(models.shown_person(), language_code(str(request.get("language", Request().language)))).name
+        return Fitting(str(voice))
+    return fitting_voice(models.shown_person(), language_code(str(request.get("language", Request().language))))
 
 
 def other_face(
@@ -167,7 +167,7 @@ def other_face(
         Whether only the voice is another one, for exports, which hold one face.
     """
     language = language_code(str(request.get("language", Request().language)))
-    own = spoken_voice(models, request)
+    own = spoken_voice(models, request).name
     usable = [name for name in SHIPPED_VOICES if name != own and speaks(name, language) and is_installed(name)]
     is_male = has_voice(own) and find_voice(own).sex == "male"
     wanted = "female" if is_male == (number % 2 == 1) else "male"

@@ -184,9 +184,11 @@ def choose_voice(name: str, language: str | None, text: str, adjustments: Adjust
     kind = voice_kind(name)
     if kind is None:
         check_voice(name)
-        spoken = next(voice.languages for voice in catalogue.voices() if voice.name == name)
+        spoken = next((voice.languages for voice in catalogue.voices() if voice.name == name), None)
         if language is None:
             guessed = guess_language(text)
+            # the voice that fits a face speaks any language
+            spoken = spoken or (guessed,)
             language = next((code for code in (guessed, DEFAULT_LANGUAGE) if code in spoken), spoken[0])
             adjustments.note_language(language)
         return name, KOKORO_LANGUAGES.get(language, language)
