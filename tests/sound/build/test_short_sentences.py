@@ -9,7 +9,8 @@ from lexicon.sequence import SILENCE
 from tests.packages import needs
 from tts2face.sound.delivery import speak_with
 from tts2face.sound.prosody import Prosody
-from tts2face.sound.voice_pool import JOE_PACKAGE, load_voice
+from tts2face.sound.shipped_voices import JOE_PACKAGE
+from tts2face.sound.voice_pool import load_voice
 
 SUBJECTS = ("He", "She", "Bob", "It", "We", "Nobody", "Anna", "That", "Tom")
 VERBS = ("left", "ate", "came", "stopped", "agreed", "tried", "saw it", "owes me", "is up", "went", "laughed", "asked")
