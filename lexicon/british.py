@@ -154,7 +154,7 @@ def _stressed_as(word: Segments, pattern: Segments) -> Segments:
 def in_british_phones(american: Segments, word: str) -> Segments:
     """British phones of an American pronunciation: without /ɹ/ before consonants, with the vowels of lot and goat.
 
-    The spelling tells lot (o) from palm (a), and where /j/ is kept (tune, new).
+    The spelling separates lot (o) from palm (a), and shows where /j/ is kept (tune, new).
     """
     return tuple(_converted(american, word))
 

@@ -61,7 +61,7 @@ def _entry_before(text: bytes, low: int, middle: int) -> int:
 
 
 def _find(text: bytes, word: str) -> dict[str, str | None]:
-    """Letters of a word by part of speech, by bisection; DEFAULT where they are not told apart, none for no word."""
+    """Letters of a word by part of speech, by bisection; DEFAULT where all have one, none for no word."""
     key = word.encode()
     low, high = 1, len(text) - 1
     while low < high:

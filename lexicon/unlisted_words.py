@@ -2,19 +2,22 @@
 
 import re
 from collections.abc import Sequence
+from types import MappingProxyType
 
 from lexicon.english import fold_to_arpabet
 from lexicon.foreign_spellings import read_foreign_spelling
 from lexicon.g2p import DEFAULT_LANGUAGE, segments_by_rules
 from lexicon.ipa import IpaPhone
 
-# Two consonants with which no English word begins: espeak-ng spells the first of them (vlog, Zlatan, Dnipro, Tchad).
+# Two consonants with which no English word begins: espeak-ng spells the first of them (vlog, Zlatan, Dnipro).
 _ODD_START = re.compile(
-    r"(?:v(?=[lr][aeiouy])|z(?=[bdgklmnrvw][aeiouylr])|t(?=ch)|t(?=[zsln][aeiouyhw])|d(?=[nlv][aeiouyi])|"
-    r"k(?=[vtsj][aeiouy])|c(?=[tsv][aeiouyi])|chth|phth)",
+    r"(?:v(?=[lr][aeiouy])|z(?=[bdgklmnrvw][aeiouylr])|t(?=ch)|t(?=[zslnm][aeiouyhw])|d(?=[nlv][aeiouyi])|"
+    r"k(?=[vtsj][aeiouy])|c(?=[tsv][aeiouyi])|g(?=[vdz][aeiouy])|s(?=[vbr][aeiouy])|chth|phth)",
     re.IGNORECASE,
 )
-_SOUND_OF_START = {"v": "v", "z": "z", "t": "t", "d": "d", "k": "k", "c": "k", "chth": "θ", "phth": "θ"}
+_SOUND_OF_START = MappingProxyType({
+    "v": "v", "z": "z", "t": "t", "d": "d", "k": "k", "c": "k", "g": "ɡ", "s": "s", "chth": "θ", "phth": "θ",
+})  # fmt: skip
 _NAME_IN_S = re.compile(r"[A-Z].*[^s][aiouy]s")
 
 

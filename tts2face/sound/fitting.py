@@ -89,7 +89,7 @@ def fitting_voice(person: Person | None, language: str) -> Fitting:
 
 
 def _foreign_accent(name: str, language: str) -> str:
-    """What is said where the voice of a language has another accent; empty where it has not."""
+    """Sentence about a voice whose accent is not that of the language; empty where it is."""
     if SHIPPED_VOICES[name].accent in {"", language} or not has_dictionary(language):
         return ""
     others = [other for other, info in SHIPPED_VOICES.items() if info.accent == language]
