@@ -25,6 +25,7 @@ from lexicon.languages import language_code
 from lexicon.marked_text import MAX_NESTING, MarkedText, MarkedTextBuilder, NameMark, NodMark, PauseMark, PhoneMark
 from lexicon.say_as import reads_kind, say_as
 from lexicon.ssml_leniency import (
+    APART,
     LANGUAGE,
     RENAMED,
     TRANSPARENT,
@@ -109,7 +110,7 @@ class _SsmlReader:
             "speak": self._speak,
             "p": self._stretch,
             "s": self._stretch,
-            "w": self._word,
+            "w": self._open_language,
             "break": self._break,
             "mstts:silence": self._silence,
             "emphasis": self._emphasis,
@@ -146,7 +147,7 @@ class _SsmlReader:
 
     def _start(self, tag: str, attributes: Attributes) -> None:
         name, renamed = RENAMED.get(tag, (tag, {}))
-        if (name == "speak") != (not self._elements):
+        if name != "speak" and not self._elements:
             raise InputError("<speak> must be the only root element; put everything into one")
         if len(self._elements) > 2 * MAX_NESTING:
             raise InputError(f"<{tag[:40]}> is nested in {len(self._elements)} others; reduce the nesting")
@@ -159,7 +160,8 @@ class _SsmlReader:
         self._n_unspoken += self._n_unspoken > 0 or name in UNSPOKEN
         if self._n_unspoken > 1:
             return
-        if name not in self._starts:
+        self._stand_apart(name)
+        if name not in self._starts or (name == "speak" and len(self._elements) > 1):
             shown = f"<{tag[:40]}> is not supported; its text is spoken"
             self._note(UNSPOKEN.get(name) or TRANSPARENT.get(name, shown))
             return
@@ -175,6 +177,8 @@ class _SsmlReader:
         if self._n_unspoken:
             self._n_unspoken -= 1
             return
+        if name != "w" and self._elements:  # behind a word 's may follow
+            self._stand_apart(name)
         if name in REPLACED_KINDS:
             self._speak_replacement(name)
         if pause_s:
@@ -206,10 +210,10 @@ class _SsmlReader:
         self._builder.add_text(STRETCH_ENDS[self._elements[-1]])
         self._open_language(attributes)
 
-    def _word(self, attributes: Attributes) -> None:
-        if self._builder.last_character.isalnum():  # words may stand side by side
+    def _stand_apart(self, name: str) -> None:
+        """Add a space between words that stand side by side in elements alone."""
+        if name in APART and self._builder.last_character.isalnum():
             self._builder.add_text(" ")
-        self._open_language(attributes)
 
     def _open_language(self, attributes: Attributes) -> None:
         """Begin a span of another language, if an element names one."""

@@ -35,7 +35,9 @@ UNSPOKEN: Mapping[str, str] = MappingProxyType({
 TRANSPARENT: Mapping[str, str] = MappingProxyType({
     "audio": "the sound of <audio> is not played; the text in it is spoken",
     "lookup": "<lookup> is not followed; its text is spoken",
+    "speak": "a <speak> within another one is read as its text",
 })  # fmt: skip
+APART = frozenset({"w", "audio", "speak", "media", "par", "seq"})  # whose words stand apart from those beside them
 _KNOWN: Mapping[str, str] = MappingProxyType({
     "speak": f"version {LANGUAGE}", "p": LANGUAGE, "s": LANGUAGE, "w": LANGUAGE, "lang": LANGUAGE,
     "break": "time strength",

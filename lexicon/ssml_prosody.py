@@ -8,7 +8,6 @@ from types import MappingProxyType
 from lexicon.errors import InputError
 from lexicon.marked_text import PITCH_LIMITS
 from lexicon.tones import Contour
-from lexicon.values.checks import check_limits
 
 SEMITONES_PER_OCTAVE = 12.0
 USUAL_RANGE = 7.6  # semitones from the 10th to the 90th percentile of F0 in read sentences, by which a range is counted
@@ -120,14 +119,14 @@ def parse_range(written: str, voice_hz: float) -> float:
 def parse_contour(written: str, voice_hz: float, added: float = 0.0) -> Contour:
     """Points of a contour: shares of the time, 0 to 1, with the semitones there; arguments as of `parse_pitch`.
 
-    Times without order are ordered, as of several points at one time the last one counts (SSML 1.1, 3.2.4).
+    Times without order are ordered, and of several points at one time the last one counts (SSML 1.1, 3.2.4). Points
+    beyond `PITCH_LIMITS` lie on them: those of Azure's own example are 16 semitones low.
     """
     points: dict[float, float] = {}
     at, text = 0, written.strip()
     while match := _POINT.match(text, at):
         pitch = parse_pitch(match[2], voice_hz, added)
-        check_limits("the pitch of a contour", round(pitch, 6), PITCH_LIMITS, " semitones")
-        points[min(float(match[1]) / 100, 1.0)] = pitch
+        points[min(float(match[1]) / 100, 1.0)] = min(max(pitch, PITCH_LIMITS[0]), PITCH_LIMITS[1])
         at = match.end()
     if at < len(text) or len(points) > MAX_POINTS:
         raise InputError(

@@ -83,7 +83,11 @@ def choose_voice(
     InputError
         The language does not exist, or the voice does not speak it.
     """
-    tag = attributes.get("xml:lang") or attributes.get("language") or attributes.get("languages", "").split(" ")[0]
+    tag = (
+        attributes.get("xml:lang")
+        or attributes.get("language")
+        or attributes.get("languages", "").split(" ")[0].partition(":")[0]
+    )
     spoken = language_code(tag) if tag else None
     gender = attributes.get("gender", "neutral").strip() or "neutral"
     if gender not in GENDERS:

@@ -23,12 +23,12 @@ MARK_PATTERN = re.compile(
     r"|\[(?P<name>/?(?:style|nod|pause)\b|phoneme(?=:)|/phoneme(?=\]))(?P<rest>[^\[\]]*)(?P<end>\]?)"
 )
 MAX_QUOTED_CHARACTERS = 40
-_SSML = re.compile(r"\ufeff?\s*<(?:speak[\s>/]|\?xml\s|!DOCTYPE\s)")
+_SSML = re.compile(r"\ufeff?\s*(?:<!--(?:[^-]|-(?!->))*+-->\s*)*+<(?:speak[\s>/]|\?xml\s|!DOCTYPE\s)")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
 
 
 def is_ssml(text: str) -> bool:
-    """Whether a text is SSML: it begins with ``<speak``, an XML or a document type declaration."""
+    """Whether a text is SSML: it begins with ``<speak``, an XML or a document type declaration, behind comments."""
     return _SSML.match(text) is not None
 
 

@@ -133,7 +133,6 @@ def test_speeds(written: str, rate: float) -> None:
 @pytest.mark.parametrize(
     ("inside", "reason"),
     [
-        ("<speak>a</speak>", "<speak> must be the only root element"),
         ("a\n\n<p>", "not well-formed: mismatched tag in line 3"),
         ("2 < 3", "not well-formed"),
         ("[nod]", "square brackets cannot be combined with SSML"),
@@ -153,7 +152,6 @@ def test_speeds(written: str, rate: float) -> None:
         ("<prosody range='300%'>a</prosody>", "range within <prosody> must lie between 0 and 2, not 4"),
         ("<prosody contour='up'>a</prosody>", r"cannot read the contour 'up'; write up to 100 points"),
         ("<prosody contour='(0%,+20Hz) up'>a</prosody>", "cannot read the contour"),
-        ("<prosody contour='(0%,+20st)'>a</prosody>", "pitch of a contour must lie between -12 and 12 semitones"),
         ("<prosody duration='long'>a</prosody>", "cannot read the time 'long' of a <prosody>"),
         ("<prosody rate='warp'>a</prosody>", "no rate 'warp'; use x-slow"),
         ("<prosody rate='300%'>a</prosody>", "rate within <prosody> must lie between 0.5 and 2, not 3"),

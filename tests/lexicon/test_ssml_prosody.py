@@ -55,6 +55,7 @@ def test_volumes_of_other_services(written: str, factor: float) -> None:
 
 def test_a_contour_is_ordered_and_its_last_point_at_one_time_counts() -> None:
     assert parse_contour("(50%,-2st) (0%, +2st),(50%,+1st)", VOICE_HZ) == ((0.0, 2.0), (0.5, 1.0))
+    assert parse_contour("(60%,-60%) (100%,+80%)", VOICE_HZ)[0] == (0.6, -12.0)
     ((_, pitch),) = parse_contour("(100%,200Hz)", VOICE_HZ, 3.0)
     assert pitch == pytest.approx(-3.0)
 
