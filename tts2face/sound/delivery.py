@@ -1,4 +1,4 @@
-"""Delivery of a sentence by any voice: its rate by the voice, pitch and formants by the voice or in its sound."""
+"""Delivery of a sentence by any voice: rate, pitch and formants by the voice, or in its sound (decision 259)."""
 
 from typing import Protocol, runtime_checkable
 
@@ -39,9 +39,8 @@ def speak_with(
     """
     if isinstance(voice, DeliveringVoice):
         return voice.deliver(content, prosody, seed)
-    speech = voice.speak(content, rate=prosody.rate, seed=seed)
     intended = intention(content, language)
-    speech = with_pauses(speech, content, prosody.rate, language)
+    speech = with_pauses(voice.speak(content, seed=seed), content, language)
     return retuned(speech, prosody, intended) if is_retuned(prosody, intended) else speech
 
 
@@ -54,4 +53,4 @@ def sound_with(
     # edges of words tell where these are
     if has_pauses(content) or is_retuned(prosody, intention(content, language)):
         return speak_with(voice, content, prosody, seed, language=language).waveform
-    return voice.sound(content, rate=prosody.rate, seed=seed)
+    return voice.sound(content, seed=seed)

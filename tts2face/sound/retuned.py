@@ -1,4 +1,4 @@
-"""Speech of a voice that has one pitch: its F0, formants and emphasised words are changed in the finished sound."""
+"""Speech of a voice that has one pitch: rate, F0, formants and emphasised words are changed in the finished sound."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -53,18 +53,11 @@ def intention(content: SpeechInput, language: str) -> Intention:
 
 def is_retuned(prosody: Prosody, intended: Intention) -> bool:
     """Whether `retuned` changes anything."""
-    unchanged = (prosody.pitch, prosody.range, prosody.formants)
-    return not intended.is_plain or unchanged != (PLAIN_PROSODY.pitch, PLAIN_PROSODY.range, PLAIN_PROSODY.formants)
+    return not intended.is_plain or prosody != PLAIN_PROSODY
 
 
 def retuned(speech: Speech, prosody: Prosody, intended: Intention) -> Speech:
-    """Speech with pitch, range and formants of a prosody, and with tones and movements; edges move with the sound.
-
-    Parameters
-    ----------
-    prosody
-        Its rate is not used: the voice has it.
-    """
+    """Speech with a prosody, tones and movements; edges move with the sound."""
     places = _matched(intended.words, [word.text for word in speech.words])
     words = [_placed(speech, span, intended, place) for span, place in zip(speech.words, places, strict=True)]
     spans = {place: at for at, place in enumerate(places) if place is not None}
@@ -74,7 +67,7 @@ def retuned(speech: Speech, prosody: Prosody, intended: Intention) -> Speech:
         if move.at in spans and move.until in spans
     ]
     tune = Tune(prosody, words, moves)
-    stretch = _stretch(words, speech.waveform.duration)
+    stretch = _stretch(words, speech.waveform.duration, prosody.rate)
     sound = resynthesize(
         speech.waveform,
         stretch,
@@ -127,12 +120,12 @@ def _placed(speech: Speech, span: WordSpan, intended: Intention, place: int | No
     return PlacedWord(start, end, (vowel_start, vowel_end), EVEN if place is None else intended.tones[place])
 
 
-def _stretch(words: Sequence[PlacedWord], duration: float) -> Stretch:
-    """Emphasised words are longer; what is between them lasts as before."""
+def _stretch(words: Sequence[PlacedWord], duration: float, rate: float) -> Stretch:
+    """Emphasised words are longer; all is faster by the rate."""
     times, factors = [0.0], [1.0]
     for word in words:
         if word.tone.emphasis and word.end - word.start > 2 * STRETCH_RAMP_S and word.start >= times[-1]:
             factor = EMPHASIS_LENGTH**word.tone.emphasis
             times += [word.start, word.start + STRETCH_RAMP_S, word.end - STRETCH_RAMP_S, word.end]
             factors += [1.0, factor, factor, 1.0]
-    return Stretch(np.array([*times, duration]), np.array([*factors, 1.0]))
+    return Stretch(np.array([*times, duration]), np.array([*factors, 1.0]) / rate)

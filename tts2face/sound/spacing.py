@@ -36,15 +36,13 @@ def has_pauses(content: SpeechInput) -> bool:
     return any(MARKS.intersection(word) for word in words[:-1])
 
 
-def with_pauses(speech: Speech, content: SpeechInput, rate: float, language: str) -> Speech:
+def with_pauses(speech: Speech, content: SpeechInput, language: str) -> Speech:
     """Speech of a content with the pauses of the table at its marks; words whose mark is unknown keep theirs.
 
     Edges behind a pause move with the sound.
 
     Parameters
     ----------
-    rate
-        By which pauses are shorter.
     language
         Code of the content.
     """
@@ -54,7 +52,7 @@ def with_pauses(speech: Speech, content: SpeechInput, rate: float, language: str
     for (word, following), mark in zip(pairwise(speech.words), _marks(speech, content, language), strict=False):
         if not mark or SILENCE not in phones[word.last : following.first]:
             continue
-        cuts += pause_cuts(levels, (float(edges[word.last]), float(edges[following.first])), PAUSES_S[mark] / rate)
+        cuts += pause_cuts(levels, (float(edges[word.last]), float(edges[following.first])), PAUSES_S[mark])
     if not cuts:
         return speech
     sound = respaced(speech.waveform, cuts)
