@@ -42,6 +42,12 @@ class ToneVoice:
     def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
         return self.speak(content, rate=rate, seed=seed).waveform
 
+    def deliver(self, content: SpeechInput, prosody: Prosody, seed: int) -> Speech:
+        return self.speak(content, rate=prosody.rate, seed=seed)
+
+    def deliver_sound(self, content: SpeechInput, prosody: Prosody, seed: int) -> Waveform:
+        return self.deliver(content, prosody, seed).waveform
+
 
 class LetterVoice:
     """A phone of 0.1 s and of constant level for each letter; `splits` words at hyphens, as some voices do."""
@@ -56,6 +62,12 @@ class LetterVoice:
 
     def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
         return self.speak(content, rate=rate, seed=seed).waveform
+
+    def deliver(self, content: SpeechInput, prosody: Prosody, seed: int) -> Speech:
+        return self.speak(content, rate=prosody.rate, seed=seed)
+
+    def deliver_sound(self, content: SpeechInput, prosody: Prosody, seed: int) -> Waveform:
+        return self.deliver(content, prosody, seed).waveform
 
     def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
         text = content if isinstance(content, str) else " ".join(word.text + word.after for word in content)
