@@ -230,6 +230,7 @@ def pronounce(text: str, language: str = DEFAULT_LANGUAGE, dictionary: Dictionar
         words = _words_by_espeak(text, language)
         for word in words:
             word.segments = own.lookup(word.text) or word.segments
+        words = [word for word in words if word.segments]  # espeak-ng is silent about the others
     words = [word for word in words if word.segments or any(map(str.isalpha, word.text))]  # no signs without words
     if not words:
         raise SilentTextError(NOTHING)
