@@ -145,6 +145,14 @@ def test_a_server_that_is_not_there_is_said(listed: dict[str, Any], monkeypatch:
 
 
 @pytest.mark.usefixtures("listed")
+def test_a_network_of_another_form_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "model.onnx").write_bytes(MODEL)
+    add_voice("fenrir", tmp_path / "model.onnx")
+    with pytest.raises(DataError, match="another form"):
+        load_voice("fenrir", "en-us")
+
+
+@pytest.mark.usefixtures("listed")
 def test_an_added_voice_speaks_and_is_chosen(tmp_path: Path) -> None:
     assert default_voice("en-gb") == "heart"
     with pytest.raises(BackendError, match="voices add emma"):

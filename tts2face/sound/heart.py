@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.british import LANGUAGE as BRITISH
-from lexicon.errors import import_of_extra
+from lexicon.errors import DataError, import_of_extra
 from lexicon.pauses import PAUSES_S
 from lexicon.pronounce import has_dictionary
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
@@ -33,6 +33,7 @@ from tts2face.sound.heart_letters import (
 from tts2face.sound.heart_network import DURATION_STEP_S, FRAME_S, HeartNetwork
 from tts2face.sound.heart_spectrum import creak_to_harmonics, is_heard, match_energy, samples_of, spectrum
 from tts2face.sound.hibari_voices import USUAL_VOICE, hibari_voice, read_model
+from tts2face.sound.onnx_part import onnx_errors
 from tts2face.sound.prosody import PLAIN_PROSODY, Prosody
 from tts2face.sound.psola import even_stretch, resynthesize
 from tts2face.sound.spacing import Cut, pause_cuts, respaced, respaced_times, sound_levels
@@ -96,7 +97,14 @@ class NeuralVoice:
         self._language = BRITISH if language == BRITISH and has_dictionary(BRITISH) else voice.language
         americanised = BRITISH_IN_AMERICAN if self._language == BRITISH else LETTERS_OF_PHONE
         self._alphabet = BRITISH_LETTERS if voice.is_british else americanised
-        self._network = HeartNetwork(read_model(name), run)
+        model = read_model(name)
+        try:
+            self._network = HeartNetwork(model, run)
+        except onnx_errors() as other:
+            raise DataError(
+                f"the network of the voice {name} has another form than this version reads; update tts2face, or run: "
+                f"tts2face voices remove {name}"
+            ) from other
         pronounce_content("Hello.", self._language, {})  # reads the dictionary while other models are loaded
 
     @cached_property

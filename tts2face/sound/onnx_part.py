@@ -60,6 +60,14 @@ def cut_model(model: bytes, inputs: Mapping[str, tuple[int, Shape]], outputs: Se
     return rest + _field(MODEL_GRAPH, b"".join(kept))
 
 
+def onnx_errors() -> tuple[type[Exception], ...]:
+    """Exceptions for damaged files of ONNX Runtime, which have no common base but Exception."""
+    from onnxruntime.capi import onnxruntime_pybind11_state as state
+
+    runtime = [error for error in vars(state).values() if isinstance(error, type) and issubclass(error, Exception)]
+    return TypeError, ValueError, KeyError, AttributeError, *runtime
+
+
 def _tensor_name(tensor: bytes) -> str:
     return next(field.content.decode() for field in _fields(tensor) if field.number == TENSOR_NAME)
 

@@ -25,6 +25,7 @@ from lexicon.values.json_text import read_json
 from tts2face.numeric.telemetry import disable_telemetry
 from tts2face.sound.aligned_speech import AlignedWord, aligned_speech
 from tts2face.sound.alignment import Align, Aligner
+from tts2face.sound.onnx_part import onnx_errors
 from tts2face.sound.voice import (
     PronunciationMap,
     SpeechInput,
@@ -189,14 +190,6 @@ def _load_session(path: Path) -> Any:
     if not inputs >= MODEL_INPUTS:
         raise DataError(f"{path} is not a Piper voice: its inputs are {', '.join(sorted(inputs))}; download it again")
     return session
-
-
-def onnx_errors() -> tuple[type[Exception], ...]:
-    """Exceptions for damaged files of ONNX Runtime, which have no common base but Exception."""
-    from onnxruntime.capi import onnxruntime_pybind11_state as state
-
-    runtime = [error for error in vars(state).values() if isinstance(error, type) and issubclass(error, Exception)]
-    return TypeError, ValueError, KeyError, AttributeError, *runtime
 
 
 class PiperVoice:
