@@ -84,7 +84,7 @@ def test_word_times_decide_where_ours_are_far_off() -> None:
 def test_a_sentence_that_is_expected_is_asked_for_once() -> None:
     with speech_server(speech=says) as server:
         voice = ServerVoice(server.url, VoiceSetting("en-us"))
-        voice.expect("Two.", 1.0)
+        voice.expect("Two.")
         voice.sound("One.")
         voice.sound("Two.")
     assert sorted(server.texts()) == ["One.", "Two."]
@@ -238,7 +238,7 @@ def test_clients_documents_and_files_cannot_name_a_url(tmp_path: Path) -> None:
 
 def test_the_next_sentence_is_asked_for_while_one_is_worked_on() -> None:
     with speech_server(speech=says) as server:
-        prepared = prepare(Request(text="One. Two. Three.", voice=server.url))
+        prepared = prepare(Request(text="One. Two. Three.", voice=server.url, rate=1.2))
         models = SpeechModels(fitted_voices(VoicePool(), None, {}))
         sentences = speak_sentences(prepared, models, has_phones=False)
         next(sentences)

@@ -170,13 +170,12 @@ def speak_sentence(
     )
 
 
-def expect_sentence(voice: Voice, sentence: Sentence, request: Request, deliveries: Deliveries = NO_DELIVERIES) -> None:
+def expect_sentence(voice: Voice, sentence: Sentence) -> None:
     """Let a voice that can begin with a sentence, while the one before it is worked on."""
     if isinstance(voice, ExpectingVoice):
         for part in sentence.utterances:
             if part.voice is None and part.language is None:
-                delivery = delivery_of(part, sentence.runs, request, deliveries)
-                voice.expect(phrase_content(part), prosody_of(part, request, delivery).rate)
+                voice.expect(phrase_content(part))
 
 
 def sentence_sound(

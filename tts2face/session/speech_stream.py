@@ -17,7 +17,7 @@ from lexicon.sentence_length import n_letters
 from lexicon.sentences import Sentence, text_prefix
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.gestures.timeline import Timeline
-from tts2face.request import CONVERSATION, TURN_S, Idle, Listening, Recorded, Request, Spoken
+from tts2face.request import CONVERSATION, TURN_S, Idle, Listening, Recorded, Spoken
 from tts2face.session.joining import JOIN_LEAD_S, Excerpt, excerpt_of_speech, shift_start, silent_speech, word_bounds
 from tts2face.session.phrase_delivery import NO_DELIVERIES, Deliveries, text_of
 from tts2face.session.prepared import IDLE_STEPS, PreparedRequest
@@ -293,7 +293,7 @@ def speak_sentences(
             lambda made: made.sound.samples.nbytes + made.speech.waveform.samples.nbytes,
         )
 
-    shortened = map(partial(_expected, voice, request, models.deliveries), prepared.sentences())
+    shortened = map(partial(_expected, voice), prepared.sentences())
     for (sentence, before_s, after_s), found, is_last in _spoken(shortened, speak):
         text = " ".join(phrase.source for phrase in sentence.utterances)
         spoken = found
@@ -306,10 +306,10 @@ def speak_sentences(
         yield from _ending(chain(before, [SpokenPart(spoken, sentence.n_characters, text)], after), is_last=is_last)
 
 
-def _expected(voice: Voice, request: Request, deliveries: Deliveries, sentence: Sentence) -> Shortened:
+def _expected(voice: Voice, sentence: Sentence) -> Shortened:
     """A sentence without its long silences, for which the voice is asked ahead."""
     shortened = without_long_silence(sentence)
-    expect_sentence(voice, shortened.sentence, request, deliveries)
+    expect_sentence(voice, shortened.sentence)
     return shortened
 
 

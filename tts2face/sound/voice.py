@@ -98,8 +98,8 @@ class Voice(Protocol):
 class ExpectingVoice(Protocol):
     """A voice that takes its time without work of this machine, and may be asked ahead."""
 
-    def expect(self, content: SpeechInput, rate: float) -> None:
-        """Begin with a sentence that will be spoken soon."""
+    def expect(self, content: SpeechInput) -> None:
+        """Begin with a sentence that will be spoken soon, at rate 1."""
 
 
 @dataclass(frozen=True, slots=True)

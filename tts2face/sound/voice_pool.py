@@ -301,12 +301,12 @@ class _SharedVoice:
         """Code of the language for which it was loaded."""
         return str(self.key[1])
 
-    def expect(self, content: SpeechInput, rate: float) -> None:
+    def expect(self, content: SpeechInput) -> None:
         name = self.key[0]
         if is_voice_url(name) or name in named_urls():  # others would be loaded for it
             with self.pool.borrow(self.key, self.load) as voice:
                 if isinstance(voice, ExpectingVoice):
-                    voice.expect(content, rate * self.prosody.rate)
+                    voice.expect(content)
 
     def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
         return self.deliver(content, Prosody(rate), seed)

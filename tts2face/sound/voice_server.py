@@ -230,7 +230,7 @@ class ServerVoice:
         self._wait = setting.wait
         self._rate_hz: int | None = None
         self._threads = ThreadPoolExecutor(N_AHEAD, "voice-server")
-        self._asked: OrderedDict[tuple[str, float], Future[Any]] = OrderedDict()
+        self._asked: OrderedDict[str, Future[Any]] = OrderedDict()
 
     @property
     def sample_rate(self) -> int:
@@ -240,11 +240,11 @@ class ServerVoice:
         assert self._rate_hz is not None
         return self._rate_hz
 
-    def expect(self, content: SpeechInput, rate: float) -> None:
+    def expect(self, content: SpeechInput) -> None:
         """Ask for the sound of a sentence that will be spoken soon."""
         text = written_text(content)
-        if text and (text, rate) not in self._asked:
-            self._asked[(text, rate)] = self._ask(text, rate)
+        if text and text not in self._asked:
+            self._asked[text] = self._ask(text, 1.0)
             while len(self._asked) > N_AHEAD:
                 self._asked.popitem(last=False)[1].cancel()
 
@@ -272,7 +272,8 @@ class ServerVoice:
     def _sound_of(self, text: str, rate: float) -> tuple[Waveform, list[tuple[str, float, float]]]:
         if not any(letter.isalnum() for letter in text):
             raise SilentTextError("there is nothing to say in the text; give at least one word")
-        asked = self._asked.pop((text, rate), None) or self._ask(text, rate)
+        asked = self._asked.pop(text, None) if rate == 1.0 else None
+        asked = asked or self._ask(text, rate)
         sound, stated = self._wait(asked)
         self._rate_hz = self._rate_hz or sound.rate
         if sound.rate != self._rate_hz:
