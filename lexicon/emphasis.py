@@ -25,6 +25,10 @@ _CAPITALS = re.compile(r"(?<![\w.&/@#+'’-])[^\W\d_a-z]{2,}(?:['’][^\W\d_a-z]
 _SMALL = re.compile(r"[^\W\d_A-Z]{2}")
 _WORD = re.compile(r"[^\W\d_]+")
 _SENTENCE_START = re.compile(r"(?:\A|[.!?:…]['\"”’)]{0,3}\s)\s*\Z")
+_STRETCHED = re.compile(r"(.)\1{2,}")  # SOOO, YESSS, COOOL
+_AFTER_NUMBER = re.compile(r"[0-9]\s*\Z")  # 5 AM, 12 IN
+_AFTER_TOWN = re.compile(r"[A-Z][a-z]+, \Z")  # Portland, OR 97201
+MAX_CODE_LETTERS = 2  # of units, halves of the day and states
 _BEFORE = 24  # characters before a word that hold the word before it
 
 
@@ -109,8 +113,12 @@ def _is_emphasised(line: str, match: "re.Match[str]", language: str) -> bool:
     if not word.isupper() or line[match.end() : match.end() + 1] == ":":
         return False  # the second: WARNING:, ANNA: or [EMOTION: calm] names what follows
     if language.partition("-")[0] == "en":
+        may_be_code = _AFTER_NUMBER.search(before) or _AFTER_TOWN.search(before)
+        if len(word) <= MAX_CODE_LETTERS and may_be_code:
+            return False
         words = _WORD.findall(before)
-        return is_word_in_capitals(word, words[-1] if words else "")
+        spellings = {word, _STRETCHED.sub(r"\1", word), _STRETCHED.sub(r"\1\1", word)}
+        return any(len(one) > 1 and is_word_in_capitals(one, words[-1] if words else "") for one in spellings)
     return word.casefold() in common_words(language) or len(word) >= MIN_FOREIGN_LETTERS
 
 

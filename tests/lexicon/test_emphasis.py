@@ -31,6 +31,7 @@ def emphasised(text: str, language: str = "en-us") -> list[tuple[str, float]]:
         ("I said no! Not now, not EVER.", ["ever"]),
         ("Don't you DARE, I DON'T like it.", ["dare", "don't"]),
         ("WHO did that? WE did.", ["Who", "We"]),
+        ("That is SOOO good and COOOL, YESSS!", ["sooo", "coool", "yesss"]),
         ("It is *not* here, **really** not, ***ever***.", ["not", "really", "ever"]),
         ("She paid *$5* for *it*.", ["$5", "it"]),
         ('"*Please*," he said (*slowly now*).', ["Please", "slowly now"]),
@@ -45,8 +46,9 @@ def test_words_are_emphasised(text: str, words: list[str]) -> None:
     [
         "NASA and the FBI agreed.",
         "NATO, OPEC and the WHO met in the US.",
-        "JPEG, PNG and GIF files, ASAP, FYI.",
+        "JPEG, PNG and GIF files, ASAP, FYI, AAA, WWW and XXX.",
         "The GPU has VRAM for CUDA, HTTP 500, GPT-4o, AC/DC, U.S., R&D and A4.",
+        "At 5 AM or 10 PM, 12 IN wide, in Portland, OR 97201, and Columbus, OH.",
         "Henry VIII, King Charles III and Pope Leo XIV met.",
         "MAN: (whispering) get down",
         "WARNING: do it now",
