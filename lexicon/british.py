@@ -83,7 +83,7 @@ def _word(word: str, american: Segments, *, is_last: bool) -> Segments:
     plain = in_british_phones(american, word)
     if len(word) > 1 and is_initialism(word):
         return _spelled(word) or plain
-    readings = {tag: _segments(letters) for tag, letters in misaki_readings(word, "gb").items() if letters}
+    readings = {tag: _segments(letters) for tag, letters in misaki_readings(word, "gb").items()}
     if is_homograph(word):
         same = [reading for reading in readings.values() if _is_same_reading(reading, plain)]
         return min(same, key=lambda reading: _other_stresses(reading, plain), default=plain)
@@ -106,7 +106,7 @@ def _of_parts(word: str) -> Segments | None:
 
 def _look_up(word: str) -> Segments | None:
     readings = misaki_readings(word, "gb")
-    return _segments(readings[DEFAULT] or "") if readings else None
+    return _segments(readings[DEFAULT]) if readings else None
 
 
 def _segments(letters: str) -> Segments:

@@ -36,13 +36,7 @@ def load_reader() -> Any:
 
 
 def to_kana(text: str) -> str:
-    """Spoken form in katakana (particles wa and e, long vowels, numbers), with spaces between accent phrases.
-
-    Raises
-    ------
-    BackendError
-        The library is not installed.
-    """
+    """Spoken form in katakana (particles wa and e, long vowels, numbers), with spaces between accent phrases."""
     read = load_reader().run_frontend
     return " ".join("".join(_kana_pieces(read(chunk))).strip() for chunk in split_chunks(text, MAX_CHARACTERS, "ja"))
 

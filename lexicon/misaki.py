@@ -6,7 +6,6 @@ Each is JSON text, sorted, and searched by bisection: parsed as tables they take
 import functools
 import gzip
 import importlib.util
-import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -27,6 +26,7 @@ PHONE_OF_LETTER = MappingProxyType({
 STRESSES = MappingProxyType({"ˈ": 1, "ˌ": 2})
 DEFAULT = "DEFAULT"  # reading of a word in other parts of speech than are named
 GRADES = ("gold", "silver")  # the first was checked by hand
+_READING = re.compile(rb'"(\w+)":"([^"]*)"')  # of a part of speech; those without letters are left out
 _VALUE = re.compile(rb'"[^"]*"|\{[^}]*\}')
 _RHOTIC = MappingProxyType({"ɝ": "ɝ", "ə": "ɚ", "ɚ": "ɚ"})
 
@@ -60,7 +60,7 @@ def _entry_before(text: bytes, low: int, middle: int) -> int:
     return at
 
 
-def _find(text: bytes, word: str) -> dict[str, str | None]:
+def _find(text: bytes, word: str) -> dict[str, str]:
     """Letters of a word by part of speech, by bisection; DEFAULT where all have one, none for no word."""
     key = word.encode()
     low, high = 1, len(text) - 1
@@ -71,8 +71,8 @@ def _find(text: bytes, word: str) -> dict[str, str | None]:
         if value is None:
             return {}
         if text[at + 1 : end] == key:
-            found = json.loads(value[0])
-            return found if isinstance(found, dict) else {DEFAULT: found}
+            readings = _READING.findall(value[0]) or [(DEFAULT.encode(), value[0].strip(b'"'))]
+            return {tag.decode(): letters.decode() for tag, letters in readings}
         if text[at + 1 : end] < key:
             low = value.end() + 1
         else:
@@ -83,7 +83,7 @@ def _find(text: bytes, word: str) -> dict[str, str | None]:
 @functools.lru_cache(maxsize=50_000)
 def misaki_readings(
     word: str, accent: str = "us", grades: tuple[str, ...] = GRADES, *, is_exact: bool = False
-) -> Mapping[str, str | None]:
+) -> Mapping[str, str]:
     """A word in misaki's alphabet by part of speech, of which DEFAULT is always one; empty if it has none.
 
     Parameters
@@ -119,4 +119,4 @@ def misaki_lookup(
 ) -> tuple[IpaPhone, ...] | None:
     """Phones of an American English word, or None; arguments as of `misaki_readings`."""
     readings = misaki_readings(word, "us", grades, is_exact=is_exact)
-    return letter_segments(readings[DEFAULT] or "") if readings else None
+    return letter_segments(readings[DEFAULT]) if readings else None

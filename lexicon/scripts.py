@@ -102,15 +102,7 @@ def foreign_runs(text: str, language: str) -> Iterator[tuple[int, int]]:
 
 
 def check_script(text: str, language: str) -> None:
-    """Check that a language can read a text; digits, symbols and single letters with a name are always accepted.
-
-    Raises
-    ------
-    InputError
-        The text contains words of another script; the message names them, their script and the language.
-    BackendError
-        The text is Japanese with Chinese characters, and the library that reads them is not installed.
-    """
+    """Check that a language can read a text; digits, symbols and single letters with a name are always accepted."""
     if language == "ja" and has_kanji(text):
         load_reader()
     words: dict[str, None] = {}
