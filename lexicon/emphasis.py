@@ -118,7 +118,7 @@ def _is_emphasised(line: str, match: "re.Match[str]", language: str) -> bool:
             return False
         words = _WORD.findall(before)
         spellings = {word, _STRETCHED.sub(r"\1", word), _STRETCHED.sub(r"\1\1", word)}
-        return any(len(one) > 1 and is_word_in_capitals(one, words[-1] if words else "") for one in spellings)
+        return any(len(form) > 1 and is_word_in_capitals(form, words[-1] if words else "") for form in spellings)
     return word.casefold() in common_words(language) or len(word) >= MIN_FOREIGN_LETTERS
 
 

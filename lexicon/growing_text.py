@@ -34,7 +34,8 @@ class GrowingText:
     """
 
     def __init__(self, language: str, markup: str = "auto") -> None:
-        self._language, self._markup, self._text = language, markup, ""
+        self._language, self._markup = language, markup
+        self._text = ""
         self._is_held = False  # whether the first sentence waits for the end of a mark
 
     def add(self, part: str) -> list[str]:

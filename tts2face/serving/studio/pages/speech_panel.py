@@ -5,7 +5,7 @@ from typing import Any
 
 from nicegui import ui
 
-from tts2face.request import GESTURES, OWN_FACE, Recorded
+from tts2face.request import GESTURES, MARKUPS, OWN_FACE, Recorded
 from tts2face.serving.studio.pages import character_dialog
 from tts2face.serving.studio.pages.choices import appearance, languages, models, voices
 from tts2face.serving.studio.pages.frame import heading
@@ -37,6 +37,7 @@ class SpeechPanel:
             "keydown.ctrl.enter", lambda event: page.speak(str(event.args)), js_handler="(e) => emit(e.target.value)"
         )
         self._controls["text"] = text
+        self._select("request", "markup", "Marks in the text", {name: name for name in MARKUPS})
         if not is_recording:
             self._select("request", "voice", "Voice", voices())
             self._slider("rate", "Rate", 0.5, 2.0, 0.05)
