@@ -69,7 +69,7 @@ def pause_cuts(levels: FloatArray, silence: tuple[float, float], wanted: float, 
     levels : (T,)
         `sound_levels`.
     silence
-        Begin and end in seconds; the sound decides what of it, and within `reach` around it, is quiet.
+        In seconds; the sound decides what of it, and within `reach` around it, is quiet.
     """
     start, end = quiet_span(levels, silence, reach)
     change = wanted - (end - start)
@@ -104,7 +104,7 @@ def sound_levels(sound: Waveform) -> FloatArray:
 
 
 def quiet_span(levels: FloatArray, silence: tuple[float, float], reach: float = REACH_S) -> tuple[float, float]:
-    """Begin and end of the longest quiet part around a silence between two words; the silence where there is none."""
+    """Times of the longest quiet part around a silence between two words; the silence where there is none."""
     first = max(round((silence[0] - reach) / WINDOW_S), 0)
     runs = true_runs(levels[first : round((silence[1] + reach) / WINDOW_S)] < QUIET_DB) + first
     longest = max(runs.tolist(), key=lambda run: run[1] - run[0], default=None)
