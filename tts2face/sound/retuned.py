@@ -18,6 +18,7 @@ from tts2face.sound.voice import SpeechInput, pronounce_content
 from tts2face.types import Speech
 
 ENGLISH = "en"
+OBSTRUENTS = frozenset({"stop", "affricate", "fricative", "click"})  # after which nobody hears a rise
 STRETCH_RAMP_S = 0.01  # between a word of another length and its neighbours
 
 
@@ -85,9 +86,10 @@ def _shaped(times: FloatArray, hertz: FloatArray, tune: Tune, phones: PhoneSeque
     """F0 (N,) at N times, shaped in voiced phones; the hum of a neural voice in others goes with that around it."""
     at = np.clip(np.searchsorted(phones.edges, times, side="right") - 1, 0, len(phones) - 1)
     voiced = np.array([label in PHONES and PHONES[label].is_voiced for label in phones.phones])[at]
+    sonorous = np.array([label in PHONES and PHONES[label].kind not in OBSTRUENTS for label in phones.phones])[at]
     ratio: FloatArray = np.full(len(times), 2.0 ** (tune.prosody.pitch / SEMITONES))
     if voiced.any():
-        found = shape_pitch(np.where(voiced, hertz, 0.0), times, tune).f0
+        found = shape_pitch(np.where(voiced, hertz, 0.0), times, tune, sonorous).f0
         ratio = np.interp(times, times[voiced], found[voiced] / hertz[voiced])
     changed: FloatArray = hertz * ratio
     return changed

@@ -25,7 +25,7 @@ WORD_RAMP_S = 0.04  # between words of different tones
 # A rise begins below the median; of what is known of 30 questions it is heard as one by Praat in all
 DIP, DIP_S = 1.5, 0.075  # semitones, and how soon they are reached
 BEND = 1.2  # exponent of its curve
-LEAST_RISE_S, LONGEST_RISE_S = 0.2, 0.4
+LEAST_RISE_S, LONGEST_RISE_S = 0.2, 0.3
 BEYOND_S = 0.15  # of voice behind the end of the word
 HEIGHTS = MappingProxyType({"rise": 9.0, "item": 4.0, "fall": -5.0})  # semitones above the median, at the end
 FALL_START = 2.5
