@@ -104,7 +104,7 @@ SHIPPED_VOICES: Mapping[str, VoiceInfo] = MappingProxyType({
     ),
     "mei": VoiceInfo(
         "hidden Markov models, Japanese (extra [japanese])", _mei, "open-jtalk", "pyopenjtalk", "female",
-        "CC BY 3.0 (NOTICE)", ("ja",), "ja",
+        "CC BY 3.0 (NOTICE)", ("ja",), "ja", pitch_hz=355.6,
     ),
     "espeak": VoiceInfo(
         "formant synthesis, every language of espeak-ng", _espeak, "espeak-ng", "espeakng_loader", "male",
