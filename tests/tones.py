@@ -2,12 +2,14 @@
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from lexicon.languages import language_code
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.sound.prosody import PLAIN_PROSODY, Prosody
+from tts2face.sound.retuned import intention, retuned
 from tts2face.sound.voice import (
     PronunciationMap,
     SpeechInput,
@@ -43,7 +45,9 @@ class ToneVoice:
         return self.speak(content, rate=rate, seed=seed).waveform
 
     def deliver(self, content: SpeechInput, prosody: Prosody, seed: int) -> Speech:
-        return self.speak(content, rate=prosody.rate, seed=seed)
+        speech = self.speak(content, rate=prosody.rate, seed=seed)
+        others = replace(prosody, rate=1.0)
+        return speech if others == PLAIN_PROSODY else retuned(speech, others, intention("", ""))
 
     def deliver_sound(self, content: SpeechInput, prosody: Prosody, seed: int) -> Waveform:
         return self.deliver(content, prosody, seed).waveform
