@@ -3,7 +3,7 @@
 import json
 from collections import deque
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 
@@ -16,6 +16,7 @@ from tts2face.processes.message import MORE, Message
 from tts2face.request import MARKUPS, Request
 from tts2face.serving.service.live import LiveTask
 from tts2face.serving.service.messages import Event, Work
+from tts2face.serving.service.routes.openai import Markup
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.session.project import Project
 from tts2face.session.project_file import load_project, save_project
@@ -26,7 +27,7 @@ ADJUSTED = "x-tts2face-adjusted"
 
 
 def test_options_name_every_markup() -> None:
-    assert tuple(text_marks.MARKUPS) == MARKUPS
+    assert tuple(text_marks.MARKUPS) == get_args(Markup) == MARKUPS
 
 
 @pytest.mark.parametrize("markup", ["llm", "SSML", ""])
@@ -71,6 +72,10 @@ def test_the_service_says_in_a_header_what_is_not_followed(table: TableProcess, 
         assert {name: asked[name] for name in ("markup", *prosody)} == {"markup": "ssml", **prosody}
         spoken = client.post("/v1/audio/speech", json={"input": f"<speak>{FRAGMENT}</speak>", "response_format": "wav"})
         assert "<bell> is not supported" in spoken.headers[ADJUSTED]
+        asked = {"input": FRAGMENT, "markup": "ssml", "response_format": "wav", **prosody}
+        assert NOTE.replace(";", ",") in client.post("/v1/audio/speech", json=asked).headers[ADJUSTED]
+        spoken_request = table.works[-1].request
+        assert {name: spoken_request[name] for name in ("text", *prosody)} == {"text": FRAGMENT, **prosody}
         named = client.post("/v1/clips", json={"text": "<speak><ж>a</ж></speak>", "format": "wav"})
         assert "<?> is not supported" in named.headers[ADJUSTED]
         for name, value in (("markup", "llm"), ("voice_pitch", 13), ("voice_range", -0.1)):

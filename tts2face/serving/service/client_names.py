@@ -18,7 +18,7 @@ from lexicon.languages import language_code
 from lexicon.marked_text import RATE_LIMITS
 from lexicon.spoken_words import reading_notes
 from lexicon.text_language import guess_language
-from tts2face.request import AUTO
+from tts2face.request import AUTO, AUTO_MARKUP
 from tts2face.serving.service.clip_options import check_voice, resolve_models
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
@@ -32,6 +32,7 @@ from tts2face.sound.voice_pool import find_voice
 
 ADJUSTED = "X-Tts2face-Adjusted"
 FEMALE, MALE = "female", "male"
+VOICE_NAMES = {"markup", "voice_pitch", "voice_range"}  # options of clips beside the fields of OpenAI
 OPENAI_VOICES: Mapping[str, str] = MappingProxyType({
     "alloy": FEMALE, "ash": MALE, "ballad": MALE, "cedar": MALE, "coral": FEMALE, "echo": MALE, "fable": MALE,
     "marin": FEMALE, "nova": FEMALE, "onyx": MALE, "sage": FEMALE, "shimmer": FEMALE, "verse": MALE,
@@ -214,13 +215,15 @@ async def choose_talker(state: ServiceState, key: ApiKey, model: str, adjustment
 
 
 async def spoken_fields(state: ServiceState, key: ApiKey, asked: Any, adjustments: Adjustments) -> dict[str, Any]:
-    """Options of a clip for a request with OpenAI's fields: input, model, voice, speed, language, volume."""
+    """Options of a clip for a request with OpenAI's fields (input, model, voice, speed, language) and `VOICE_NAMES`."""
     voice = asked.voice if isinstance(asked.voice, str) else str(asked.voice.get("id", ""))
     language = asked.language or asked.lang_code
     state.results.check_length(asked.input)
-    text = with_marks(asked.input)
+    more: dict[str, Any] = asked.model_dump(include=VOICE_NAMES, exclude_none=True)
+    markup = more.get("markup", AUTO_MARKUP)
+    text = with_marks(asked.input) if markup == AUTO_MARKUP else asked.input
     name, code = await asyncio.to_thread(choose_voice, voice, language, text, adjustments)
-    await adjustments.note_words(state, text, code)
+    await adjustments.note_words(state, text, code, markup)
     talker = await choose_talker(state, key, asked.model, adjustments)
     given = {"text": text, "rate": limited_rate(asked.speed, adjustments), "voice": name, "language": code}
-    return given | ({} if talker is None else {"talker": talker})
+    return given | more | ({} if talker is None else {"talker": talker})

@@ -41,6 +41,7 @@ SoundFormat = Literal["mp3", "opus", "aac", "flac", "wav", "pcm", "weba"]
 Format = Literal[
     "mp3", "opus", "aac", "flac", "wav", "pcm", "weba", "mp4", "webm", "glb", "jsonl", "curves", "oculus", "azure"
 ]
+Markup = Literal["auto", "plain", "ssml"]  # as `tts2face.request.MARKUPS`
 TimeName = Literal["word", "phone"]
 LISTS: Mapping[str, str] = MappingProxyType({"word": "words", "phone": "phones"})  # in answers, by what has times
 
@@ -77,6 +78,9 @@ class SpokenText(BaseModel):
         float | None,
         Field(ge=VOLUME_LIMITS[0], le=VOLUME_LIMITS[1], description="Factor of the loudness.", examples=[1.0]),
     ] = None
+    markup: Annotated[Markup | None, described("markup")] = None
+    voice_pitch: Annotated[float | None, described("voice_pitch")] = None
+    voice_range: Annotated[float | None, described("voice_range")] = None
     return_download_link: Annotated[
         bool, Field(description="`X-Download-Path` of the answer names a complete file, below /v1.", examples=[False])
     ] = False
