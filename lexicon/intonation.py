@@ -27,8 +27,9 @@ WORDS = MappingProxyType({name: frozenset(words.split()) for name, words in {
     "thereabouts more less later other else",
     "number": "one two three four five six seven eight nine ten eleven twelve twenty thirty hundred once twice",
     "unstressed": "it me him her them us you he she they we i one ones there then please for to with of at about from "
-    "anyway though again here today tonight",
-    "open choice": "whether either",  # what follows is one answer
+    "anyway though again here today tonight and but or so the a an",
+    "open choice": "whether either any anyone anybody anything ever",  # any brothers or sisters: yes or no
+    "no item": "but so because which who when where while",  # of a list
 }.items()})  # fmt: skip
 SENTENCE_MARKS = frozenset(".!?")
 LONGEST_ITEM = 4  # words of an item of a list
@@ -218,14 +219,15 @@ def _is_choice(said: Sequence[str], first: int, at: int, end: int) -> bool:
     is_amount = (
         said[at - 1] in WORDS["number"] and said[at + 1] in WORDS["number"] and at + 2 < end
     )  # two or three people
-    return not is_amount and said[at - 1 : at + 3] != ["way", "or", "the", "other"] and said[at + 1 :] != ["two"]
+    is_about = said[at + 1] == "two" and said[max(at - 2, 0)] in {"a", "an"}  # a day or two
+    return not (is_amount or is_about) and said[at - 1 : at + 3] != ["way", "or", "the", "other"]
 
 
 def _list_items(said: Sequence[str], clauses: Sequence[_Clause]) -> Iterator[Movement]:
     """Movements of the items before the last one of a list: apples, pears and plums."""
     clauses = clauses[_is_opener(said, clauses[0]) :]
     joints = [at for at in range(*clauses[-1]) if said[at] in {"and", "or"}] if clauses else []
-    if len(clauses) < 2 or not joints:
+    if len(clauses) < 2 or not joints or said[clauses[-1].first] in WORDS["no item"]:
         return
     joint = joints[-1]
     # the part before the joint is empty behind a comma: pears, and plums

@@ -21,6 +21,7 @@ def tunes(text: str) -> str:
         ("Your sister paints?", "paints↗"),
         ("And if I say no?", "no↗"),
         ("Really?", "Really↗"),
+        ("And you?", "you↗"),
         ("Do you know where she lives?", "lives↗"),
         ("Can you tell me what happened?", "happened↗"),
         ("You bought what?", "what↗"),
@@ -78,6 +79,9 @@ def test_statements_and_questions_with_a_question_word_stay(text: str) -> None:
         ("Is it more or less ready?", "ready↗"),
         ("Do you know whether they won or lost?", "lost↗"),
         ("Or are you tired?", "tired↗"),
+        ("Have you any pens or pencils?", "pencils↗"),
+        ("Can you wait a day or two?", "two↗"),
+        ("One or two?", "One↗ two↘"),
     ],
 )
 def test_alternatives_rise_but_the_last(text: str, expected: str) -> None:
@@ -110,6 +114,7 @@ def test_tags_fall_where_they_contradict(text: str, expected: str) -> None:
         ("Did you buy flour, butter and eggs?", "flour↑ butter↑ eggs↗"),
         ("Later that day, when the rain had stopped, we left.", ""),
         ("Well, we went home and slept.", ""),
+        ("I like pears, but plums and figs are better.", ""),
     ],
 )
 def test_items_of_lists_rise_a_little(text: str, expected: str) -> None:
