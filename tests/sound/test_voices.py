@@ -1,6 +1,7 @@
 """Requirements that every voice meets."""
 
 import random
+import time
 import unicodedata
 from dataclasses import replace
 
@@ -110,6 +111,14 @@ def test_espeak_has_a_female_voice() -> None:
     male, female = (load_voice(name, "de").speak("Guten Morgen.") for name in ("espeak", "espeak-female"))
     assert male.phones.phones == female.phones.phones
     assert pitch_hz(female) > 1.4 * pitch_hz(male)
+
+
+def test_breath_is_the_same_in_every_second() -> None:
+    """espeak-ng draws the noise of its female voices by the time in seconds."""
+    voice = load_voice("espeak-female", "de")
+    first = voice.speak("Guten Morgen.").waveform.samples
+    time.sleep(1.0 - time.time() % 1.0)
+    assert np.array_equal(voice.speak("Guten Morgen.").waveform.samples, first)
 
 
 def pitch_hz(speech: Speech) -> float:

@@ -24,6 +24,7 @@ CHARACTERS_UTF8 = 1
 PHONEMES_IN_BRACKETS = 0x100
 POSITION_IN_CHARACTERS = 1
 RATE_PARAMETER = 1
+RANDOM_SEED = 1
 DEFAULT_BUFFER_MS = 200
 POLL_INTERVAL_S = 0.2  # between checks whether the parent is running
 
@@ -120,6 +121,8 @@ def speak(request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
     voice = _Voice(languages=request["language"].encode(), gender=request["gender"])
     if rate <= 0 or library.espeak_SetVoiceByProperties(ctypes.byref(voice)) != 0:
         return {"error": f"espeak-ng does not speak {request['language']}"}, b""
+    # the breath of female voices is random, by the second in which the library starts; equal texts give equal bytes
+    library.espeak_ng_SetRandSeed(ctypes.c_long(RANDOM_SEED))
     library.espeak_SetParameter(RATE_PARAMETER, request["words_per_minute"], 0)
     # espeak_Synth reads up to a zero byte
     text = request["text"].encode() + b"\0"
