@@ -49,7 +49,8 @@ if TYPE_CHECKING:
 SAMPLE_RATE = 24_000
 BOUNDARY_DELAY_S = 0.061  # delay of the model's own boundaries against its sound (56 ms when fast, 71 when slow)
 STATED_REACH_S = 0.15  # around a stated pause, in which the quiet part of the sound lies
-FASTEST = 1.0  # rate of the network; above it its sound is shortened, in which less is lost (decision 251)
+# rates of the network; beyond them its sound is shortened or lengthened, and edges move with it (decision 251)
+SLOWEST, FASTEST = 0.85, 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,7 +145,8 @@ class NeuralVoice:
     def _spoken(self, part: LetteredPart, prosody: Prosody, seed: int) -> SpokenPart:
         numbers = [0, *(self._numbers[letter] for letter in part.letters), 0]
         hidden, durations = self._network.read(numbers)
-        steps = letter_steps(part, durations, min(prosody.rate, FASTEST))
+        rate = min(max(prosody.rate, SLOWEST), FASTEST)
+        steps = letter_steps(part, durations, rate)
         frames = self._network.frames(numbers, hidden, steps)
         plain = spectrum(frames, frames.f0, seed)
         unchanged = _limited(samples_of(plain))
@@ -158,12 +160,12 @@ class NeuralVoice:
             changed = spectrum(frames, shaped.f0, seed)
             sound = _limited(samples_of(match_energy(changed, plain, shaped.moved)))
         stated = stated_phones(part.words, steps)
-        cuts = _pause_cuts(part, steps, unchanged, min(prosody.rate, FASTEST))
+        cuts = _pause_cuts(part, steps, unchanged, rate)
         if cuts:
             unchanged, sound = respaced(unchanged, cuts), respaced(sound, cuts)
             starts = respaced_times(np.array([phone.start for phone in stated]), cuts)
             stated = [replace(phone, start=float(start)) for phone, start in zip(stated, starts, strict=True)]
-        stretch = even_stretch(max(prosody.rate / FASTEST, 1.0))
+        stretch = even_stretch(prosody.rate / rate)
         shift = 2.0 ** (in_sound / SEMITONES)
         shifted = (lambda _, hertz: hertz * shift) if in_sound else None
         sound = resynthesize(sound, stretch, shifted, prosody.formants)
@@ -210,9 +212,10 @@ def letter_steps(part: LetteredPart, durations: FloatArray, rate: float) -> NDAr
         factors[start + 1 : start + 1 + word.n_spoken] = EMPHASIS_LENGTH**word.tone.emphasis
     if rate == 1.0 and (factors == 1.0).all():
         return steps
-    inner = steps[1:-1]
-    total = max(round(float((inner * factors[1:-1]).sum()) / rate), len(inner))
-    steps[1:-1] = carried_steps((durations[1:-1] if rate != 1.0 else inner) * factors[1:-1], total)
+    # pauses get their length later
+    spoken = np.flatnonzero([letter not in MARKS for letter in part.letters]) + 1
+    total = max(round(float((steps[spoken] * factors[spoken]).sum()) / rate), len(spoken))
+    steps[spoken] = carried_steps((durations if rate != 1.0 else steps)[spoken] * factors[spoken], total)
     return steps
 
 
