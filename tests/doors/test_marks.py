@@ -15,6 +15,7 @@ from tts2face.picture.options import Picture
 from tts2face.request import Request
 from tts2face.session.session import Session
 from tts2face.session.speech_stream import Piece
+from tts2face.sound.voice_pool import VoicePool
 from tts2face.types import concatenate_clips
 from tts2face.video.media import read_media_info
 
@@ -64,13 +65,14 @@ def test_a_pause_is_silent_and_the_lips_rest_in_it(shipped: Session) -> None:
     assert len(paused.clip.motion) > len(plain.clip.motion) + 30
 
 
-def test_a_document_with_voices_languages_and_phones_is_one_sound(ready: Session) -> None:
+def test_a_document_with_voices_languages_and_phones_is_one_sound(world: World, voices: VoicePool) -> None:
+    session = world.session(voices=voices)
     text = (
         '<speak>One <phoneme ph="kæt">two</phoneme>. <lang xml:lang="de">Guten Tag.</lang> <voice gender="male">Three '
         '<say-as interpret-as="ordinal">4</say-as></voice> <voice name="heart">five.</voice></speak>'
     )
     for voice, rate in (("espeak", 22_050), ("heart", 24_000)):
-        speech = concatenate_clips([piece.clip for piece in ready.stream(Request(text=text, voice=voice))]).speech
+        speech = concatenate_clips([piece.clip for piece in session.stream(Request(text=text, voice=voice))]).speech
         assert speech.waveform.rate == rate
         names = [word.text.strip(".") for word in speech.words]
         assert names == ["One", "two", "Guten", "Tag", "Three", "fourth", "five"]
