@@ -20,8 +20,8 @@ TOLERANCES = (0, 500, 500)  # by which they may differ, so that few commits have
 # Of all packages. They had 56,843 when the files had been divided by subject, 56,967 before it. Since then came readers
 # of subtitles, transcripts, captures and films of other programs, and what says how they were read (4,400), names of
 # characters' shapes, their calibration, VRM Animation and materials of scenes (900), heads without shapes (1,000),
-# repairs of their scans (250), and voices: their rate, pitch, questions and pauses (800), those of faces, of servers and
-# that are added (800), words in no dictionary and of other languages (600), SSML of other services and emphasis (400).
+# repairs of their scans (250), and voices: their rate, pitch, questions and pauses (800), those of faces, of servers
+# and that are added (800), words in no dictionary and of other languages (600), SSML of other services, emphasis (400).
 MOST_STATEMENTS = 66_400
 
 

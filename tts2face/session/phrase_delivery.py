@@ -16,7 +16,6 @@ from tts2face.sound.voice import SpeechInput, SpokenWord, Voice
 from tts2face.types import Speech
 
 Deliveries = Mapping[str, Delivery]  # of a palette's styles, by name
-DURATION_STEPS, DURATION_TOLERANCE = 3, 0.02  # voices of Piper follow a rate by half
 NO_DELIVERIES: Deliveries = MappingProxyType({})
 
 
@@ -77,15 +76,9 @@ def speak_phrase(speaker: Voice, part: Phrase, request: Request, prosody: Prosod
     speech = speak_with(speaker, content, prosody, request.known_seed, language=language)
     if part.seconds is None or not speech.words:
         return speech
-    for _ in range(DURATION_STEPS):
-        edges = speech.phones.edges
-        lasting = float(edges[speech.words[-1].last] - edges[speech.words[0].first])
-        rate = min(max(prosody.rate * lasting / part.seconds, RATE_LIMITS[0]), RATE_LIMITS[1])
-        if abs(rate / prosody.rate - 1.0) < DURATION_TOLERANCE:
-            break
-        prosody = replace(prosody, rate=rate)
-        speech = speak_with(speaker, content, prosody, request.known_seed, language=language)
-    return speech
+    lasting = float(speech.phones.edges[speech.words[-1].last] - speech.phones.edges[speech.words[0].first])
+    rate = min(max(prosody.rate * lasting / part.seconds, RATE_LIMITS[0]), RATE_LIMITS[1])
+    return speak_with(speaker, content, replace(prosody, rate=rate), request.known_seed, language=language)
 
 
 def phrase_content(part: Phrase) -> SpeechInput:
