@@ -9,25 +9,19 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
-import parselmouth
 from sentences import sentences
+from speech_measures import RISE_ST, phone_errors, pitch_track, rise_at, spoken_seconds
 
 from lexicon.pauses import PAUSES_S
 from lexicon.tones import Tone
-from tts2face.numeric.arrays import FloatArray
 from tts2face.sound.delivery import speak_with
-from tts2face.sound.pauses import sound_windows
 from tts2face.sound.prosody import PLAIN_PROSODY, Prosody
-from tts2face.sound.recogniser import PhoneRecogniser
 from tts2face.sound.spacing import quiet_span, sound_levels
 from tts2face.sound.voice import SpokenWord, Voice, pronounce_content
 from tts2face.sound.voice_pool import load_voice
-from tts2face.types import Speech, Waveform
+from tts2face.types import Speech
 
 LANGUAGE = "en-us"
-ALIKE = {"ɪ": "ə", "ʊ": "ə", "ɛ": "ə", "ʌ": "ə", "ɐ": "ə", "ɔ": "ɑ", "ɒ": "ɑ", "ɾ": "t"}
-SPLIT = {"ɝ": ("ə", "ɹ"), "ɚ": ("ə", "ɹ")}
-AUDIBLE_DB = -50.0
 PROSODIES = (
     Prosody(pitch=-4.0), Prosody(pitch=4.0), Prosody(range=0.6), Prosody(range=1.5), Prosody(formants=0.86),
     Prosody(formants=1.16), Prosody(pitch=-9.1, formants=0.86), Prosody(pitch=2.9, formants=1.16),
@@ -62,7 +56,6 @@ PAUSED = (
     "We waited for an hour{} nobody opened", "It was raining{} the match went on", "I know the answer{} it is no help",
     "She looked at the map{} then turned around",
 )  # fmt: skip
-FAR_AT = 3  # semitones of a rise that is heard as a question
 EMPHASISED = 3  # index of the word
 
 
@@ -71,7 +64,6 @@ class Bench:
 
     def __init__(self, voice: Voice, texts: Sequence[str]) -> None:
         self.voice, self.texts = voice, texts
-        self.recogniser = PhoneRecogniser()
         self.usual = {text: self.speak(text) for text in texts}
 
     def speak(self, text: str, prosody: Prosody = PLAIN_PROSODY, tones: Sequence[Tone] = ()) -> Speech:
@@ -85,20 +77,18 @@ class Bench:
         """Share of phones that are heard otherwise, in percent."""
         wrong = n = 0
         for text, speech in spoken:
-            peak = max(float(np.abs(speech.waveform.samples).max()), 1e-9)
-            heard = self.recogniser.hear(Waveform(0.5 / peak * speech.waveform.samples, speech.waveform.rate))
-            said = folded(phone for word in pronounce_content(text, LANGUAGE, {}) for phone in word.phones)
-            wrong += distance(said, folded(phone for word in heard.words() for phone in word))
-            n += len(said)
+            said = [phone for word in pronounce_content(text, LANGUAGE, {}) for phone in word.phones]
+            found = phone_errors(said, speech.waveform)
+            wrong, n = wrong + found[0], n + found[1]
         return 100.0 * wrong / n
 
     def rates(self, rates: Sequence[float]) -> None:
         """Print real rates and phone errors."""
         print("| rate asked | real | least and most of it | phone error |\n| --- | --- | --- | --- |")
-        lengths = np.array([spoken_s(self.usual[text].waveform) for text in self.texts])
+        lengths = np.array([spoken_seconds(self.usual[text].waveform) for text in self.texts])
         for rate in rates:
             spoken = {text: self.speak(text, Prosody(rate)) for text in self.texts}
-            now = np.array([spoken_s(speech.waveform) for speech in spoken.values()])
+            now = np.array([spoken_seconds(speech.waveform) for speech in spoken.values()])
             apart = lengths / now / rate
             real, error = lengths.sum() / now.sum(), self.error(spoken.items())
             print(f"| {rate:g} | {real:.3f} | {apart.min():.3f}, {apart.max():.3f} | {error:.1f} % |", flush=True)
@@ -120,16 +110,16 @@ class Bench:
         for name, texts in QUESTIONS.items():
             spoken = {text: self.speak(text) for text in texts}
             rises = np.array([rise_at(speech, -1) for speech in spoken.values()])
-            share = f"{(rises >= FAR_AT).sum()} of {len(texts)}"
+            share = f"{(rises >= RISE_ST).sum()} of {len(texts)}"
             print(f"| {name} | {share} | {np.nanmedian(rises):+.1f} | {self.error(spoken.items()):.1f} % |", flush=True)
         either = [self.speak(text) for text in ALTERNATIVES]
         places = [[word.text for word in speech.words].index("or") - 1 for speech in either]
         rises = np.array([rise_at(speech, place) for speech, place in zip(either, places, strict=True)])
         falls = np.array([rise_at(speech, -1) for speech in either])
         print(
-            f"| alternatives: the first | {(rises >= FAR_AT).sum()} of {len(either)} | {np.nanmedian(rises):+.1f} | |"
+            f"| alternatives: the first | {(rises >= RISE_ST).sum()} of {len(either)} | {np.nanmedian(rises):+.1f} | |"
         )
-        print(f"| the last | {(falls >= FAR_AT).sum()} of {len(either)} | {np.nanmedian(falls):+.1f} | |")
+        print(f"| the last | {(falls >= RISE_ST).sum()} of {len(either)} | {np.nanmedian(falls):+.1f} | |")
 
     def emphasis(self) -> None:
         """Print what becomes of an emphasised word; its level is the session's."""
@@ -161,59 +151,15 @@ class Bench:
             print(f"| {mark} | {PAUSES_S[mark]} | {np.median(found):.3f} | {min(found):.3f}, {max(found):.3f} |")
 
 
-def folded(phones: Iterable[str]) -> list[str]:
-    """Phones, of which similar vowels are one."""
-    parts = [part for phone in phones for part in SPLIT.get(phone, (phone,))]
-    return [ALIKE.get(phone, phone) for phone in parts]
-
-
-def distance(said: Sequence[str], heard: Sequence[str]) -> int:
-    """Least number of phones to change, add and leave out (Levenshtein)."""
-    row = list(range(len(heard) + 1))
-    for at, phone in enumerate(said, start=1):
-        diagonal, row[0] = row[0], at
-        for column, other in enumerate(heard, start=1):
-            best = min(row[column] + 1, row[column - 1] + 1, diagonal + (phone != other))
-            diagonal, row[column] = row[column], best
-    return row[-1]
-
-
-def praat_f0(sound: Waveform) -> tuple[FloatArray, FloatArray]:
-    """Times and F0 in semitones of voiced frames."""
-    found = parselmouth.Sound(sound.samples.astype(np.float64), sound.rate).to_pitch_ac(0.005, 50.0, pitch_ceiling=600)
-    hertz = found.selected_array["frequency"]
-    return found.xs()[hertz > 0], 12 * np.log2(hertz[hertz > 0])
-
-
 def pitch_of(speech: Speech) -> tuple[float, float]:
     """Median and range (10 to 90 %) of F0 in semitones."""
-    _, tones = praat_f0(speech.waveform)
+    _, tones = pitch_track(speech.waveform)
     return float(np.median(tones)), float(np.ptp(np.quantile(tones, [0.1, 0.9])))
-
-
-def spoken_s(sound: Waveform) -> float:
-    """Seconds from the first to the last audible window."""
-    power = np.square(sound_windows(sound, 0.005), dtype=np.float64).mean(axis=1)
-    audible = np.flatnonzero(10 * np.log10(power / power.max() + 1e-12) > AUDIBLE_DB)
-    return float(audible[-1] - audible[0] + 1) * 0.005
-
-
-def rise_at(speech: Speech, word: int) -> float:
-    """Semitones by which F0 rises over the last voiced 200 ms of a word; NaN without voice."""
-    times, tones = praat_f0(speech.waveform)
-    span = speech.words[word]
-    start, end = speech.phones.edges[[span.first, span.last]]
-    inside = np.flatnonzero((times > start - 0.05) & (times < end))
-    if len(inside) < 6:
-        return float("nan")
-    inside = inside[times[inside] > times[inside[-1]] - 0.2]
-    third = max(len(inside) // 3, 1)
-    return float(np.median(tones[inside[-third:]]) - np.median(tones[inside[:third]]))
 
 
 def word_measures(speech: Speech, word: int) -> tuple[float, float]:
     """Peak of F0 in semitones (95th percentile) and seconds of a word."""
-    times, tones = praat_f0(speech.waveform)
+    times, tones = pitch_track(speech.waveform)
     start, end = speech.phones.edges[[speech.words[word].first, speech.words[word].last]]
     inside = tones[(times > start) & (times < end)]
     return (float(np.quantile(inside, 0.95)) if len(inside) else float("nan")), float(end - start)

@@ -15,11 +15,10 @@ from bench_voice import SEARCH_S, STEP_S, high_energy, landmarks, sounding
 from sentences import sentences
 from speech_measures import (
     RISE_ST,
-    last_rise,
     longest_gap,
     phone_errors,
     pitch_track,
-    semitones,
+    rise_at,
     silence_at_ends,
     spoken_seconds,
 )
@@ -76,8 +75,7 @@ def basics(voice: Voice, texts: Sequence[str]) -> dict[str, str]:
         seconds += sound.duration
         wrong, n = phone_errors([phone for phone in speech.phones.phones if phone != SILENCE], sound)
         errors, phones = errors + wrong, phones + n
-        hertz = pitch_track(sound)[1]
-        tones.append(semitones(hertz[hertz > 0]))
+        tones.append(pitch_track(sound)[1])
         levels.append(integrated_loudness([sound]))
         edges += list(edge_errors(speech))
     flat = np.concatenate(tones)
@@ -121,7 +119,7 @@ def questions(voice: Voice) -> dict[str, str]:
     """Sentences of each kind whose end rises."""
     kinds = {"yes or no": YES_NO, "statements": STATEMENTS, "wh": WH}
     return {
-        kind: f"{sum(last_rise(say(voice, text).waveform) >= RISE_ST for text in texts)} of {len(texts)}"
+        kind: f"{sum(rise_at(say(voice, text)) >= RISE_ST for text in texts)} of {len(texts)}"
         for kind, texts in kinds.items()
     }
 
@@ -159,8 +157,8 @@ def draw(voices: dict[str, Voice]) -> None:
     figure, axes = pyplot.subplots(len(voices), 1, figsize=(7, 1.9 * len(voices)), sharex=True, layout="constrained")
     for axis, (name, voice) in zip(np.atleast_1d(axes), voices.items(), strict=True):
         for text, colour in (("You have never seen snow.", "#3465a4"), ("You have never seen snow?", "#c4442a")):
-            seconds, hertz = pitch_track(say(voice, text).waveform)
-            axis.plot(seconds, np.where(hertz > 0, hertz, np.nan), color=colour, label=text)
+            seconds, tones = pitch_track(say(voice, text).waveform)
+            axis.plot(seconds, 2 ** (tones / 12), ".", markersize=3, color=colour, label=text)
         axis.set_yscale("log")
         axis.set_yticks([75, 100, 150, 200, 300, 450], ["75", "100", "150", "200", "300", "450"], minor=False)
         axis.minorticks_off()

@@ -8,7 +8,7 @@ import parselmouth
 from numpy.typing import NDArray
 
 from tts2face.sound.recogniser import PhoneRecogniser
-from tts2face.types import Waveform
+from tts2face.types import Speech, Waveform
 
 # Phones that the recogniser takes for each other, and vowels that are reduced.
 ALIKE = {
@@ -46,28 +46,26 @@ def _folded(phones: Sequence[str]) -> list[str]:
 
 
 def pitch_track(sound: Waveform) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Seconds and F0 in Hz (T,) by Praat; 0 where there is none."""
+    """Seconds and F0 in semitones above 1 Hz (T,) of frames with voice, by Praat."""
     low, high = PITCH_LIMITS_HZ
     found = parselmouth.Sound(sound.samples.astype(float), sound.rate).to_pitch_ac(
         time_step=PITCH_STEP_S, pitch_floor=low, pitch_ceiling=high
     )
-    return found.xs(), found.selected_array["frequency"]
+    hertz = found.selected_array["frequency"]
+    return found.xs()[hertz > 0], 12.0 * np.log2(hertz[hertz > 0])
 
 
-def semitones(hertz: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of 1 Hz."""
-    return 12.0 * np.log2(hertz)
-
-
-def last_rise(sound: Waveform) -> float:
-    """Semitones by which F0 rises over the last `RISE_S` with voice."""
-    seconds, hertz = pitch_track(sound)
-    voiced = np.flatnonzero(hertz > 0)
-    if len(voiced) < 6:
-        return 0.0
-    last = semitones(hertz[voiced[seconds[voiced] > seconds[voiced[-1]] - RISE_S]])
-    n = max(min(6, len(last) // 3), 1)
-    return float(np.median(last[-n:]) - np.median(last[:n]))
+def rise_at(speech: Speech, word: int = -1) -> float:
+    """Semitones by which F0 rises over the last `RISE_S` with voice of a word; NaN without voice."""
+    times, tones = pitch_track(speech.waveform)
+    span = speech.words[word]
+    start, end = speech.phones.edges[[span.first, span.last]]
+    inside = np.flatnonzero((times > start - 0.05) & (times < end))
+    if len(inside) < 6:
+        return float("nan")
+    inside = inside[times[inside] > times[inside[-1]] - RISE_S]
+    third = max(len(inside) // 3, 1)
+    return float(np.median(tones[inside[-third:]]) - np.median(tones[inside[:third]]))
 
 
 def loud_windows(sound: Waveform) -> NDArray[np.int64]:
