@@ -18,8 +18,8 @@ STRONG, MODERATE = 1.0, 0.6  # `lexicon.tones.Tone.emphasis`
 MAX_STRONG_WORDS = 3  # of one span: a whole sentence said so has no accent
 MIN_FOREIGN_LETTERS = 7  # of a word in capitals in a language whose words are not known: hardly an abbreviation
 # A letter or digit of writing with spaces between words, beside which an asterisk is none of emphasis.
-_SPACED = r"[^\W\u0e00-\u0eff\u1000-\u109f\u1780-\u17ff\u3040-\u30ff\u3400-\u9fff]"
-_STARRED = re.compile(rf"(?<!{_SPACED})(?<!\*)(\*{{1,3}})(?![\s*(\[])([^*]{{1,200}})(?<!\s)\1(?!{_SPACED}|\*)")
+SPACED = r"[^\W\u0e00-\u0eff\u1000-\u109f\u1780-\u17ff\u3040-\u30ff\u3400-\u9fff]"
+_STARRED = re.compile(rf"(?<!{SPACED})(?<!\*)(\*{{1,3}})(?![\s*(\[])([^*]{{1,200}})(?<!\s)\1(?!{SPACED}|\*)")
 # A word in capitals that is no part of a code, an address or an abbreviation.
 _CAPITALS = re.compile(r"(?<![\w.&/@#+'’-])[^\W\d_a-z]{2,}(?:['’][^\W\d_a-z]{1,2})?(?![\w&/@#+'’-]|\.\w)")
 _SMALL = re.compile(r"[^\W\d_A-Z]{2}")

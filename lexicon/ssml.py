@@ -25,9 +25,9 @@ from lexicon.languages import language_code
 from lexicon.marked_text import MAX_NESTING, MarkedText, MarkedTextBuilder, NameMark, NodMark, PauseMark, PhoneMark
 from lexicon.say_as import reads_kind, say_as
 from lexicon.ssml_leniency import (
-    APART,
     LANGUAGE,
     RENAMED,
+    TOUCHING,
     TRANSPARENT,
     UNSPOKEN,
     known_attributes,
@@ -93,6 +93,7 @@ class _SsmlReader:
         self._spans: list[str] = []  # for each element the kind of its span, or empty
         self._final_pauses_s: list[float] = []  # of each element
         self._n_unspoken = 0  # elements around whose text is not spoken
+        self._n_tags, self._is_apart = 0, False  # since the last text; whether one of them divides words
         self._replaced_text: list[str] = []  # text of a phoneme or say-as
         self._replaced_attributes: Attributes = {}
         self._base, self._voice_hz = language, voice_hz
@@ -154,13 +155,13 @@ class _SsmlReader:
         if self._elements and self._elements[-1] in LEAF_KINDS:
             raise InputError(f"<{self._elements[-1]}> cannot contain elements; close it before <{tag[:40]}>")
         check_lengths(tag, attributes)
+        self._stand_apart(name)
         self._elements.append(name)
         self._spans.append("")
         self._final_pauses_s.append(0.0)
         self._n_unspoken += self._n_unspoken > 0 or name in UNSPOKEN
         if self._n_unspoken > 1:
             return
-        self._stand_apart(name)
         if name not in self._starts or (name == "speak" and len(self._elements) > 1):
             shown = f"<{tag[:40]}> is not supported; its text is spoken"
             self._note(UNSPOKEN.get(name) or TRANSPARENT.get(name, shown))
@@ -177,10 +178,9 @@ class _SsmlReader:
         if self._n_unspoken:
             self._n_unspoken -= 1
             return
-        if name != "w" and self._elements:  # behind a word 's may follow
-            self._stand_apart(name)
         if name in REPLACED_KINDS:
             self._speak_replacement(name)
+        self._stand_apart(name)
         if pause_s:
             self._builder.add_mark(PauseMark(self._builder.at, pause_s))
         if span:
@@ -201,7 +201,7 @@ class _SsmlReader:
         if inside in REPLACED_KINDS:
             self._replaced_text.append(text)
         else:
-            self._builder.add_text(text)
+            self._add_text(text)
 
     def _speak(self, attributes: Attributes) -> None:
         self._language = attributes.get(LANGUAGE)
@@ -211,9 +211,18 @@ class _SsmlReader:
         self._open_language(attributes)
 
     def _stand_apart(self, name: str) -> None:
-        """Add a space between words that stand side by side in elements alone."""
-        if name in APART and self._builder.last_character.isalnum():
+        """Divide words at a tag (SSML 1.1, 1.2), but within ``<w>`` and where ``<emphasis>`` has a part of a word."""
+        self._n_tags += 1
+        divides = name != "emphasis" or self._n_tags > 1
+        self._is_apart = "w" not in self._elements and (self._is_apart or divides)
+
+    def _add_text(self, text: str) -> None:
+        """Add text, behind a space if it would be one word, or one sentence, with what stands before a tag."""
+        if self._is_apart and TOUCHING.match(f"{self._builder.last_character:1}{text[:2]}"):
             self._builder.add_text(" ")
+        self._builder.add_text(text)
+        if text:
+            self._n_tags, self._is_apart = 0, False
 
     def _open_language(self, attributes: Attributes) -> None:
         """Begin a span of another language, if an element names one."""
@@ -245,13 +254,14 @@ class _SsmlReader:
         attributes, text = self._replaced_attributes, "".join(self._replaced_text)
         alphabet, wanted = attributes.get("alphabet", "ipa"), attributes.get("interpret-as", "").strip()
         if kind == "phoneme" and alphabet in ALPHABETS:
+            self._add_text(" " if self._is_apart and self._builder.last_character.isalnum() else "")
             _add_phonemes(self._builder, text, attributes["ph"], alphabet)
         elif kind == "say-as" and reads_kind(wanted, self._current_language):
-            self._builder.add_text(say_as(wanted, text, attributes.get("format", ""), self._current_language))
+            self._add_text(say_as(wanted, text, attributes.get("format", ""), self._current_language))
         else:
             what = f"alphabet {alphabet[:40]!r}" if kind == "phoneme" else f"kind {wanted[:40]!r}"
             self._note(f"the {what} of <{kind}> is not read in {self._current_language}; its text is spoken as written")
-            self._builder.add_text(text)
+            self._add_text(text)
 
     def _break(self, attributes: Attributes) -> None:
         seconds = look_up_value("strength", attributes.get("strength", "medium"), BREAKS_S)
@@ -307,7 +317,7 @@ class _SsmlReader:
         alias = attributes.get("alias", "")
         if not alias.strip():
             raise InputError('a <sub> needs an alias; write <sub alias="doctor">Dr</sub>')
-        self._builder.add_text(alias)
+        self._add_text(alias)
 
     def _express_as(self, attributes: Attributes) -> None:
         style = (attributes.get("style") or attributes.get("type", "")).strip()

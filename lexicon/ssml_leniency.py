@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from xml.sax.saxutils import escape
 
+from lexicon.emphasis import SPACED
 from lexicon.written_forms import read_table
 
 LANGUAGE = "xml:lang"
@@ -37,7 +38,9 @@ TRANSPARENT: Mapping[str, str] = MappingProxyType({
     "lookup": "<lookup> is not followed; its text is spoken",
     "speak": "a <speak> within another one is read as its text",
 })  # fmt: skip
-APART = frozenset({"w", "audio", "speak", "media", "par", "seq"})  # whose words stand apart from those beside them
+# Characters before and after a tag between which a word or a sentence ends; writing without spaces needs none, and a
+# plural of <sub> stays with it.
+TOUCHING = re.compile(rf"{SPACED}(?!s\b){SPACED}|[.!?…,;:)”][^\W\d_]")
 _KNOWN: Mapping[str, str] = MappingProxyType({
     "speak": f"version {LANGUAGE}", "p": LANGUAGE, "s": LANGUAGE, "w": LANGUAGE, "lang": LANGUAGE,
     "break": "time strength",

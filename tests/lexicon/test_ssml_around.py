@@ -74,6 +74,25 @@ def test_words_stand_apart() -> None:
     assert ssml("<w>one</w><token>two</token>, <w>three</w>'s").text == "one two, three's"
 
 
+@pytest.mark.parametrize(
+    ("inside", "text"),
+    [
+        ('<prosody rate="80%">How are you</prosody><express-as style="sad">Great</express-as>', "How are you Great"),
+        ('Going?<prosody pitch="low">Yes.</prosody><lang xml:lang="fr">Oui</lang>', "Going? Yes. Oui"),
+        ("<x>(one)</x><y>two</y>, <y>three</y>.", "(one) two, three."),
+        ('cup<break/>board, <sub alias="et cetera">etc</sub>and', "cup board, et cetera and"),
+        ('5<sub alias="kilometres">km</sub>of, <sub alias="unit">U</sub>s', "5 kilometres of, units"),
+        ('year<say-as interpret-as="digits">12</say-as>and <phoneme ph="k">x</phoneme>y', "year one two and x y"),
+        ("so <emphasis>really</emphasis><emphasis>good</emphasis>", "so really good"),
+        ("un<emphasis>believ</emphasis>able <w>over<x>whelm</x>ing</w>", "unbelievable overwhelming"),
+        ("<a>「はい」</a><b>これは</b><c>いい</c>", "「はい」これはいい"),
+        ('<sub alias="three">3</sub>.<b>14</b>, "<b>so</b>", <b>$</b><b>5</b>', 'three.14, "so", $5'),
+    ],
+)
+def test_words_of_two_elements_are_two(inside: str, text: str) -> None:
+    assert ssml(inside).text == text
+
+
 def test_a_word_may_have_a_language() -> None:
     found = ssml('say <w xml:lang="de">Tag</w> now')
     assert [run.language for run in found.runs] == [None, "de", None]

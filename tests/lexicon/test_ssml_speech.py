@@ -212,7 +212,7 @@ def test_spans_have_a_voice_and_a_language() -> None:
         '<voice gender="female" language="fr-FR">e</voice><voice xml:lang="en-GB">f</voice>'
         '<voice languages="es it" required="languages">g</voice>'
     )
-    assert found.text == "abcdefg"
+    assert found.text == "a b c d e f g"
     assert [(run.voice, run.language) for run in found.runs] == [
         (None, None),
         ("heart", None),
