@@ -19,6 +19,7 @@ NOD_SIZE_LIMITS = (0.1, 2.0)  # above 12 degrees a nod is a bow
 MAX_PAUSE_S = 10.0  # s, at one position; speech services allow 10 to 20
 MAX_NESTING = 16  # levels of marks within marks
 MAX_NOTES = 20  # on one text
+LEAST_CUT = 1e-6  # by which a value is beyond its limit, rather than rounded
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,6 +163,17 @@ class MarkedTextBuilder:
         """Note what is not followed, once."""
         self._notes.setdefault(text, line)
 
+    def add_pause(self, seconds: float, line: int) -> None:
+        """Add silence at the current position, as far as `MAX_PAUSE_S` reaches, with a note on the rest."""
+        earlier = self._last_pause[1]
+        room = MAX_PAUSE_S - (earlier.seconds if earlier is not None and earlier.at == self._length else 0.0)
+        if seconds > room + LEAST_CUT:
+            self.note(
+                f"silence at one place is {MAX_PAUSE_S:g} s, the limit, not {seconds - room + MAX_PAUSE_S:g}", line
+            )
+        if min(seconds, room) > 0:
+            self.add_mark(PauseMark(self._length, min(seconds, room)))
+
     def add_mark(self, mark: Mark) -> None:
         """Add a mark at the current position; pauses at one position are added up."""
         if isinstance(mark, PauseMark):
@@ -180,29 +192,45 @@ class MarkedTextBuilder:
         self._start_run(replace(before, start=self._length, styles=(*before.styles, style)))
 
     def open_prosody(
-        self, shown: str, *, rate: float = 1.0, volume: float = 1.0, tone: Tone = EVEN, seconds: float | None = None
+        self,
+        shown: str,
+        line: int,
+        *,
+        rate: float = 1.0,
+        volume: float = 1.0,
+        tone: Tone = EVEN,
+        seconds: float | None = None,
     ) -> None:
         """Begin a span of another prosody that `close` ends; in nested spans factors multiply and pitches add up.
 
+        What is beyond the limits lies on them, with a note (SSML 1.1, 3.2.4).
+
         Parameters
         ----------
+        line
+            Of the source.
         tone
             Its emphasis and contour replace those around it.
         seconds
             In which the words of the span are spoken, whatever the rate.
         """
         before = self._begin("prosody", shown, seconds)
+
+        def limited(what: str, value: float, limits: tuple[float, float], unit: str = "") -> float:
+            kept = min(max(value, limits[0]), limits[1])
+            if abs(kept - value) > LEAST_CUT:
+                self.note(f"{what} within {shown} is {kept:g}{unit}, the limit, not {value:.4g}", line)
+            return kept
+
         whole = Tone(
             before.tone.emphasis,
-            before.tone.pitch + tone.pitch,
-            before.tone.range * tone.range,
+            limited("the pitch", before.tone.pitch + tone.pitch, PITCH_LIMITS, " semitones"),
+            limited("the range", before.tone.range * tone.range, RANGE_LIMITS),
             tone.contour or before.tone.contour,
         )
-        check_limits(f"the speaking rate within {shown}", before.rate * rate, RATE_LIMITS)
-        check_limits(f"the volume within {shown}", before.volume * volume, VOLUME_LIMITS)
-        check_limits(f"the pitch within {shown}", round(whole.pitch, 6), PITCH_LIMITS, " semitones")
-        check_limits(f"the range within {shown}", whole.range, RANGE_LIMITS)
-        run = replace(before, start=self._length, rate=before.rate * rate, volume=before.volume * volume, tone=whole)
+        rate = limited("the speaking rate", before.rate * rate, RATE_LIMITS)
+        volume = limited("the volume", before.volume * volume, VOLUME_LIMITS)
+        run = replace(before, start=self._length, rate=rate, volume=volume, tone=whole)
         self._start_run(run, is_own=seconds is not None)
 
     def open_emphasis(self, shown: str, emphasis: float) -> None:

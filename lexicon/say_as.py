@@ -29,6 +29,7 @@ _CLOCK = re.compile(
 _DURATION = re.compile(r"(?:([0-9]{1,3})h ?)?([0-9]{1,3})(?:'|′|m ?)(?:([0-9]{1,2})(?:\"|″|''|s))?")
 _CURRENCY_FIRST = re.compile(r"([A-Z]{3})\s*([0-9][0-9,]*(?:\.[0-9]+)?)")
 _COMPACT = re.compile("[0-9?]{8}")
+_SAME_LETTERS = re.compile(r"([dmy])\1*[-./ ]?")  # yyyymmdd and dd.mm.yyyy are ymd and dmy
 _PARTS = re.compile(r"[0-9]+|[^\W\d_]+|\?+")
 DATE_FORMATS = ("mdy", "dmy", "ymd", "ydm", "md", "dm", "ym", "my", "y", "m", "d")
 Reader = Callable[[str, str], str]
@@ -137,10 +138,11 @@ def _date(text: str, written_format: str) -> str:
         if words == text or not any(character.isdigit() for character in text):
             raise _reading_error(text, "a date", '2024-03-15, with format="ymd" if it is ambiguous')
         return words
-    if written_format not in DATE_FORMATS:
+    order = _SAME_LETTERS.sub(r"\1", written_format.lower())
+    if order not in DATE_FORMATS:
         raise InputError(f"there is no format {written_format[:20]!r} of dates; use {', '.join(DATE_FORMATS)}")
     try:
-        return _date_words(_date_parts(text, written_format))
+        return _date_words(_date_parts(text, order))
     except (ValueError, IndexError, StopIteration) as wrong:
         raise _reading_error(text, f"a date of the format {written_format}", "12/31/1999 for mdy") from wrong
 
@@ -199,9 +201,9 @@ def _bleep(_text: str, _: str) -> str:
 
 KINDS: MappingProxyType[str, Reader] = MappingProxyType({
     "cardinal": _cardinal, "number": _cardinal, "ordinal": _ordinal, "characters": _characters,
-    "spell-out": _characters, "verbatim": _characters, "digits": _digits, "date": _date, "time": _time,
-    "telephone": _telephone, "fraction": _fraction, "currency": _currency, "money": _currency, "unit": _unit,
-    "address": _unit, "expletive": _bleep, "bleep": _bleep,
+    "spell-out": _characters, "verbatim": _characters, "digits": _digits, "number_digit": _digits, "date": _date,
+    "time": _time, "telephone": _telephone, "fraction": _fraction, "currency": _currency, "money": _currency,
+    "unit": _unit, "address": _unit, "expletive": _bleep, "bleep": _bleep,
 })  # fmt: skip
 
 

@@ -22,7 +22,7 @@ from xml.parsers import expat
 from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.languages import language_code
-from lexicon.marked_text import MAX_NESTING, MarkedText, MarkedTextBuilder, NameMark, NodMark, PauseMark, PhoneMark
+from lexicon.marked_text import MAX_NESTING, MarkedText, MarkedTextBuilder, NameMark, NodMark, PhoneMark
 from lexicon.say_as import reads_kind, say_as
 from lexicon.ssml_leniency import (
     LANGUAGE,
@@ -181,8 +181,7 @@ class _SsmlReader:
         if name in REPLACED_KINDS:
             self._speak_replacement(name)
         self._stand_apart(name)
-        if pause_s:
-            self._builder.add_mark(PauseMark(self._builder.at, pause_s))
+        self._builder.add_pause(pause_s, self.line)
         if span:
             self._builder.close(span, f"</{tag}>")
         if name in {"p", "s"}:
@@ -257,18 +256,25 @@ class _SsmlReader:
             self._add_text(" " if self._is_apart and self._builder.last_character.isalnum() else "")
             _add_phonemes(self._builder, text, attributes["ph"], alphabet)
         elif kind == "say-as" and reads_kind(wanted, self._current_language):
-            self._add_text(say_as(wanted, text, attributes.get("format", ""), self._current_language))
+            self._add_text(self._said_as(wanted, text, attributes.get("format", "")))
         else:
             what = f"alphabet {alphabet[:40]!r}" if kind == "phoneme" else f"kind {wanted[:40]!r}"
             self._note(f"the {what} of <{kind}> is not read in {self._current_language}; its text is spoken as written")
             self._add_text(text)
 
+    def _said_as(self, kind: str, text: str, written_format: str) -> str:
+        """Words of a ``<say-as>``; as written, with a note, if they are not of its kind (SSML 1.1, 3.1.9)."""
+        try:
+            return say_as(kind, text, written_format, self._current_language)
+        except InputError as wrong:
+            self._note(f"{wrong}; it is spoken as written")
+            return text
+
     def _break(self, attributes: Attributes) -> None:
         seconds = look_up_value("strength", attributes.get("strength", "medium"), BREAKS_S)
         if "time" in attributes:
             seconds = _parse_time(attributes["time"], "<break>")
-        if seconds > 0:
-            self._builder.add_mark(PauseMark(self._builder.at, seconds))
+        self._builder.add_pause(seconds, self.line)
 
     def _silence(self, attributes: Attributes) -> None:
         kind = attributes.get("type", "").strip().casefold().removesuffix("-exact")
@@ -278,8 +284,8 @@ class _SsmlReader:
         seconds = _parse_time(attributes.get("value", ""), "<mstts:silence>")
         if kind == "tailing":
             self._final_pauses_s[-2] += seconds
-        elif seconds > 0:
-            self._builder.add_mark(PauseMark(self._builder.at, seconds))
+        else:
+            self._builder.add_pause(seconds, self.line)
 
     def _emphasis(self, attributes: Attributes) -> None:
         level = attributes.get("level", "moderate")
@@ -297,6 +303,7 @@ class _SsmlReader:
         contour = attributes.get("contour", "").strip()
         self._builder.open_prosody(
             "<prosody>",
+            self.line,
             rate=parse_rate(attributes.get("rate", "medium")),
             volume=parse_volume(attributes.get("volume", "medium")),
             tone=Tone(

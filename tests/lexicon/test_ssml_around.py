@@ -40,6 +40,13 @@ def ssml(inside: str, language: str = "en-us") -> MarkedText:
         ('<express-as style="neutral" styledegree="2">a</express-as>', "a", "attribute styledegree of <express-as> is"),
         ('<prosody amazon:max-duration="2s">a</prosody>', "a", "amazon:max-duration of <prosody> is not followed"),
         ('<phoneme alphabet="x-sampa" ph="k">a</phoneme>', "a", "alphabet 'x-sampa' of <phoneme> is not read in en-us"),
+        (
+            '<say-as interpret-as="date">tomorrow</say-as>',
+            "tomorrow",
+            "cannot read 'tomorrow' as a date; write it as in",
+        ),
+        ('<say-as interpret-as="cardinal">12 men</say-as>', "12 men", "1,234; it is spoken as written"),
+        ('<say-as interpret-as="date" format="q">1/2</say-as>', "1/2", "there is no format 'q' of dates; use mdy"),
         ('<say-as interpret-as="interjection">wow</say-as>', "wow", "the kind 'interjection' of <say-as> is not read"),
         (
             '<voice name="en-US-JennyNeural">a</voice>',
@@ -68,6 +75,45 @@ def test_what_is_not_followed_is_spoken_around_with_a_note(inside: str, text: st
 )
 def test_attributes_without_an_effect_need_no_note(inside: str) -> None:
     assert ssml(inside).notes == ()
+
+
+@pytest.mark.parametrize(
+    ("inside", "note", "rate", "volume", "pitch", "range_"),
+    [
+        ("<prosody rate='300%'>a</prosody>", "the speaking rate within <prosody> is 2, the limit, not 3", 2, 1, 0, 1),
+        (
+            "<prosody rate='slow'><prosody rate='x-slow'>a</prosody></prosody>",
+            "is 0.5, the limit, not 0.375",
+            0.5,
+            1,
+            0,
+            1,
+        ),
+        ("<prosody volume='+20dB'>a</prosody>", "the volume within <prosody> is 2, the limit, not 10", 1, 2, 0, 1),
+        (
+            "<prosody pitch='+900Hz'>a</prosody>",
+            "pitch within <prosody> is 12 semitones, the limit, not 32",
+            1,
+            1,
+            12,
+            1,
+        ),
+        ("<prosody pitch='-40st' range='300%'>a</prosody>", "pitch within <prosody> is -12 semitones", 1, 1, -12, 2),
+    ],
+)
+def test_prosody_beyond_the_limits_lies_on_them(
+    inside: str, note: str, rate: float, volume: float, pitch: float, range_: float
+) -> None:
+    found = ssml(inside)
+    run = found.runs[0]
+    assert (run.rate, run.volume, run.tone.pitch, run.tone.range) == (rate, volume, pitch, range_)
+    assert any(note in noted for noted in found.notes), found.notes
+
+
+def test_silence_beyond_the_limit_lies_on_it() -> None:
+    found = ssml("a<break time='8s'/><break time='12s'/><break/> <break time='1s'/>b")
+    assert found.marks == (PauseMark(1, 10.0), PauseMark(2, 1.0))
+    assert found.notes[0] == "SSML, line 1: silence at one place is 10 s, the limit, not 20"
 
 
 def test_words_stand_apart() -> None:
