@@ -42,6 +42,10 @@ _READ_ACRONYMS = word_set(
     "MPEG NAFTA NASCAR NASDAQ NIMBY NORAD OECD OPEC OSHA OXFAM PAYPAL POTUS RADAR RICO SARS SCOTUS SCUBA SONAR SONY "
     "SWAT UEFA UNESCO UNICEF UNIX USAID VISA YAML YMCA YOLO"
 )
+# Short words that are shouted and are no initialisms.
+_SHOUTED = word_set(
+    "ASK BOY BUY CRY DID DIE EAT FAR FEW GOD GUN HIT HUH JOY LIE MAD NAH OWN PAY SAD TRY UGH USE WAR YAY YEP YUP"
+)
 _MIN_WORD_LETTERS = 4  # a text with such a word in capitals holds more than initialisms
 
 
@@ -97,7 +101,7 @@ def is_word_in_capitals(word: str, before: str) -> bool:
     ):
         return False
     if len(plain) <= _MAX_SPELLED_LETTERS:
-        return plain in _function_words()
+        return plain in _function_words() or plain in _SHOUTED
     return _is_word(plain) and not is_read_by_letters(plain)
 
 

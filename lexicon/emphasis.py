@@ -19,7 +19,7 @@ MAX_STRONG_WORDS = 3  # of one span: a whole sentence said so has no accent
 MIN_FOREIGN_LETTERS = 7  # of a word in capitals in a language whose words are not known: hardly an abbreviation
 # A letter or digit of writing with spaces between words, beside which an asterisk is none of emphasis.
 SPACED = r"[^\W\u0e00-\u0eff\u1000-\u109f\u1780-\u17ff\u3040-\u30ff\u3400-\u9fff]"
-_STARRED = re.compile(rf"(?<!{SPACED})(?<!\*)(\*{{1,3}})(?![\s*(\[])([^*]{{1,200}})(?<!\s)\1(?!{SPACED}|\*)")
+_STARRED = re.compile(rf"(?<!{SPACED})(?<!\*)(\*{{1,3}})(?![\s*(\[]|\.\w)([^*]{{1,200}})(?<!\s)\1(?!{SPACED}|\*)")
 # A word in capitals that is no part of a code, an address or an abbreviation.
 _CAPITALS = re.compile(r"(?<![\w.&/@#+'’-])[^\W\d_a-z]{2,}(?:['’][^\W\d_a-z]{1,2})?(?![\w&/@#+'’-]|\.\w)")
 _SMALL = re.compile(r"[^\W\d_A-Z]{2}")
@@ -29,6 +29,7 @@ _STRETCHED = re.compile(r"(.)\1{2,}")  # SOOO, YESSS, COOOL
 _AFTER_NUMBER = re.compile(r"[0-9]\s*\Z")  # 5 AM, 12 IN
 _AFTER_TOWN = re.compile(r"[A-Z][a-z]+, \Z")  # Portland, OR 97201
 MAX_CODE_LETTERS = 2  # of units, halves of the day and states
+_SUBJECT = re.compile(r"(?:he|she|it|who|which|that|this|everyone|nobody)\s+\Z", re.IGNORECASE)  # she *looks* well
 _BEFORE = 24  # characters before a word that hold the word before it
 
 
@@ -61,23 +62,34 @@ def find_emphases(text: str, language: str) -> Iterator[EmphasisedWords]:
             if has_small_letters:
                 yield from _in_capitals(line, start, (at, match.start()), language)
             at = match.end()
-            if any(map(str.isalnum, match[2])) and not is_direction(match[2]):
+            before = line[max(match.start() - _BEFORE, 0) : match.start()]
+            is_stage = is_direction(match[2], begins=_SENTENCE_START.search(before) is not None)
+            if any(map(str.isalnum, match[2])) and (not is_stage or _SUBJECT.search(before)):
                 yield _emphasised(match[2], start + match.start(), start + at)
         if has_small_letters:
             yield from _in_capitals(line, start, (at, len(line)), language)
         start += len(line)
 
 
-def is_direction(words: str) -> bool:
-    """Whether words between asterisks say what somebody does, or how: a mood, a manner, a sound, or a verb (sighs)."""
+def is_direction(words: str, *, begins: bool = False) -> bool:
+    """Whether words between asterisks say what somebody does, or how: a mood, a manner, a sound, or a verb (sighs).
+
+    Parameters
+    ----------
+    begins
+        They begin a sentence, where also verbs are directions that are often emphasised elsewhere: takes, walks.
+    """
     found = _WORD.findall(words.casefold())
-    return bool(found) and (found[0] in _verbs() or all(word in _direction_words() for word in found))
+    if not found:
+        return False
+    is_moved = begins and words[0].islower() and found[0] in _verbs("stage")
+    return is_moved or found[0] in _verbs("verb") or all(word in _direction_words() for word in found)
 
 
 @functools.cache
-def _verbs() -> frozenset[str]:
+def _verbs(kind: str) -> frozenset[str]:
     """Verbs of directions, as they begin one: sighs, sighing."""
-    return frozenset(form for verb in read_table("directions.tsv")["verb"][0].split() for form in _forms(verb))
+    return frozenset(form for verb in read_table("directions.tsv")[kind][0].split() for form in _forms(verb))
 
 
 def _forms(verb: str) -> tuple[str, str, str]:
@@ -90,7 +102,7 @@ def _forms(verb: str) -> tuple[str, str, str]:
 @functools.cache
 def _direction_words() -> frozenset[str]:
     table = read_table("directions.tsv")
-    return _verbs() | frozenset(word for kind in ("noun", "mood", "manner") for word in table[kind][0].split())
+    return _verbs("verb") | frozenset(word for kind in ("noun", "mood", "manner") for word in table[kind][0].split())
 
 
 def _in_capitals(line: str, start: int, span: tuple[int, int], language: str) -> Iterator[EmphasisedWords]:
@@ -117,6 +129,8 @@ def _is_emphasised(line: str, match: "re.Match[str]", language: str) -> bool:
         if len(word) <= MAX_CODE_LETTERS and may_be_code:
             return False
         words = _WORD.findall(before)
+        if word == "AM" and words[-1:] != ["I"]:  # the AM radio
+            return False
         spellings = {word, _STRETCHED.sub(r"\1", word), _STRETCHED.sub(r"\1\1", word)}
         return any(len(form) > 1 and is_word_in_capitals(form, words[-1] if words else "") for form in spellings)
     return word.casefold() in common_words(language) or len(word) >= MIN_FOREIGN_LETTERS
