@@ -125,6 +125,42 @@ def test_a_server_that_is_not_there_is_said() -> None:
         client_of(server).sound(TEXT, 1.0)
 
 
+def test_an_answer_that_breaks_off_is_asked_for_again() -> None:
+    def half(content: dict[str, Any]) -> Reply:
+        _, headers, body = says(content)
+        return 200, {**headers, "Content-Length": str(len(body))}, body[: len(body) // 2]
+
+    broken = iter([True])
+    with speech_server(speech=lambda content: half(content) if next(broken, False) else says(content)) as server:
+        sound, _ = client_of(server).sound(TEXT, 1.0)
+    assert sound.duration == spoken(TEXT).waveform.duration
+    with speech_server(speech=half) as server, pytest.raises(BackendError, match=r"broke .* bytes before the end"):
+        client_of(server).sound(TEXT, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "order", "rate"),
+    [
+        ("audio/pcm", "<i2", 24_000),
+        ("audio/L16;rate=16000;channels=1", ">i2", 16_000),
+        ("audio/l16; codec=pcm; rate=22050", "<i2", 22_050),
+    ],
+)
+def test_samples_without_a_header_are_read_by_their_media_type(kind: str, order: str, rate: int) -> None:
+    samples = 0.5 * np.sin(np.arange(8000) / 15)
+    body = np.round(samples * 32768).astype(order).tobytes() + b"\0"
+    found = decode_sound(body, kind)
+    assert found.rate == rate
+    np.testing.assert_allclose(found.samples, samples, atol=1e-4)
+    with pytest.raises(DataError, match="its rate is 7 Hz"):
+        decode_sound(body, "audio/pcm;rate=7")
+
+
+def test_silence_is_no_speech() -> None:
+    with pytest.raises(DataError, match="it is silent"):
+        decode_sound(bytes(4000), "audio/pcm")
+
+
 @pytest.mark.parametrize("body", [b"", b"<html>no</html>", b"RIFF\x04\0\0\0WAVE"])
 def test_what_is_no_sound_is_refused(body: bytes) -> None:
     with (

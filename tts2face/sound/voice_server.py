@@ -103,7 +103,8 @@ class SpeechClient:
             if captioned is not None:
                 return captioned
             self._states_words = False
-        return self._wave(self._ask(f"{self.address.base}/audio/speech", content)), []
+        answer = self._ask(f"{self.address.base}/audio/speech", content)
+        return self._wave(answer.body, answer.kind), []
 
     def _captioned(self, content: Mapping[str, Any]) -> tuple[Waveform, list[tuple[str, float, float]]] | None:
         """Sound and words by the route of Kokoro-FastAPI; None where a server has no such route."""
@@ -121,19 +122,19 @@ class SpeechClient:
             return None
         return sound, words
 
-    def _wave(self, body: bytes) -> Waveform:
+    def _wave(self, body: bytes, kind: str = "") -> Waveform:
         try:
-            return decode_sound(body)
+            return decode_sound(body, kind)
         except DataError as wrong:
             raise DataError(
                 f"the voice server {self.address.place} sends no sound that can be read: {wrong}; check the URL"
             ) from wrong
 
-    def _ask(self, url: str, content: Mapping[str, Any]) -> bytes:
+    def _ask(self, url: str, content: Mapping[str, Any]) -> _Answer:
         answer = self._try(url, content, n_tries=1 + len(WAITS_S))
         assert answer is not None  # all tries of more than one raise
         if answer.status == 200:
-            return answer.body
+            return answer
         said = f"{answer.status}{_words_of(answer)}"
         if 300 <= answer.status < 400:
             raise BackendError(
@@ -197,6 +198,9 @@ class SpeechClient:
                 )
             if time.monotonic() > until:
                 raise TimeoutError(f"an answer lasts longer than {LONGEST_S:.0f} s")
+        # http.client ends quietly where a connection breaks
+        if response.length:
+            raise ConnectionError(f"the connection broke {response.length} bytes before the end of its answer")
         return bytes(found)
 
 
