@@ -5,6 +5,7 @@ Decided by words and punctuation alone, after Wells, English Intonation (2006), 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Literal, NamedTuple
 
@@ -14,12 +15,13 @@ WORDS = MappingProxyType({name: frozenset(words.split()) for name, words in {
     "auxiliary": "am is are was were do does did have has had can could will would shall should may might must need "
     "ought dare cannot innit isn't aren't wasn't weren't don't doesn't didn't haven't hasn't hadn't can't couldn't "
     "won't wouldn't shan't shouldn't mightn't mustn't needn't oughtn't ain't",
-    "preposition": "in at on to for from with by of about since until till through under over after before into near",
+    "preposition": "in at on to for from with by of about since until till through under over after before into near "
+    "like",
     "pronoun": "i you he she it we they there this that these those one",
     "negative": "not no never nobody nothing none neither nowhere hardly scarcely seldom rarely barely cannot",
     # before a question, without a part in it
     "opener": "and but so or well oh ah hey then now okay ok right please sorry excuse hi hello look listen anyway "
-    "actually honestly seriously tell say yes no yeah um uh er because still also pardon wait however",
+    "actually honestly seriously tell say yes no yeah um uh er because still also pardon wait however guess",
     # after a statement, asking for consent; they rise
     "consent": "right okay ok yes no yeah huh eh hm hmm correct agreed understood really seriously",
     # behind "or": no other answer
@@ -30,6 +32,8 @@ WORDS = MappingProxyType({name: frozenset(words.split()) for name, words in {
     "anyway though again here today tonight and but or so the a an",
     "open choice": "whether either any anyone anybody anything ever",  # any brothers or sisters: yes or no
     "no item": "but so because which who when where while",  # of a list
+    "opinion": "think say suppose reckon believe imagine guess",  # what is that, would you say
+    "determiner": "a the these those my your his her our their first last next past",
 }.items()})  # fmt: skip
 SENTENCE_MARKS = frozenset(".!?")
 LONGEST_ITEM = 4  # words of an item of a list
@@ -128,13 +132,20 @@ def _tag(said: Sequence[str], clauses: Sequence[_Clause]) -> Movement | None:
     if not is_verb or not (has_mark or said[at].endswith("n't")) or _is_inverted(said, first, at):
         return None
     is_negative = said[at].endswith("n't") or size > TAG
-    was_negative = any(word in WORDS["negative"] or word.endswith("n't") for word in before)
+    was_negative = any(word in WORDS["negative"] or word.endswith("n't") for word in before) or _has_few(before)
     return Movement("fall" if is_negative != was_negative else "rise", at, end - 1)
 
 
+def _has_few(words: Sequence[str]) -> bool:
+    """Whether "few" denies: few people know that, but not: a few people know that."""
+    return any(word == "few" and last not in WORDS["determiner"] for last, word in pairwise(["", *words]))
+
+
 def _is_inverted(said: Sequence[str], first: int, end: int) -> bool:
-    """Whether words begin as a question does."""
+    """Whether words begin as a question does; "what a view" is an exclamation."""
     at = _behind_openers(said, first, end)
+    if said[at : at + 2] in (["what", "a"], ["what", "an"]):
+        return False
     return at < end and (said[at] in WORDS["auxiliary"] or said[at] in WORDS["question"]) and end - at > 1
 
 
@@ -151,15 +162,24 @@ def _is_opener(said: Sequence[str], clause: _Clause) -> bool:
 
 def _head(said: Sequence[str], clauses: Sequence[_Clause]) -> int:
     """Index of the clause that asks: the last one in the order of a question, or the first behind the openers."""
-    asking = [at for at, clause in enumerate(clauses) if _asks(said, clause)]
+    asking = [at for at, clause in enumerate(clauses) if _asks(said, clause) and not _is_opinion(said, clause)]
     if asking:
         # a choice or a list goes on: are you coming, or are you staying
         first_of_choice = [at for at in asking if not _is_joined(said, clauses[at])]
         return (first_of_choice or asking)[-1]
     kept = [at for at, clause in enumerate(clauses) if not _is_opener(said, clause)]
+    # in the end, who won? if not now, when?
+    asked = _question_word(said, clauses[-1])
+    if len(kept) > 1 and asked is not None and (_size(clauses[-1]) > 1 or said[clauses[0].first] == "if"):
+        return kept[-1]
     # what, now?
     kept = [at for at in kept if said[clauses[at].first] not in WORDS["question"] or _size(clauses[at]) > 1] or kept
     return kept[0] if kept else 0
+
+
+def _is_opinion(said: Sequence[str], clause: _Clause) -> bool:
+    """Whether a clause only asks whose opinion is asked for, as in "how old is it, would you say"."""
+    return _size(clause) == 3 and said[clause.first + 1] == "you" and said[clause.end - 1] in WORDS["opinion"]
 
 
 def _size(clause: _Clause) -> int:
@@ -186,7 +206,7 @@ def _question_word(said: Sequence[str], clause: _Clause) -> int | None:
     at = _behind_openers(said, *clause)
     if said[at] in WORDS["preposition"] and at + 1 < clause.end:
         at += 1
-    found = said[at].removesuffix("'s").removesuffix("'re").removesuffix("'d").removesuffix("'ll")
+    found = said[at].removesuffix("'s").removesuffix("'re").removesuffix("'d").removesuffix("'ll").removesuffix("'ve")
     return at if found in WORDS["question"] else None
 
 
@@ -214,7 +234,8 @@ def _choices(said: Sequence[str], clauses: Sequence[_Clause]) -> list[Movement]:
 
 def _is_choice(said: Sequence[str], first: int, at: int, end: int) -> bool:
     """Whether an ``or`` stands between answers of which one is expected."""
-    if WORDS["open choice"] & {*said[first:at]} or said[at + 1] in WORDS["extender"]:
+    is_open = any(word == "or" and after in WORDS["extender"] for word, after in pairwise(said[at:end]))
+    if is_open or WORDS["open choice"] & {*said[first:at]}:
         return False
     is_amount = (
         said[at - 1] in WORDS["number"] and said[at + 1] in WORDS["number"] and at + 2 < end
@@ -241,8 +262,10 @@ def _list_items(said: Sequence[str], clauses: Sequence[_Clause]) -> Iterator[Mov
 
 def _movement(said: Sequence[str], tune: Tune, clause: _Clause) -> Movement:
     """A movement that begins on the last stressed word of a clause and ends with it."""
-    tail = range(clause.end - 1, max(clause.first - 1, clause.end - 1 - LONGEST_TAIL), -1)
+    is_extended = _size(clause) > 2 and said[clause.end - 2] == "or" and said[clause.end - 1] in WORDS["extender"]
+    last = clause.end - 1 - (2 if is_extended else 0)  # ill or something
+    tail = range(last, max(clause.first - 1, last - LONGEST_TAIL), -1)
     stressed = next((at for at in tail if said[at] not in WORDS["unstressed"]), None)
     if stressed is None:
-        stressed = clause.end - 1
+        stressed = last
     return Movement(tune, stressed, clause.end - 1)

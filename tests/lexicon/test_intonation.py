@@ -33,6 +33,10 @@ def tunes(text: str) -> str:
         ("Mary, are you awake?", "awake↗"),
         ('"Are you ready?" she asked.', "ready↗"),
         ("Is it raining?! Yes.", "raining↗"),
+        ("Is he from Leeds or somewhere?", "Leeds↗"),
+        ("Did you ask Bob or Ann or anyone like that?", "that↗"),
+        ("Is it far, would you say?", "say↗"),
+        ("It is cold, don't you think?", "think↗"),
     ],
 )
 def test_questions_that_ask_for_yes_or_no_rise(text: str, expected: str) -> None:
@@ -56,6 +60,13 @@ def test_questions_that_ask_for_yes_or_no_rise(text: str, expected: str) -> None
         "If it snows, what will they do?",
         "What would you like to eat or drink?",
         "I wonder if they know.",
+        "In the end, who won?",
+        "If not now, when?",
+        "Guess who I met?",
+        "Who've you told?",
+        "Like what?",
+        "How many people came, would you say?",
+        "What is it, do you think?",
     ],
 )
 def test_statements_and_questions_with_a_question_word_stay(text: str) -> None:
@@ -74,7 +85,7 @@ def test_statements_and_questions_with_a_question_word_stay(text: str) -> None:
         ("Did you see it or not?", "see↗ not↘"),
         ("Are you mad or what?", "what↘"),
         # no choice between two answers
-        ("Do you need a pen or something?", "something↗"),
+        ("Do you need a pen or something?", "pen↗"),
         ("Did two or three guests stay?", "stay↗"),
         ("Is it more or less ready?", "ready↗"),
         ("Do you know whether they won or lost?", "lost↗"),
@@ -95,6 +106,9 @@ def test_alternatives_rise_but_the_last(text: str, expected: str) -> None:
         ("She sings well doesn't she?", "doesn't↘"),
         ("They never called, did they?", "did↘"),
         ("You can't swim, can you?", "can↘"),
+        ("Few people know that, do they?", "do↘"),
+        ("A few people know that, don't they?", "don't↘"),
+        ("What a view, isn't it?", "isn't↘"),
         # of one polarity, or asking for consent
         ("So you know him, do you?", "do↗"),
         ("Let's start, shall we?", "shall↗"),
