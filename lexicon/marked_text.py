@@ -109,6 +109,8 @@ class MarkedText:
         Language declared in the text (SSML), or None.
     notes
         What of the source is not followed, each a sentence without its stop.
+    foreign_styles
+        Names of styles that are none of a speech service that is known, and need be none of the palette.
     """
 
     text: str
@@ -116,6 +118,7 @@ class MarkedText:
     marks: tuple[Mark, ...] = ()
     language: str | None = None
     notes: tuple[str, ...] = ()
+    foreign_styles: frozenset[str] = frozenset()
 
     @property
     def has_voice_changes(self) -> bool:
@@ -147,6 +150,7 @@ class MarkedTextBuilder:
         self._open_spans: list[_OpenSpan] = []
         self._last_pause: tuple[int, PauseMark | None] = (0, None)
         self._notes: dict[str, int] = {}  # with the line of the first
+        self._foreign_styles: set[str] = set()
 
     @property
     def at(self) -> int:
@@ -186,8 +190,9 @@ class MarkedTextBuilder:
             self._last_pause = (len(self._marks), mark)
         self._marks.append(mark)
 
-    def open_style(self, kind: str, shown: str, style: str) -> None:
-        """Begin a span of a style that `close` ends; nested styles accumulate."""
+    def open_style(self, kind: str, shown: str, style: str, *, is_foreign: bool = False) -> None:
+        """Begin a span of a style that `close` ends; nested styles accumulate; a foreign one may not exist."""
+        self._foreign_styles |= {style} if is_foreign else set()
         before = self._begin(kind, shown)
         self._start_run(replace(before, start=self._length, styles=(*before.styles, style)))
 
@@ -294,7 +299,8 @@ class MarkedTextBuilder:
             if not runs or not runs[-1].is_spoken_as(merged):
                 runs.append(merged)
         notes = [f"SSML, line {line}: {text}" for text, line in [*self._notes.items()][:MAX_NOTES]]
-        return MarkedText("".join(self._pieces), tuple(runs), tuple(self._marks), language, tuple(notes))
+        styles = frozenset(self._foreign_styles)
+        return MarkedText("".join(self._pieces), tuple(runs), tuple(self._marks), language, tuple(notes), styles)
 
     def _begin(self, kind: str, shown: str, seconds: float | None = None) -> StyleRun:
         """Open a span at the current position; the run before it."""

@@ -93,6 +93,7 @@ class _SsmlReader:
         self._spans: list[str] = []  # for each element the kind of its span, or empty
         self._final_pauses_s: list[float] = []  # of each element
         self._n_unspoken = 0  # elements around whose text is not spoken
+        self._tag = ""  # the last one that is followed, as it is written
         self._n_tags, self._is_apart = 0, False  # since the last text; whether one of them divides words
         self._replaced_text: list[str] = []  # text of a phoneme or say-as
         self._replaced_attributes: Attributes = {}
@@ -169,7 +170,7 @@ class _SsmlReader:
         read, unread = known_attributes(name, {renamed.get(key, key): value for key, value in attributes.items()})
         for attribute in unread:
             self._note(f"the attribute {attribute[:40]} of <{tag}> is not followed")
-        self._spans[-1] = name if name in SPAN_KINDS else ""
+        self._spans[-1], self._tag = name if name in SPAN_KINDS else "", tag
         self._starts[name](read)
 
     def _end(self, tag: str) -> None:
@@ -330,9 +331,15 @@ class _SsmlReader:
         style = (attributes.get("style") or attributes.get("type", "")).strip()
         if not style:
             raise InputError('<express-as> needs a style; write <express-as style="delighted">')
-        if nearest := nearest_style(style):
+        nearest = nearest_style(style)
+        if nearest is not None:
             self._note(f"the style {style[:40]} is {nearest} here, unless the palette has one of its own")
-        self._builder.open_style("express-as", f'<express-as style="{style}">', style)
+        is_foreign = nearest is None and ":" in self._tag
+        if is_foreign:
+            self._note(
+                f"the style {style[:40]} of <{self._tag}> is not followed, unless the palette has one of its name"
+            )
+        self._builder.open_style("express-as", f'<express-as style="{style}">', style, is_foreign=is_foreign)
 
 
 def _parse_time(written: str, element: str) -> float:

@@ -9,6 +9,8 @@ from lexicon.marked_text import MAX_NOTES, MarkedText, NameMark, PauseMark
 from lexicon.ssml_leniency import nearest_style, with_plain_entities
 from lexicon.text_marks import parse_marks
 from tts2face.models.palette_file import load_palette
+from tts2face.request import Request
+from tts2face.session.prepared import prepare, with_styles_of
 
 
 def ssml(inside: str, language: str = "en-us") -> MarkedText:
@@ -204,6 +206,16 @@ def test_styles_of_services_are_the_nearest_of_the_palette() -> None:
     )
     assert [run.styles for run in found.runs] == [("cheerful",), (), ("excited",), ()]
     assert found.notes[0].endswith("the style cheerful is delighted here, unless the palette has one of its own")
+
+
+def test_styles_of_services_that_are_not_known_are_spoken_around_unless_the_palette_has_them() -> None:
+    text = '<mstts:express-as style="santa">a</mstts:express-as> <express-as style="happy">b</express-as>'
+    prepared = prepare(Request(text=f"<speak>{text}</speak>"))
+    assert "the style santa of <mstts:express-as> is not followed, unless the palette" in prepared.notes[0]
+    for names, styles in ((["delighted"], {(), ("delighted",)}), (["santa", "happy"], {(), ("santa",), ("happy",)})):
+        assert {run.styles for run in with_styles_of(prepared, names).text.runs} == styles
+    own = prepare(Request(text='<speak><express-as style="santa">a</express-as></speak>'))
+    assert with_styles_of(own, ["delighted"]).text.runs[0].styles == ("santa",)
 
 
 def test_a_fragment_is_ssml_where_the_markup_says_so() -> None:

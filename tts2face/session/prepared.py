@@ -283,12 +283,14 @@ def marked_styles(text: MarkedText) -> tuple[str, ...]:
 
 
 def with_styles_of(prepared: PreparedRequest, names: Sequence[str]) -> PreparedRequest:
-    """A request whose marks name styles of a palette, where they name those of a speech service that are none of it."""
+    """A request whose marks name styles of a palette, and not those of a speech service that are none of it."""
     text = prepared.text
-    runs = [
-        replace(run, styles=tuple(name if name in names else nearest_style(name) or name for name in run.styles))
-        for run in text.runs
-    ]
+    known = {
+        name: name if name in names else nearest_style(name) or name
+        for name in {name for run in text.runs for name in run.styles}
+        if name in names or name not in text.foreign_styles
+    }
+    runs = [replace(run, styles=tuple(known[name] for name in run.styles if name in known)) for run in text.runs]
     return replace(prepared, text=replace(text, runs=tuple(runs)))
 
 
