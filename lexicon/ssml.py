@@ -74,10 +74,10 @@ def parse_ssml(text: str, language: str = DEFAULT_LANGUAGE, voice_hz: VoiceHz = 
     try:
         return reader.read(text)
     except expat.ExpatError as broken:
-        reason = expat.ErrorString(broken.code)
-        raise InputError(
-            f"the SSML is not well-formed: {reason} in line {broken.lineno}; correct that line"
-        ) from broken
+        reason = expat.ErrorString(broken.code).removeprefix("not well-formed ").strip("()")
+        is_open = reason == "mismatched tag" and reader.innermost
+        remedy = f"close <{reader.innermost}>" if is_open else "correct that line"
+        raise InputError(f"the SSML is not well-formed: {reason} in line {broken.lineno}; {remedy}") from broken
     except UnicodeEncodeError as broken:
         raise InputError(f"the SSML contains an unpaired surrogate (character {broken.start}); remove it") from broken
     except InputError as wrong:
@@ -130,6 +130,11 @@ class _SsmlReader:
     def line(self) -> int:
         """Current line of the parser."""
         return self._parser.CurrentLineNumber
+
+    @property
+    def innermost(self) -> str:
+        """Name of the innermost element that is open; empty without one."""
+        return self._elements[-1][:40] if self._elements else ""
 
     def read(self, text: str) -> MarkedText:
         """Parse the whole document."""

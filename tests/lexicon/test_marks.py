@@ -133,8 +133,8 @@ def test_speeds(written: str, rate: float) -> None:
 @pytest.mark.parametrize(
     ("inside", "reason"),
     [
-        ("a\n\n<p>", "not well-formed: mismatched tag in line 3"),
-        ("2 < 3", "not well-formed"),
+        ("a\n\n<p>", "not well-formed: mismatched tag in line 3; close <p>"),
+        ("2 < 3", "the SSML is not well-formed: invalid token in line 1; correct that line"),
         ("[nod]", "square brackets cannot be combined with SSML"),
         ("\ud800", "unpaired surrogate"),
         ("<break time='soon'/>", "cannot read the time 'soon' of a <break>"),
