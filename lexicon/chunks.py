@@ -24,6 +24,7 @@ _MAX_UNDIVIDED_CHARACTERS = 600  # a longer word, as of digits, is divided; addr
 _CONTEXT_BEFORE, _CONTEXT_AFTER = 24, 40  # characters around a full stop by which an abbreviation is recognised
 _SHORT_LINE = 50  # characters at most of a line of a poem, a list or a title; text that is wrapped has longer ones
 _LAST_WORD = re.compile(r"([^\W\d_]*)[^\w.]*\Z|\.\s*\Z")
+_ITEM = re.compile(r"\s*(?:[-–—*•]|\(?(?:[0-9]{1,3}|[a-z])[.)])\s")  # of a list: - milk, 2. eggs, (b) bread
 _PRONOUN = re.compile(r"I\b")
 
 
@@ -89,6 +90,10 @@ def _is_wrapped(text: str, start: int, end: "re.Match[str]") -> bool:
     """Whether a sentence goes on behind the end of a line, as in text that is wrapped at a width."""
     first = max(text.rfind("\n", start, end.start()) + 1, start)
     line, following = text[first : end.start()].rstrip(), text[end.end() : end.end() + _CONTEXT_AFTER].lstrip()
+    line_start = text.rfind("\n", 0, end.start()) + 1  # an item may be a number and sentences
+    is_list = line.endswith(":") or _ITEM.match(text, line_start) or _ITEM.match(text, start)
+    if is_list and _ITEM.match(following):
+        return False
     last = _LAST_WORD.search(line[-_CONTEXT_BEFORE:])
     # no line of a poem or a list ends behind a function word, or with the full stop of an abbreviation
     if last is None or last[1] is None or len(line) > _SHORT_LINE or is_function_word(last[1]):

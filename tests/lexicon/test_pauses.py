@@ -58,6 +58,10 @@ def test_an_ellipsis_within_a_sentence_is_a_mark_of_its_own(dots: str) -> None:
          ["The committee of the national museum decided last week Thursday was free."]),
         ("Ich sah den Hund\nund die Katze.", ["Ich sah den Hund und die Katze."]),
         ("Dr.\nSmith came.", ["Dr. Smith came."]),
+        ("1. Wash them\n2. Dry it in\n3. Go", ["1.", "Wash them", "2.", "Dry it in", "3.", "Go"]),
+        ("- call them\n- a\n* b", ["- call them", "- a", "* b"]),
+        ("Do this:\na) milk and\nb) eggs", ["Do this:", "a) milk and", "b) eggs"]),
+        ("It was so\n– he said – that", ["It was so – he said – that"]),
     ],
 )  # fmt: skip
 def test_a_line_that_ends_on_purpose_is_a_sentence(text: str, sentences: list[str]) -> None:
