@@ -40,6 +40,7 @@ _BEFORE_R = MappingProxyType({
     "ʌ": "ɜ", "aɪ": "aɪ ə", "aʊ": "aʊ ə", "ɔɪ": "ɔɪ ə",
 })  # fmt: skip
 _LINKING = frozenset({"ɑ", "ɔ", "ɜ", "ə", "eə", "ɪə", "ʊə"})
+_HAM = re.compile(r"^[A-Z].*[^aeiou]ham$")
 _FINAL_R = re.compile(r"re?$")
 _VOWEL_LETTERS = re.compile(r"[aeiouy]+w?")
 _YOD_BEFORE = frozenset({"t", "d", "n"})
@@ -91,7 +92,16 @@ def _word(word: str, american: Segments, *, is_last: bool) -> Segments:
         return plain
     if is_function_word(word) and readings:
         return _stressed_as(readings[BEFORE_PAUSE if is_last and BEFORE_PAUSE in readings else DEFAULT], plain)
-    return readings.get(DEFAULT) or _of_parts(word) or plain
+    return _with_weak_ham(readings.get(DEFAULT) or _of_parts(word) or plain, word)
+
+
+def _with_weak_ham(segments: Segments, word: str) -> Segments:
+    """Phones of a place in -ham, which the dictionary has in full for some of them: Balham, Birmingham."""
+    *_, vowel, end = segments or (IpaPhone("m"),) * 2
+    if not _HAM.search(word) or (vowel.phone, end.phone) != ("a", "m") or vowel.stress == 1:
+        return segments
+    rest = segments[:-3] if segments[-3].phone == "h" else segments[:-2]
+    return (*rest, IpaPhone("ə", is_syllabic=True), end)
 
 
 def _of_parts(word: str) -> Segments | None:

@@ -15,6 +15,7 @@ from types import MappingProxyType
 from lexicon.g2p import segments_by_rules
 from lexicon.ipa import IpaPhone
 from lexicon.phones import ARPABET, PHONES, nearest_phones
+from lexicon.pinyin import read_pinyin
 from lexicon.written_forms import read_table
 
 BY_LETTERS = "letters"  # in place of a language
@@ -51,6 +52,7 @@ _GRAPHEME = re.compile("|".join(sorted(_GRAPHEMES, key=len, reverse=True)))
 # Steps before the letters are read: gue and que, soft c, silent h, the x of names, yes and my, final ng.
 _STEPS = (
     (re.compile(r"gu(?=[ei])"), "g"), (re.compile(r"qu(?=[ei])"), "k"),
+    (re.compile(r"^hu(?=a)"), "w"),
     (re.compile(r"c(?=[eiy])"), "s"), (re.compile(r"h$|(?<=[aeiou])h(?![aeiou])"), ""), (re.compile(r"^x"), "z"),
     (re.compile(r"(?<=i)y(?=[aeiou])"), ""), (re.compile(r"y(?![aeiou])"), "i"), (re.compile(r"ng$"), "ŋ"),
 )  # fmt: skip
@@ -71,9 +73,10 @@ def spelling_language(word: str) -> str:
 
 def read_foreign_spelling(word: str) -> tuple[IpaPhone, ...]:
     """English phones of a word with the spelling of another language; none if its letters do not tell one."""
-    language = spelling_language(word)
+    chinese = read_pinyin(word)
+    language = "" if chinese else spelling_language(word)
     if not language:
-        return ()
+        return chinese
     if language == BY_LETTERS:
         return english_phones(_letter_phones(word))
     (said,) = segments_by_rules([word], language)

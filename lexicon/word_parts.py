@@ -108,7 +108,9 @@ def _with_ending(word: str, look_up: Lookup, n_parts: int) -> Segments | None:
         if not word.endswith(ending):
             continue
         rest = word.removesuffix(ending)
-        for stem in _stems(rest) if segments[0].is_syllabic else (rest,):
+        # hangr(y): hangrily, hangriness
+        before_consonant = (rest, f"{rest[:-1]}y") if rest.endswith("i") else (rest,)
+        for stem in _stems(rest) if segments[0].is_syllabic else before_consonant:
             base = _known(stem, look_up, n_parts)
             if base:
                 is_joined = base[-1].phone == segments[0].phone and not base[-1].is_syllabic  # full + ly

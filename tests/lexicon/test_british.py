@@ -32,6 +32,12 @@ def test_lexical_sets(word: str) -> None:
     assert _phones(word) == [WORDS[word]]
 
 
+def test_the_ending_of_places_in_ham_is_weak() -> None:
+    assert _phones("Birmingham, Balham, Wokingham, Abraham, ham") == [
+        "bɜmɪŋəm", "baləm", "wəʊkɪŋəm", "eɪbɹəham", "ham",
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("text", "is_linked"),
     [

@@ -135,3 +135,24 @@ def test_without_misaki_words_are_read_by_rules(monkeypatch: pytest.MonkeyPatch)
     assert misaki_lookup("burrata") is None
     assert all(phone in PHONES for phone in pronounce("zymotechnic").phones)
     misaki.misaki_readings.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("word", "phones"),
+    [
+        ("Xiaoming", "ʃaʊmɪŋ"),
+        ("Anqi", "ɑntʃi"),
+        ("Quanzhou", "tʃwɑndʒoʊ"),
+        ("Jinxiang", "dʒɪnʃɑŋ"),
+        ("Xianzhi", "ʃjɛndʒi"),
+        ("Huaraz", "wɑɹɑz"),
+        ("hangrily", "hæŋɡɹili"),
+        ("cringiness", "kɹɪndʒinəs"),
+        ("ketoacidosis", "kitoʊæsədoʊsəs"),
+        # no Chinese syllables
+        ("Zhanna", "ʒænə"),
+        ("Brezhnevo", "bɹɛʒnivoʊ"),
+    ],
+)
+def test_names_and_words_by_their_letters(word: str, phones: str) -> None:
+    assert "".join(pronounce(word).words[0].phones) == phones

@@ -25,6 +25,7 @@ F0_HZ = {FEMALE: (264.0, 223.0, 223.0, 199.0), MALE: (264.0, 132.0, 132.0, 144.0
 # Formants over those of men: geometric means of F1 to F3 of ten vowels (Peterson and Barney 1952: women 1.16, children
 # 1.35); they fall by some 3 % in old age (Linville and Rens 2001).
 FORMANTS = {FEMALE: (1.35, 1.16, 1.16, 1.13), MALE: (1.35, 1.0, 1.0, 0.97)}
+VOICE_BREAKS = 13.0  # years; a boy before it is nearer to a woman than to a man
 RATES = (1.0, 1.0, 1.0, 0.92)  # old people speak some 10 % more slowly, others 20 (Smith, Wasowicz and Preston 1987)
 FORMANT_SYNTHESIS = "espeak-ng"  # engine of the voices that are chosen where no other one speaks a language
 
@@ -79,7 +80,8 @@ def fitting_voice(person: Person | None, language: str) -> Fitting:
     if person is None:
         return Fitting(usual, sentence=foreign)
     voices = _usable(language, usual)
-    name = min(voices, key=lambda name: (voices[name].sex != person.sex, voices[name].accent not in ("", language)))
+    sex = FEMALE if person.age < VOICE_BREAKS else person.sex
+    name = min(voices, key=lambda name: (voices[name].sex != sex, voices[name].accent not in ("", language)))
     prosody = _difference(Person(voices[name].sex), person)
     if name == usual and prosody == PLAIN_PROSODY:
         return Fitting(name, sentence=foreign)
