@@ -66,6 +66,15 @@ def test_grown_up_women_and_unknown_people_have_the_voice_as_it_is() -> None:
     assert fitting_voice(None, "de").name == "espeak"
 
 
+def test_a_boy_speaks_as_a_girl_does_in_any_language() -> None:
+    for language in ("en-us", "de"):
+        boy, girl = (fitting_voice(Person(sex, 9), language) for sex in (MALE, FEMALE))
+        assert (boy.name, boy.prosody) == (girl.name, girl.prosody)
+        assert "a boy of 9" in boy.sentence
+        assert boy.prosody.pitch < 4
+    assert fitting_voice(Person(MALE, 14), "de").name == "espeak"
+
+
 def test_old_people_speak_more_slowly_in_any_voice() -> None:
     old = fitting_voice(Person(MALE, 80), "de")
     assert (old.name, old.prosody.rate, old.prosody.pitch) == ("espeak", 0.92, 1.5)
