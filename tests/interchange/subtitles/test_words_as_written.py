@@ -244,3 +244,10 @@ def test_tags_have_attributes_and_paths_no_line_breaks(
 def test_signs_of_line_breaks_are_those_of_players(read: ReadText) -> None:
     assert spoken(read, srt((1, 2, "So\\Nit\\his"))) == ["So it is"]
     assert spoken(read, vtt((1, 2, "So\\Nit")), ".vtt") == ["So\\Nit"]
+
+
+def test_a_cue_that_is_an_ssml_document_keeps_its_tags(read: ReadText) -> None:
+    document = '<speak>ANNA: <prosody pitch="+3st">hi</prosody>\n- [laughs] <b>you</b></speak>'
+    found = read(srt((1, 2, document), (3, 4, '<i>It</i> <break time="1s"/> is late.')), ".srt").cues
+    assert [cue.text for cue in found] == [document.replace("\n", " "), "It is late."]
+    assert found[0].speaker == ""

@@ -51,6 +51,8 @@ def test_a_sentence_goes_on(text: str, following: str) -> None:
         ("We saw the men", "...Then they left."),
         ("We saw the", "..."),
         ("We left.", "...and that was all."),
+        ("<speak>We left,</speak>", "and that was all."),
+        ("We left,", "<speak>and that was all.</speak>"),
     ],
 )
 def test_a_sentence_ends(text: str, following: str) -> None:

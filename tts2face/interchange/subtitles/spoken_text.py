@@ -4,6 +4,7 @@ import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
+from lexicon.text_marks import is_ssml
 from tts2face.interchange.subtitles.cues import CuePart
 from tts2face.interchange.subtitles.labels import divided_at_labels, split_label, without_manners
 from tts2face.interchange.subtitles.markup import SUBRIP_MARKUP, Markup, plain_text
@@ -75,7 +76,7 @@ def spoken_text(
 
     A label is a name before a colon and a space (``JOHN:``), at the start of a line. A part begins at a label, at a tag
     of one of several WebVTT voices, and at each of two or more dashes that begin a line or follow a sentence in it; a
-    line after a sentence needs only a dash of its own.
+    line after a sentence needs only a dash of its own. A cue that is an SSML document keeps its tags and is one part.
 
     Parameters
     ----------
@@ -84,6 +85,9 @@ def spoken_text(
     speakers
         Keys of the labels of the file; None: names in capitals.
     """
+    if markup.has_tags and is_ssml(written):
+        document = " ".join(written.split())
+        return SpokenText(document, " ".join(plain_text(written, markup).split()), (CuePart("", document),), ())
     is_dialogue = markup.has_tags and len({name.strip() for name in _VOICE.findall(written)}) > 1
     plain = plain_text(_VOICE.sub("\n\x02\\1\x03", written) if is_dialogue else written, markup)
     turns = divided_at_labels(plain, speakers) if speakers else plain

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from lexicon.dictionary import word_set
 from lexicon.sentence_ends import ends_sentence
 from lexicon.sentence_length import MAX_SENTENCE_CHARACTERS
+from lexicon.text_marks import is_ssml
 from tts2face.serving.batch.windows import Window
 
 MAX_GAP_S = 1.0  # between the cues of a sentence
@@ -25,7 +26,8 @@ def continues(text: str, following: str, language: str = "en-us", *, is_in_capit
 
     It has no end mark, and a comma at its end, a small letter after it, or a last word that ends no sentence
     (*of*, *the*); or dots at its end and a small letter after it; or the full stop of an abbreviation (*Mr.*), which
-    the rules of the language do not take for an end. Dots in front of the next cue do not count.
+    the rules of the language do not take for an end. Dots in front of the next cue do not count. An SSML document is
+    whole.
 
     Parameters
     ----------
@@ -33,7 +35,7 @@ def continues(text: str, following: str, language: str = "en-us", *, is_in_capit
         Whether the file has no small letters; then a missing end mark decides.
     """
     end, begin = _end(text), _LEADING_DOTS.sub("", following.lstrip("\"'“‘«(["))
-    if not end or not begin:
+    if not end or not begin or is_ssml(text) or is_ssml(following):
         return False
     if _DOTS.search(end):
         return begin[:1].islower()
