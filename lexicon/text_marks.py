@@ -23,7 +23,8 @@ MARK_PATTERN = re.compile(
     r"|\[(?P<name>/?(?:style|nod|pause)\b|phoneme(?=:)|/phoneme(?=\]))(?P<rest>[^\[\]]*)(?P<end>\]?)"
 )
 MAX_QUOTED_CHARACTERS = 40
-_SSML = re.compile(r"\ufeff?\s*(?:<!--(?:[^-]|-(?!->))*+-->\s*)*+<(?:speak[\s>/]|\?xml\s|!DOCTYPE\s)")
+# without possessive repeats, which Python 3.11.2 loses within each other
+_SSML = re.compile(r"\ufeff?\s*(?:<!--(?:[^-]|-(?!->))*-->\s*)*<(?:speak[\s>/]|\?xml\s|!DOCTYPE\s)")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
 
 
