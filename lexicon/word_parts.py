@@ -108,6 +108,8 @@ def _with_ending(word: str, look_up: Lookup, n_parts: int) -> Segments | None:
         if not word.endswith(ending):
             continue
         rest = word.removesuffix(ending)
+        if rest.endswith("qu"):  # quishing
+            continue
         # hangr(y): hangrily, hangriness
         before_consonant = (rest, f"{rest[:-1]}y") if rest.endswith("i") else (rest,)
         for stem in _stems(rest) if segments[0].is_syllabic else before_consonant:
