@@ -99,6 +99,8 @@ def test_another_content_is_not_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     with pytest.raises(DataError, match=r"wrong\.onnx is not the model"):
         add_voice("fenrir", tmp_path / "wrong.onnx")
     (tmp_path / "short.onnx").write_bytes(b"no")
+    with pytest.raises(InputError, match=r"is a folder; give the file am_fenrir"):
+        add_voice("fenrir", tmp_path)
     with pytest.raises(DataError, match="has 2 bytes"):
         add_voice("fenrir", tmp_path / "short.onnx")
     assert list((tmp_path / "cache").iterdir()) == []

@@ -56,7 +56,7 @@ def hibari_voice(name: str) -> HibariVoice:
     module = _registry()
     listed: Mapping[str, Any] = module.VOICES
     if name not in listed:
-        raise InputError(f"there is no voice {name[:40]!r} to add; choose {', '.join(addable_names())}")
+        raise InputError(f"there is no voice {name[:40]!r} to add or remove; choose {', '.join(addable_names())}")
     about = listed[name]
     folder = Path(module.ASSETS if about.get("bundled") else module.cache_dir())
     place = folder / about["file"]
@@ -156,10 +156,15 @@ def remove_voice(name: str) -> Path:
 
 
 def _read_given(file: Path, voice: HibariVoice) -> bytes:
+    if file.is_dir():
+        raise InputError(f"{file} is a folder; give the file {voice.path.name}")
     try:
         size = file.stat().st_size
         if size != voice.n_bytes:
-            raise DataError(f"{file} has {size} bytes, and the model of the voice {voice.name} {voice.n_bytes}")
+            raise DataError(
+                f"{file} has {size} bytes, and the model of the voice {voice.name} {voice.n_bytes}; give the file "
+                f"{voice.path.name}"
+            )
         return file.read_bytes()
     except OSError as refused:
         raise InputError(f"cannot read {file}: {refused.strerror}; check the path") from refused
