@@ -1,6 +1,7 @@
 """A voice of a server: its sound with our edges, what of its errors is said, and what is never sent."""
 
 import json
+import re
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -15,7 +16,7 @@ from tts2face.request import Request
 from tts2face.serving.batch.cast import cast_from_tables
 from tts2face.serving.batch.lines import read_lines
 from tts2face.serving.service.clip_options import check_voice
-from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.errors import RefusedError, as_refused
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.session.prepared import prepare
 from tts2face.session.project_file import parse_project
@@ -109,6 +110,21 @@ def test_errors_of_a_server_are_said(status: int, error: type[Exception], said: 
     ):
         client_of(server).sound(TEXT, 1.0)
     assert len(server.texts()) == (3 if status in (500, 503) else 1)
+
+
+def test_clients_of_a_service_do_not_learn_where_a_voice_comes_from(caplog: pytest.LogCaptureFixture) -> None:
+    body = b'{"error": {"message": "wrong key sk-1 for Bob"}}'
+    with speech_server(speech=lambda _: (401, {}, body)) as server, pytest.raises(BackendError) as failed:
+        client_of(server).sound(TEXT, 1.0)
+    with caplog.at_level("WARNING"):
+        refused = as_refused(failed.value)
+    assert (refused.status, refused.code) == (503, "unavailable")
+    assert "log says why" in refused.message
+    assert not {str(server.port), "sk-1"} & set(re.findall(r"[\w-]+", refused.message))
+    (record,) = caplog.records
+    assert str(server.port) in record.fields["reason"]
+    assert "(401)" in record.fields["reason"]
+    assert "Bob" not in record.fields["reason"]
 
 
 def test_a_busy_server_is_asked_again_when_it_wishes() -> None:
