@@ -65,7 +65,11 @@ def find_emphases(text: str, language: str) -> Iterator[EmphasisedWords]:
             before = line[max(match.start() - _BEFORE, 0) : match.start()]
             is_stage = is_direction(match[2], begins=_SENTENCE_START.search(before) is not None)
             if any(map(str.isalnum, match[2])) and (not is_stage or _SUBJECT.search(before)):
-                yield _emphasised(match[2], start + match.start(), start + at)
+                written = match[2]
+                for words in _in_capitals(line, 0, match.span(2), language) if has_small_letters else ():
+                    first, last = words.start - match.start(2), words.end - match.start(2)
+                    written = written[:first] + words.text + written[last:]
+                yield _emphasised(written, start + match.start(), start + at)
         if has_small_letters:
             yield from _in_capitals(line, start, (at, len(line)), language)
         start += len(line)

@@ -36,6 +36,10 @@ _LETTERS = r"[^\W\d_]+"
 _SINGLE_LETTER = re.compile(rf"{_START}[^\W\d_]{_STOP}")
 # espeak-ng omits what follows the first 160 letters of a word; the longest in use have 85. From U+0900 on, scripts
 # without spaces between words begin.
+# An asterisk between numbers or letters: 2*3, 2 * x; 4* hotels and s*x are none.
+_MULTIPLIED = re.compile(
+    r"(?<=[0-9)])(\s?)\*\1(?=[0-9(]|[a-z]\b)|(?<=\b[a-z])(\s?)\*\2(?=[0-9(])|(?<=\b[a-z])\s\*\s(?=[a-z]\b)"
+)
 _LONG_WORD = re.compile(r"[^\W\d_\u0900-\U0010ffff]{100}(?=[^\W\d_\u0900-\U0010ffff])")
 # espeak-ng reads aujourd’hui in English, and 12 345 with a narrow space as two numbers
 _AS_ESPEAK_READS = str.maketrans({"’": "'", "ʼ": "'", "\u00a0": " ", "\u202f": " ", "\u2009": " "})
@@ -233,7 +237,7 @@ def normalize(text: str, language: str = "en-us") -> str:
     """
     if not language.startswith("en"):
         return canonical_text(text, keep_marks=True)
-    return join_words([token.spoken for token in split_tokens(text)])
+    return join_words([token.spoken for token in split_tokens(_MULTIPLIED.sub(" × ", text))])
 
 
 def spoken_form(text: str, language: str) -> str:

@@ -30,6 +30,7 @@ def emphasised(text: str, language: str = "en-us") -> list[tuple[str, float]]:
         ("NEVER do that. ALWAYS ask.", ["Never", "Always"]),
         ("I said no! Not now, not EVER.", ["ever"]),
         ("Don't you DARE, I DON'T like it.", ["dare", "don't"]),
+        ("I *DID* it, *it is SAD* for *NASA*.", ["did", "it is sad", "NASA"]),
         ("I DID it, oh my GOD, it is SAD. I AM here.", ["did", "god", "sad", "am"]),
         ("She *looks* well, and it *turns* out that he *takes* it.", ["looks", "turns", "takes"]),
         ("WHO did that? WE did.", ["Who", "We"]),
