@@ -21,7 +21,6 @@ from xml.parsers import expat
 
 from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE
-from lexicon.languages import language_code
 from lexicon.marked_text import MAX_NESTING, MarkedText, MarkedTextBuilder, NameMark, NodMark, PhoneMark
 from lexicon.say_as import reads_kind, say_as
 from lexicon.ssml_leniency import (
@@ -35,11 +34,19 @@ from lexicon.ssml_leniency import (
     with_plain_entities,
 )
 from lexicon.ssml_prosody import look_up_value, parse_contour, parse_pitch, parse_range, parse_rate, parse_volume
-from lexicon.ssml_values import ALPHABETS, BREAKS_S, check_lengths, choose_voice, phoneme_words, primary_subtag
+from lexicon.ssml_values import (
+    ALPHABETS,
+    BREAKS_S,
+    check_lengths,
+    choose_voice,
+    known_language,
+    phoneme_words,
+    primary_subtag,
+)
 from lexicon.tones import Tone
 
 _MARK = re.compile(r"\[/?(?:style|nod|pause)\b")
-_TIME = re.compile(r"\+?([0-9]{1,9}(?:\.[0-9]{1,9})?|\.[0-9]{1,9})\s*(ms|s)")
+_TIME = re.compile(r"\+?([0-9]{1,9}(?:\.[0-9]{1,9})?|\.[0-9]{1,9})\s*(ms|s)", re.IGNORECASE)
 # Emphasis (`Tone.emphasis`) and nod size of each level: nods are the visual cue of stress (Krahmer and Swerts 2007,
 # J. Memory and Language 57).
 EMPHASES = MappingProxyType({"strong": (1.0, 1.0), "moderate": (0.6, 0.6), "none": (0.0, 0.0), "reduced": (-1.0, 0.0)})
@@ -234,7 +241,8 @@ class _SsmlReader:
         tag = attributes.get(LANGUAGE)
         if tag is not None and primary_subtag(tag) != primary_subtag(self._current_language):
             self._spans[-1] = "lang"
-            self._builder.open_voice("lang", f"<{self._elements[-1]}>", voice=None, language=language_code(tag))
+            language = known_language(tag, self._note)
+            self._builder.open_voice("lang", f"<{self._elements[-1]}>", voice=None, language=language)
 
     @property
     def _current_language(self) -> str:
@@ -242,7 +250,10 @@ class _SsmlReader:
         return self._builder.run.language or self._base
 
     def _lang(self, attributes: Attributes) -> None:
-        self._builder.open_voice("lang", "<lang>", voice=None, language=language_code(attributes.get(LANGUAGE, "")))
+        if not attributes.get(LANGUAGE, "").strip():
+            raise InputError(f'a <lang> needs {LANGUAGE}; write <lang {LANGUAGE}="de-DE">')
+        language = known_language(attributes[LANGUAGE], self._note)
+        self._builder.open_voice("lang", "<lang>", voice=None, language=language)
 
     def _voice(self, attributes: Attributes) -> None:
         voice, language = choose_voice(attributes, self._current_language, self._note)
@@ -352,7 +363,7 @@ def _parse_time(written: str, element: str) -> float:
     match = _TIME.fullmatch(written.strip())
     if match is None:
         raise InputError(f'cannot read the time {written[:40]!r} of a {element}; write "400ms" or "0.4s"')
-    return float(match[1]) / (1000 if match[2] == "ms" else 1)
+    return float(match[1]) / (1000 if match[2].lower() == "ms" else 1)
 
 
 def _add_phonemes(builder: MarkedTextBuilder, text: str, phones: str, alphabet: str) -> None:

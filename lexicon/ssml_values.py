@@ -16,6 +16,7 @@ MAX_ATTRIBUTE_CHARACTERS = 10_000  # longer text belongs between tags
 BREAKS_S = MappingProxyType({"none": 0.0, "x-weak": 0.1, "weak": 0.2, "medium": 0.4, "strong": 0.7, "x-strong": 1.0})
 ALPHABETS: Mapping[str, Callable[[str], tuple[IpaPhone, ...]]] = MappingProxyType({
     "ipa": parse_ipa, "x-arpabet": arpabet_segments, "arpabet": arpabet_segments, "x-cmu": arpabet_segments,
+    "cmu-arpabet": arpabet_segments,
 })  # fmt: skip
 # Voices that a document may name, as in tts2face.sound; Piper voices are files, which a document cannot open.
 VOICES = ("heart", "kore", "fenrir", "emma", "fable", "joe", "mei", "espeak", "espeak-female")
@@ -31,6 +32,15 @@ PhonemeWord = tuple[str, tuple[IpaPhone, ...]]
 def primary_subtag(tag: str) -> str:
     """Primary subtag of a language tag: de of de-CH."""
     return tag.strip().replace("_", "-").partition("-")[0].lower()
+
+
+def known_language(tag: str, note: Callable[[str], None]) -> str | None:
+    """Code of a language; None, which is noted, if there is none (SSML 1.1, 3.1.12 leaves it to the processor)."""
+    try:
+        return language_code(tag)
+    except InputError:
+        note(f"there is no language {tag[:40]!r}; its words are spoken in the language around them")
+        return None
 
 
 def check_lengths(element: str, attributes: Attributes) -> None:
@@ -81,14 +91,14 @@ def choose_voice(
     Raises
     ------
     InputError
-        The language does not exist, or the voice does not speak it.
+        The voice does not speak the language.
     """
     tag = (
         attributes.get("xml:lang")
         or attributes.get("language")
         or attributes.get("languages", "").split(" ")[0].partition(":")[0]
     )
-    spoken = language_code(tag) if tag else None
+    spoken = known_language(tag, note) if tag else None
     gender = attributes.get("gender", "neutral").strip() or "neutral"
     if gender not in GENDERS:
         note(f"there is no gender {gender[:40]!r} of voices")

@@ -56,6 +56,13 @@ def ssml(inside: str, language: str = "en-us") -> MarkedText:
             "there is no voice 'en-US-JennyNeural', another one speaks; ",
         ),
         ('<voice name="/etc/x.onnx">a</voice>', "a", "there is no voice '/etc/x.onnx'"),
+        (
+            '<lang xml:lang="tlh">a</lang>',
+            "a",
+            "there is no language 'tlh'; its words are spoken in the language around",
+        ),
+        ('<s xml:lang="tlh">a</s>', "a", "there is no language 'tlh'"),
+        ('<voice xml:lang="tlh">a</voice>', "a", "there is no language 'tlh'"),
         ('<voice gender="robot">a</voice>', "a", "there is no gender 'robot' of voices"),
         ('<voice age="9">a</voice>', "a", "the attribute age of <voice> is not followed"),
         ("<?php a?>b", "b", r"the instruction <?php?> is not followed"),
@@ -110,6 +117,12 @@ def test_prosody_beyond_the_limits_lies_on_them(
     run = found.runs[0]
     assert (run.rate, run.volume, run.tone.pitch, run.tone.range) == (rate, volume, pitch, range_)
     assert any(note in noted for noted in found.notes), found.notes
+
+
+def test_units_of_time_may_be_capitals_and_arpabet_has_its_names() -> None:
+    found = ssml("<break time='1S'/>a<break time='20MS'/> <phoneme alphabet='cmu-arpabet' ph='K AE1 T'>b</phoneme>")
+    assert [mark.seconds for mark in found.marks if isinstance(mark, PauseMark)] == [1.0, 0.02]
+    assert not found.notes
 
 
 def test_silence_beyond_the_limit_lies_on_it() -> None:
