@@ -75,6 +75,12 @@ def test_a_boy_speaks_as_a_girl_does_in_any_language() -> None:
     assert fitting_voice(Person(MALE, 14), "de").name == "espeak"
 
 
+@pytest.mark.usefixtures("only_heart")
+def test_the_voice_that_is_recommended_is_of_the_sex() -> None:
+    for sex, name in ((MALE, "fable"), (FEMALE, "emma")):
+        assert f"voices add {name}`" in fitting_voice(Person(sex), "en-gb").sentence
+
+
 def test_old_people_speak_more_slowly_in_any_voice() -> None:
     old = fitting_voice(Person(MALE, 80), "de")
     assert (old.name, old.prosody.rate, old.prosody.pitch) == ("espeak", 0.92, 1.5)

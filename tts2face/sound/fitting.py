@@ -76,7 +76,7 @@ def fitting_voice(person: Person | None, language: str) -> Fitting:
         Code of `lexicon.languages`.
     """
     usual = default_voice(language)
-    foreign = _foreign_accent(usual, language)
+    foreign = _foreign_accent(usual, language, person)
     if person is None:
         return Fitting(usual, sentence=foreign)
     voices = _usable(language, usual)
@@ -90,11 +90,13 @@ def fitting_voice(person: Person | None, language: str) -> Fitting:
     return replace(fitting, sentence=f"{sentence}; {foreign}" if foreign else sentence)
 
 
-def _foreign_accent(name: str, language: str) -> str:
+def _foreign_accent(name: str, language: str, person: Person | None) -> str:
     """Sentence about a voice whose accent is not that of the language; empty where it is."""
     if SHIPPED_VOICES[name].accent in {"", language} or not has_dictionary(language):
         return ""
     others = [other for other, info in SHIPPED_VOICES.items() if info.accent == language]
+    if person is not None:
+        others.sort(key=lambda other: SHIPPED_VOICES[other].sex != person.sex)
     hint = f"; `tts2face voices add {others[0]}` adds one that was" if others else ""
     return f"{name} was trained in {SHIPPED_VOICES[name].accent} and speaks the phones of {language}{hint}"
 
