@@ -44,7 +44,8 @@ _READ_ACRONYMS = word_set(
 )
 # Short words that are shouted and are no initialisms.
 _SHOUTED = word_set(
-    "ASK BOY BUY CRY DID DIE EAT FAR FEW GOD GUN HIT HUH JOY LIE MAD NAH OWN PAY SAD TRY UGH USE WAR YAY YEP YUP"
+    "AHA ASK ATE BOO BOY BUY CRY DID DIE EAT FAR FEW GOD GUN HIT HUH JOY LIE MAD NAH OWN PAY SAD TRY UGH USE WAR YAY "
+    "YEP YUP"
 )
 _MIN_WORD_LETTERS = 4  # a text with such a word in capitals holds more than initialisms
 

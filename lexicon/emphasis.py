@@ -21,7 +21,7 @@ MIN_FOREIGN_LETTERS = 7  # of a word in capitals in a language whose words are n
 SPACED = r"[^\W\u0e00-\u0eff\u1000-\u109f\u1780-\u17ff\u3040-\u30ff\u3400-\u9fff]"
 _STARRED = re.compile(rf"(?<!{SPACED})(?<!\*)(\*{{1,3}})(?![\s*(\[]|\.\w)([^*]{{1,200}})(?<!\s)\1(?!{SPACED}|\*)")
 # A word in capitals that is no part of a code, an address or an abbreviation.
-_CAPITALS = re.compile(r"(?<![\w.&/@#+'’-])[^\W\d_a-z]{2,}(?:['’][^\W\d_a-z]{1,2})?(?![\w&/@#+'’-]|\.\w)")
+_CAPITALS = re.compile(r"(?<![\w.&/\\@#$+='’-])[^\W\d_a-z]{2,}(?:['’][^\W\d_a-z]{1,2})?(?![\w&/\\@#+='’-]|\.\w)")
 _SMALL = re.compile(r"[^\W\d_A-Z]{2}")
 _WORD = re.compile(r"[^\W\d_]+")
 _SENTENCE_START = re.compile(r"(?:\A|[.!?:…]['\"”’)]{0,3}\s)\s*\Z")
@@ -64,7 +64,8 @@ def find_emphases(text: str, language: str) -> Iterator[EmphasisedWords]:
             at = match.end()
             before = line[max(match.start() - _BEFORE, 0) : match.start()]
             is_stage = is_direction(match[2], begins=_SENTENCE_START.search(before) is not None)
-            if any(map(str.isalnum, match[2])) and (not is_stage or _SUBJECT.search(before)):
+            has_words = any(map(str.isalnum, match[2])) and match[2].count("(") == match[2].count(")")  # else footnotes
+            if has_words and (not is_stage or _SUBJECT.search(before)):
                 written = match[2]
                 for words in _in_capitals(line, 0, match.span(2), language) if has_small_letters else ():
                     first, last = words.start - match.start(2), words.end - match.start(2)

@@ -60,6 +60,8 @@ def test_words_are_emphasised(text: str, words: list[str]) -> None:
         "Compute 3 * 4 * 5, or 2*3*4, f*ck it.",
         "*smiles warmly* It's good to see you. *sighs deeply* *winks* *nervously*",
         "* one\n* two\n*args and **kwargs, terms* and conditions*",
+        "export PATH=$PATH for C:\\USERS\\BOB",
+        "Yes* (*terms apply), no* (*void)",
         "The AM radio, and find . -name '*.log' -o -name '*.tmp'",
         "*takes a deep breath* Okay. *walks in* Hello! *clears throat* I, well, *looks up* agree.",
         "Rated 5* and 4* hotels",
