@@ -63,7 +63,7 @@ def find_emphases(text: str, language: str) -> Iterator[EmphasisedWords]:
                 yield from _in_capitals(line, start, (at, match.start()), language)
             at = match.end()
             before = line[max(match.start() - _BEFORE, 0) : match.start()]
-            is_stage = is_direction(match[2], begins=_SENTENCE_START.search(before) is not None)
+            is_stage = is_direction(match[2], is_first=_SENTENCE_START.search(before) is not None)
             has_words = any(map(str.isalnum, match[2])) and match[2].count("(") == match[2].count(")")  # else footnotes
             if has_words and (not is_stage or _SUBJECT.search(before)):
                 written = match[2]
@@ -76,18 +76,18 @@ def find_emphases(text: str, language: str) -> Iterator[EmphasisedWords]:
         start += len(line)
 
 
-def is_direction(words: str, *, begins: bool = False) -> bool:
+def is_direction(words: str, *, is_first: bool = False) -> bool:
     """Whether words between asterisks say what somebody does, or how: a mood, a manner, a sound, or a verb (sighs).
 
     Parameters
     ----------
-    begins
+    is_first
         They begin a sentence, where also verbs are directions that are often emphasised elsewhere: takes, walks.
     """
     found = _WORD.findall(words.casefold())
     if not found:
         return False
-    is_moved = begins and words[0].islower() and found[0] in _verbs("stage")
+    is_moved = is_first and words[0].islower() and found[0] in _verbs("stage")
     return is_moved or found[0] in _verbs("verb") or all(word in _direction_words() for word in found)
 
 
