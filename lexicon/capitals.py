@@ -36,7 +36,7 @@ _TITLES_ALONE = frozenset({"Dr", "Mr", "Mrs", "Ms", "St"})  # also without a nam
 # as `english.MAX_SPELLED_LETTERS`: FBI is spelled, NASA is not
 _MAX_SPELLED_LETTERS = 3
 # Abbreviations of four letters and more that dictionaries read as words.
-_READ_ACRONYMS = word_set(
+READ_ACRONYMS = word_set(
     "ADAC AIPAC ARPA ASCAP ASCII ASEAN AWACS AWOL BAFTA BIOS CERN CMOS COBOL COVID DARPA DEFCON DRAM EBITDA EPCOT ESPN "
     "FAFSA FEMA FICA FIFA FLOTUS FOMO GATT HAMAS HIPAA ICANN IKEA INTERPOL JPEG JSON LASER LEGO LIBOR LINUX MENSA MERS "
     "MPEG NAFTA NASCAR NASDAQ NIMBY NORAD OECD OPEC OSHA OXFAM PAYPAL POTUS RADAR RICO SARS SCOTUS SCUBA SONAR SONY "
@@ -97,7 +97,7 @@ def is_word_in_capitals(word: str, before: str) -> bool:
     if (
         plain in _initialisms()
         or is_acronym(plain)
-        or plain in _READ_ACRONYMS
+        or plain in READ_ACRONYMS
         or (plain == "WHO" and before.lower() == "the")
     ):
         return False

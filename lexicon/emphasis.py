@@ -10,19 +10,20 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from lexicon.capitals import is_word_in_capitals
+from lexicon.capitals import READ_ACRONYMS, is_word_in_capitals
 from lexicon.text_language import common_words
 from lexicon.written_forms import read_table
 
 STRONG, MODERATE = 1.0, 0.6  # `lexicon.tones.Tone.emphasis`
 MAX_STRONG_WORDS = 3  # of one span: a whole sentence said so has no accent
-MIN_FOREIGN_LETTERS = 7  # of a word in capitals in a language whose words are not known: hardly an abbreviation
+MIN_FOREIGN_LETTERS = 5  # of a word in capitals in a language whose words are not known: hardly an abbreviation
 # A letter or digit of writing with spaces between words, beside which an asterisk is none of emphasis.
 SPACED = r"[^\W\u0e00-\u0eff\u1000-\u109f\u1780-\u17ff\u3040-\u30ff\u3400-\u9fff]"
 _STARRED = re.compile(rf"(?<!{SPACED})(?<!\*)(\*{{1,3}})(?![\s*(\[]|\.\w)([^*]{{1,200}})(?<!\s)\1(?!{SPACED}|\*)")
 # A word in capitals that is no part of a code, an address or an abbreviation.
 _CAPITALS = re.compile(r"(?<![\w.&/\\@#$+='’-])[^\W\d_a-z]{2,}(?:['’][^\W\d_a-z]{1,2})?(?![\w&/\\@#+='’-]|\.\w)")
 _SMALL = re.compile(r"[^\W\d_A-Z]{2}")
+_ROMAN = re.compile("[IVXLCDM]+")
 _WORD = re.compile(r"[^\W\d_]+")
 _SENTENCE_START = re.compile(r"(?:\A|[.!?:…]['\"”’)]{0,3}\s)\s*\Z")
 _STRETCHED = re.compile(r"(.)\1{2,}")  # SOOO, YESSS, COOOL
@@ -138,7 +139,8 @@ def _is_emphasised(line: str, match: "re.Match[str]", language: str) -> bool:
             return False
         spellings = {word, _STRETCHED.sub(r"\1", word), _STRETCHED.sub(r"\1\1", word)}
         return any(len(form) > 1 and is_word_in_capitals(form, words[-1] if words else "") for form in spellings)
-    return word.casefold() in common_words(language) or len(word) >= MIN_FOREIGN_LETTERS
+    is_long = len(word) >= MIN_FOREIGN_LETTERS and word not in READ_ACRONYMS and _ROMAN.fullmatch(word) is None
+    return word.casefold() in common_words(language) or is_long
 
 
 def _in_ordinary_writing(line: str, start: int, words: "list[re.Match[str]]", language: str) -> EmphasisedWords:

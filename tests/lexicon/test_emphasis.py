@@ -78,6 +78,7 @@ def test_a_whole_sentence_between_asterisks_is_emphasised_less() -> None:
 
 def test_other_languages_emphasise_common_and_long_words() -> None:
     assert emphasised("Das ist NICHT gut, sagt die NATO, UNGLAUBLICH.", "de") == [("NICHT", 1.0), ("UNGLAUBLICH", 1.0)]
+    assert emphasised("Il dit JAMAIS à Louis XVIII et à l'UNESCO.", "fr-fr") == [("JAMAIS", 1.0)]
     assert emphasised("Das ist *sehr* gut.", "de") == [("sehr", 1.0)]
 
 
