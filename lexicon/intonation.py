@@ -132,7 +132,9 @@ def _tag(said: Sequence[str], clauses: Sequence[_Clause]) -> Movement | None:
     if not is_verb or not (has_mark or said[at].endswith("n't")) or _is_inverted(said, first, at):
         return None
     is_negative = said[at].endswith("n't") or size > TAG
-    was_negative = any(word in WORDS["negative"] or word.endswith("n't") for word in before) or _has_few(before)
+    was_negative = any(
+        word.removesuffix("'s") in WORDS["negative"] or word.endswith("n't") for word in before
+    ) or _has_few(before)
     return Movement("fall" if is_negative != was_negative else "rise", at, end - 1)
 
 

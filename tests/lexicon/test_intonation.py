@@ -107,6 +107,7 @@ def test_alternatives_rise_but_the_last(text: str, expected: str) -> None:
         ("They never called, did they?", "did↘"),
         ("You can't swim, can you?", "can↘"),
         ("Few people know that, do they?", "do↘"),
+        ("Nobody's perfect, are they?", "are↘"),
         ("A few people know that, don't they?", "don't↘"),
         ("What a view, isn't it?", "isn't↘"),
         # of one polarity, or asking for consent
