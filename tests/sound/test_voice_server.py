@@ -266,6 +266,9 @@ def test_an_operator_names_voices_of_servers(monkeypatch: pytest.MonkeyPatch) ->
         check_voice("kokoro")
         load_voice("kokoro", "en-us").sound("Hello.")
     assert server.texts() == ["Hello."]
+    monkeypatch.setenv(NAMES_VARIABLE, "heart=https://example.org/v1#a")
+    with pytest.raises(InputError, match="as another voice, heart"):
+        load_voice("heart", "en-us")
     monkeypatch.setenv(NAMES_VARIABLE, "kokoro=ftp://example.org")
     with pytest.raises(InputError, match="named voices must be such as"):
         voice_names()

@@ -6,7 +6,7 @@ Choice and loading of a voice by name and language: those of tts2face, of other 
 import importlib.util
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ from tts2face.sound.voice import (
     VoiceSetting,
     Wait,
 )
-from tts2face.sound.voice_urls import is_voice_url, named_urls
+from tts2face.sound.voice_urls import NAMES_VARIABLE, is_voice_url, named_urls
 from tts2face.types import Speech, Waveform, YieldTurn, keep_on
 
 if TYPE_CHECKING:
@@ -44,15 +44,26 @@ MAX_VOICES = 2  # unused voices in memory; about 100 MB each
 MAX_UTTERANCES = 8  # of at most some ten seconds; one second of sound takes 100 kB
 
 
+def _server_urls() -> Mapping[str, str]:
+    """URLs by the names that the operator gives them; a name of another voice is refused."""
+    urls = named_urls()
+    taken = urls.keys() & {*SHIPPED_VOICES, "auto"}
+    if taken:
+        raise InputError(
+            f"{NAMES_VARIABLE} names a server's voice as another voice, {min(taken)}; give it its own name"
+        )
+    return urls
+
+
 def voice_names() -> tuple[str, ...]:
     """Names of all voices; those of tts2face first, which win over others of the same name."""
-    own = {**SHIPPED_VOICES, **named_urls()}
+    own = {**SHIPPED_VOICES, **_server_urls()}
     return (*own, *(name for name in declared(VOICES) if name not in own))
 
 
 def has_voice(name: str | None) -> bool:
     """Whether a name is one of `voice_names`; other packages are asked only where it is not shipped."""
-    return name in SHIPPED_VOICES or name in named_urls() or name in declared(VOICES)
+    return name in SHIPPED_VOICES or name in _server_urls() or name in declared(VOICES)
 
 
 def find_voice(name: str) -> VoiceInfo:
@@ -65,9 +76,10 @@ def find_voice(name: str) -> VoiceInfo:
     BackendError
         Its package cannot be loaded.
     """
+    urls = _server_urls()
     if name in SHIPPED_VOICES:
         return SHIPPED_VOICES[name]
-    if name in (urls := named_urls()):
+    if name in urls:
         return server_info(urls[name])
     if has_voice(name):
         info: VoiceInfo = load_plugin(VOICES, name)
@@ -303,7 +315,7 @@ class _SharedVoice:
 
     def expect(self, content: SpeechInput) -> None:
         name = self.key[0]
-        if is_voice_url(name) or name in named_urls():  # others would be loaded for it
+        if is_voice_url(name) or name in _server_urls():  # others would be loaded for it
             with self.pool.borrow(self.key, self.load) as voice:
                 if isinstance(voice, ExpectingVoice):
                     voice.expect(content)
