@@ -18,6 +18,7 @@ from tts2face.serving.batch.lines import read_lines
 from tts2face.serving.service.clip_options import check_voice
 from tts2face.serving.service.errors import RefusedError, as_refused
 from tts2face.serving.service.settings import ServiceSettings
+from tts2face.serving.work.run import _for_clients
 from tts2face.session.prepared import prepare
 from tts2face.session.project_file import parse_project
 from tts2face.session.speech_stream import SpeechModels, speak_sentences
@@ -26,7 +27,7 @@ from tts2face.sound.received_sound import decode_sound
 from tts2face.sound.voice import SpokenWord, VoiceSetting
 from tts2face.sound.voice_pool import VoicePool, find_voice, load_voice, voice_names
 from tts2face.sound.voice_server import ServerVoice, SpeechClient, matched_times
-from tts2face.sound.voice_urls import KEY_VARIABLE, NAMES_VARIABLE, parse_voice_url
+from tts2face.sound.voice_urls import KEY_VARIABLE, NAMES_VARIABLE, SERVER_FAILS, parse_voice_url
 
 TEXT = "Bob may move five big maps."
 DOCUMENT = '<speak><voice name="{}">Hello.</voice></speak>'
@@ -125,6 +126,16 @@ def test_clients_of_a_service_do_not_learn_where_a_voice_comes_from(caplog: pyte
     assert str(server.port) in record.fields["reason"]
     assert "(401)" in record.fields["reason"]
     assert "Bob" not in record.fields["reason"]
+
+
+def test_a_failed_job_does_not_name_the_server_either(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    message = "the voice server http://10.0.0.7:8880 refuses the request (400: no 'Bob'); check the voice"
+    with caplog.at_level("WARNING"):
+        assert _for_clients(message, tmp_path) == SERVER_FAILS
+    (record,) = caplog.records
+    assert "10.0.0.7" in record.fields["reason"]
+    assert "Bob" not in record.fields["reason"]
+    assert _for_clients(f"{tmp_path}/inputs/a.srt is no file", tmp_path) == "inputs/a.srt is no file"
 
 
 def test_a_busy_server_is_asked_again_when_it_wishes() -> None:

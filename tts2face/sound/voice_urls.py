@@ -21,6 +21,15 @@ USUAL_MODEL = "tts-1"  # OpenAI's name, which Kokoro-FastAPI and others take, to
 LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
 _FRAGMENT = re.compile(r"[^\s\x00-\x1f]{1,200}")
 _NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,39}")
+# Clients learn neither the address of a voice that the operator has named, nor what its server says of the key.
+SERVER_FAILS = "the server of this voice fails, and the service's log says why; choose another voice"
+_FAILURE = re.compile(r"the voice server https?://")
+_OWN_WORDS = re.compile(r"(?<=\(\d{3}): .*(?=\))", re.DOTALL)  # of a server, which may quote the text
+
+
+def failure_of_server(message: str) -> str | None:
+    """For the log, what failed at the server of a voice, without its own words; None for any other message."""
+    return _OWN_WORDS.sub("", message) if _FAILURE.search(message) else None
 
 
 def is_voice_url(name: object) -> bool:

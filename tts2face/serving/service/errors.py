@@ -1,7 +1,6 @@
 """Errors of the service as answers."""
 
 import logging
-import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,11 +11,9 @@ from starlette.exceptions import HTTPException
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
 from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.messages import BusyError, DefectError
+from tts2face.sound.voice_urls import SERVER_FAILS, failure_of_server
 from tts2face.storage.user_folders import without_folders, without_paths
 
-# Of a voice that the operator has named: clients learn neither its address nor what it says of the key.
-_VOICE_SERVER = re.compile(r"the voice server https?://")
-_ITS_WORDS = re.compile(r"(?<=\(\d{3}): .*(?=\))", re.DOTALL)  # which may quote the text
 DRAINING_RETRY_S = 5  # until another server, or this one again, may be asked
 
 
@@ -61,9 +58,9 @@ def as_refused(error: Tts2faceError, folders: Iterable[Path] = ()) -> RefusedErr
 
     Where something is missing on this machine, it names no folder at all; what a voice server says is for the log.
     """
-    if _VOICE_SERVER.search(str(error)):
-        log_event("voice server failed", level=logging.WARNING, reason=_ITS_WORDS.sub("", str(error)))
-        error = BackendError("the server of this voice fails, and the service's log says why; choose another voice")
+    if (reason := failure_of_server(str(error))) is not None:
+        log_event("voice server failed", level=logging.WARNING, reason=reason)
+        error = BackendError(SERVER_FAILS)
     status, code = next(found for kind, found in STATUS.items() if isinstance(error, kind))
     headers = {"Retry-After": str(BusyError.retry_after_s)} if status in {429, 503} else {}
     message = without_folders(" ".join(str(error).split()), folders)

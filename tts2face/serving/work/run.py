@@ -1,5 +1,6 @@
 """Execution of jobs of the service by a worker: each ends once, whatever dies meanwhile."""
 
+import logging
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -19,12 +20,14 @@ from tts2face.serving.work.changes import Ending, JobChanges
 from tts2face.serving.work.engine import ACTIVE, JOBS_PER_QUERY, QueueEngine, failure_reason, open_client
 from tts2face.serving.work.jobs import DONE, FAILED, JobFile, JobRecord
 from tts2face.serving.work.kinds import KINDS, JobCancelledError, JobTask, Product, Products
+from tts2face.sound.voice_urls import SERVER_FAILS, failure_of_server
 from tts2face.storage.bucket import StoreAwayError
 from tts2face.storage.sql import Database, DatabaseAwayError, connection_errors
 from tts2face.storage.temporary import Temporary
 from tts2face.storage.user_folders import without_folders
 
 BLOBS, RESOURCES = "results", "resources"  # kinds of files in a store: of jobs, and uploaded models
+LOG = logging.getLogger(__name__)
 MODEL_SECTIONS = ("models", "request")  # parts of a job's JSON that may name uploads
 PAUSE_S = 2.0  # before another try while the database or the store cannot be reached
 CHECK_S = 1.0  # between two questions whether a job is still wanted
@@ -132,7 +135,7 @@ class JobRunner:
             except (DatabaseAwayError, StoreAwayError):
                 raise
             except Tts2faceError as wrong:
-                ending, paths = Ending(FAILED, error=_without_folders(str(wrong), folder.path)), {}
+                ending, paths = Ending(FAILED, error=_for_clients(str(wrong), folder.path)), {}
             self._end(changes, job, ending, paths)
         return ending.state
 
@@ -236,8 +239,11 @@ class _JobEngine:
         yield from QueueEngine(self.url, priority, on_wait=self.watch.check).render(segments, store)
 
 
-def _without_folders(message: str, folder: Path) -> str:
-    """A message without the paths of this machine."""
+def _for_clients(message: str, folder: Path) -> str:
+    """A message without the paths of this machine, and without the address of a voice server."""
+    if (reason := failure_of_server(message)) is not None:
+        LOG.warning("voice server failed", extra={"fields": {"reason": reason}})
+        return SERVER_FAILS
     return without_folders(message, [*(folder / "inputs").glob("*"), folder]).replace(str(folder), "the job")
 
 
