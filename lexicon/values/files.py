@@ -45,10 +45,10 @@ def _check_kind(path: Path, mode: int) -> None:
 def is_there(path: Path, is_kind: Callable[[int], bool] = lambda _: True) -> bool:
     """Whether there is a file of a kind, as `stat.S_ISDIR`; an OSError where that cannot be read.
 
-    pathlib says no to a name that is longer than any file's from Python 3.14 on.
+    pathlib says no to a name that is longer than any file's from Python 3.14 on. No file has U+0000 in its name.
     """
     try:
-        return is_kind(path.stat().st_mode)
+        return "\0" not in str(path) and is_kind(path.stat().st_mode)
     except (FileNotFoundError, NotADirectoryError):
         return False
 

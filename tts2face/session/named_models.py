@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from lexicon.errors import InputError, Tts2faceError
 from lexicon.values.fields import check_fields
 from tts2face.models.face_names import default_face
 from tts2face.models.person import SHIPPED_PEOPLE, Person, parse_person, person_of
@@ -76,5 +77,16 @@ def described_face(face: str, identity: str | None) -> Mapping[str, Any]:
     from tts2face.storage.shipped import find_file
     from tts2face.storage.tensors import read_metadata
 
-    stated = read_metadata(find_file(face, KIND), KIND, FORMAT_VERSION).get("metadata")
+    try:
+        path = find_file(face, KIND)
+    except InputError:  # the service's name of an uploaded face; what does not exist is refused where it is loaded
+        return {"name": face, "identity": identity}
+    except OSError as refused:
+        raise InputError(f"the face {face[:60]!r} cannot be read ({refused.strerror}); check its path") from refused
+    try:
+        stated = read_metadata(path, KIND, FORMAT_VERSION).get("metadata")
+    except Tts2faceError:
+        raise
+    except (OSError, ValueError) as refused:  # a name that is too long, or with U+0000
+        raise InputError(f"the face {face[:60]!r} cannot be read ({refused}); check its path") from refused
     return {**(stated if isinstance(stated, dict) else {}), "identity": identity}

@@ -23,7 +23,7 @@ N_POSES = 200
 SIDE_PX, SHARE = 700, 0.8
 OUTLINE_PX = 5  # width of what may lie over an outline: landmarks lie between vertices, and lips are round
 FOLDED_MM2 = 12.0  # skin of the lower face that is seen at rest and turned over; lids turn over their edges
-ROLLED_MM2 = {"noor": 70.0, "zuri": 40.0}  # the rim of their upper lip rolls in in rounded or rolled smiles
+ROLLED_MM2 = {"noor": 70.0, "zuri": 50.0}  # the rim of their upper lip rolls in in rounded or rolled smiles
 LOWER_FACE_MM = -20.0
 TEXTS = (
     "People who move to Boston often choose a house by the sea.",

@@ -54,7 +54,7 @@ def test_real_people_speak(person: str, shared_recordings: Path, face_model: Pat
 
 def check_speech(face: Face, face_model: Path) -> None:
     session = Session(face=face)
-    clip = session.clip(PANGRAM, lead=None)  # with the silence of the voice: figures of rest and speech
+    clip = session.clip(f"[pause 0.5]{PANGRAM}[pause 0.5]", lead=None, seed=0)  # figures of rest and speech
     renderer = session.renderer(Picture(size="512x512", camera="close"))
     frames = list(renderer.frames(clip))
     wanted = moved_landmarks(session.mesh, clip.motion)

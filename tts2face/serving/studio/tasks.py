@@ -43,7 +43,9 @@ N_DECIMALS = 2  # of outlines, mm
 
 def read_project(work: Work) -> Project:
     """Project of an order."""
-    return parse_project(work.request["project"], "the project", Path(work.request["folder"]))
+    project = parse_project(work.request["project"], "the project", Path(work.request["folder"]))
+    # with the paths of uploaded faces, which say who is shown
+    return replace(project, models=replace(project.models, face=work.models.get("face") or project.models.face))
 
 
 def preview(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk]:
