@@ -22,7 +22,7 @@ TOLERANCES = (0, 500, 500)  # by which they may differ, so that few commits have
 # characters' shapes, their calibration, VRM Animation and materials of scenes (900), heads without shapes (1,000),
 # repairs of their scans (250), and voices: their rate, pitch, questions and pauses (800), those of faces, of servers
 # and that are added (800), words in no dictionary and of other languages (600), SSML of other services, emphasis (400).
-MOST_STATEMENTS = 66_400
+MOST_STATEMENTS = 66_500
 
 
 class Size(NamedTuple):

@@ -78,13 +78,9 @@ def described_face(face: str, identity: str | None) -> Mapping[str, Any]:
     from tts2face.storage.tensors import read_metadata
 
     try:
-        path = find_file(face, KIND)
+        stated = read_metadata(find_file(face, KIND), KIND, FORMAT_VERSION).get("metadata")
     except InputError:  # the service's name of an uploaded face; what does not exist is refused where it is loaded
         return {"name": face, "identity": identity}
-    except OSError as refused:
-        raise InputError(f"the face {face[:60]!r} cannot be read ({refused.strerror}); check its path") from refused
-    try:
-        stated = read_metadata(path, KIND, FORMAT_VERSION).get("metadata")
     except Tts2faceError:
         raise
     except (OSError, ValueError) as refused:  # a name that is too long, or with U+0000
