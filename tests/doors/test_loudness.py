@@ -11,11 +11,11 @@ from tests.oracles.loudness_meter import measure_loudness, true_peak
 from tests.world import World
 from tts2face.picture.options import Picture
 from tts2face.request import Request
-from tts2face.session.joining import FADE_S
 from tts2face.session.session import Session
 from tts2face.session.speech_stream import Piece
 from tts2face.sound import level
 from tts2face.sound.loudness import integrated_loudness
+from tts2face.sound.spacing import FADE_S
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.types import Waveform, concatenate_clips
 

@@ -5,8 +5,9 @@ import pytest
 
 from lexicon.pauses import PAUSES_S
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.session.joining import CUT_SILENCE_S, END_S, FADE_S, JOIN_LEAD_S, end_after
+from tts2face.session.joining import CUT_SILENCE_S, END_S, JOIN_LEAD_S, end_after
 from tts2face.session.session import Session
+from tts2face.sound.spacing import FADE_S
 from tts2face.types import Speech, Waveform
 
 LONG = "We came home and nobody knew that it was late in the evening because the garden behind the house was green."

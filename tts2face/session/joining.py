@@ -15,6 +15,7 @@ from lexicon.sentences import text_prefix
 from lexicon.sequence import MIN_PHONE_S, SILENCE, PhoneSequence, WordSpan, enforce_increasing
 from lexicon.written_words import written_words
 from tts2face.sound.pauses import speech_onset
+from tts2face.sound.spacing import fade_gains
 from tts2face.types import Speech, Waveform, concatenate_speech, first_sample
 
 CUT_SILENCE_S = 0.05  # around words that are cut out of a sentence
@@ -23,7 +24,6 @@ LEAST_TAIL_S = 0.05  # of silence at the end of a sentence: a frame from 20 a se
 END_S = 0.3  # of silence at the end of a text, in which the lips close
 AUDIBLE_SHARE = 0.01  # of the largest amplitude
 SAME_EDGE_S = 1e-4  # within which two times are the same edge of a phone; phones last 5 ms or more
-FADE_S = 0.005  # linear fade at each cut, which avoids clicks
 
 
 def join_utterances(speeches: Sequence[Speech], gaps: Sequence[float]) -> tuple[Speech, list[float]]:
@@ -107,7 +107,7 @@ def excerpt_of_speech(speech: Speech, start: float, end: float) -> Speech:
     """Speech from `start` to `end` seconds, faded there, with the phones and whole words within; see `word_bounds`."""
     sound, edges = speech.waveform, speech.phones.edges
     first, last = round(start * sound.rate), max(round(end * sound.rate), round(start * sound.rate) + 1)
-    gains = _fade_gains(last - first, sound.rate, first > 0, last < len(sound.samples))
+    gains = fade_gains(last - first, sound.rate, first > 0, last < len(sound.samples))
     cut = Waveform(sound.samples[first:last] * gains[: len(sound.samples) - first], sound.rate)
     at = int(np.searchsorted(edges[1:], start + SAME_EDGE_S))
     until = max(int(np.searchsorted(edges[:-1], end - SAME_EDGE_S)), at + 1)
@@ -149,7 +149,7 @@ def _part(speech: Speech, start: int, end: int) -> Speech:
     # nothing is cut: no fade
     if (start, end) == (0, len(sound.samples)):
         return speech
-    gains = _fade_gains(end - start, sound.rate, start > 0, end < len(sound.samples))
+    gains = fade_gains(end - start, sound.rate, start > 0, end < len(sound.samples))
     short = Waveform(sound.samples[start:end] * gains, sound.rate)
     edges = enforce_increasing(np.clip(phones.edges - start / sound.rate, 0.0, short.duration))
     return Speech(short, PhoneSequence(phones.phones, edges), speech.words)
@@ -201,17 +201,7 @@ def _silence_at_ends(speech: Speech) -> tuple[float, float]:
 
 def fade_out(n_samples: int, rate: int) -> NDArray[np.float32]:
     """(n_samples,) gains with a fade at their end."""
-    return _fade_gains(n_samples, rate, starts=False, ends=True)
-
-
-def _fade_gains(n_samples: int, rate: int, starts: bool, ends: bool) -> NDArray[np.float32]:
-    ramp = np.linspace(0.0, 1.0, min(round(FADE_S * rate), n_samples // 2), endpoint=False, dtype=np.float32)
-    gain = np.ones(n_samples, np.float32)
-    if starts:
-        gain[: len(ramp)] = ramp
-    if ends:
-        gain[n_samples - len(ramp) :] = ramp[::-1]
-    return gain
+    return fade_gains(n_samples, rate, starts=False, ends=True)
 
 
 class WordTimes:

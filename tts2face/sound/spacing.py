@@ -20,7 +20,7 @@ WINDOW_S = 0.005
 QUIET_DB = -40.0  # of the loudest window: what is below is not heard as speech
 REACH_S = 0.08  # around a silence between two words, in which the quiet part of the sound lies
 LEAST_CHANGE_S = 0.02  # edges and windows are not more exact
-FADE_S = 0.005  # at each cut, which avoids clicks
+FADE_S = 0.005  # linear fade at each cut, which avoids clicks
 
 
 class Cut(NamedTuple):
@@ -118,11 +118,11 @@ def respaced(sound: Waveform, cuts: Sequence[Cut]) -> Waveform:
     start = 0
     for place, change in cuts:
         at = round(place * rate)
-        parts += [_faded(samples[start:at], rate, starts=start > 0, ends=True)]
+        parts.append(samples[start:at] * fade_gains(at - start, rate, starts=start > 0, ends=True))
         if change > 0.0:
             parts.append(np.zeros(round(change * rate), np.float32))
         start = at + round(max(-change, 0.0) * rate)
-    parts.append(_faded(samples[start:], rate, starts=True, ends=False))
+    parts.append(samples[start:] * fade_gains(len(samples) - start, rate, starts=True, ends=False))
     return Waveform(np.concatenate(parts), rate)
 
 
@@ -135,11 +135,12 @@ def respaced_times(times: FloatArray, cuts: Sequence[Cut]) -> FloatArray:
     return moved
 
 
-def _faded(samples: NDArray[np.float32], rate: int, *, starts: bool, ends: bool) -> NDArray[np.float32]:
-    ramp = np.linspace(0.0, 1.0, min(round(FADE_S * rate), len(samples) // 2), endpoint=False, dtype=np.float32)
-    faded = samples.copy()
+def fade_gains(n_samples: int, rate: int, starts: bool, ends: bool) -> NDArray[np.float32]:
+    """(n_samples,) gains of a part of a sound at `rate` Hz, with a fade where it is cut."""
+    ramp = np.linspace(0.0, 1.0, min(round(FADE_S * rate), n_samples // 2), endpoint=False, dtype=np.float32)
+    gain = np.ones(n_samples, np.float32)
     if starts:
-        faded[: len(ramp)] *= ramp
+        gain[: len(ramp)] = ramp
     if ends:
-        faded[len(samples) - len(ramp) :] *= ramp[::-1]
-    return faded
+        gain[n_samples - len(ramp) :] = ramp[::-1]
+    return gain
