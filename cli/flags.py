@@ -160,6 +160,30 @@ def check_options(app: App, arguments: Sequence[str]) -> None:
             )
 
 
+def join_values(app: App, arguments: Sequence[str]) -> list[str]:
+    """Arguments in which a value that begins with a hyphen, such as -60,20,400, is joined to its option by ``=``."""
+    end = arguments.index(END_OF_OPTIONS) if END_OF_OPTIONS in arguments else len(arguments)
+    joined, names = list(arguments[:1]), None
+    for at in range(1, len(arguments)):
+        option, value = arguments[at - 1], arguments[at]
+        # a hyphen alone is standard input
+        if at < end and value[:1] == "-" != value and not is_option(value) and is_option(option):
+            names = _options_with_values(app, arguments[:end]) if names is None else names
+            if option in names:
+                joined[-1] = f"{option}={value}"
+                continue
+        joined.append(value)
+    return joined
+
+
+def _options_with_values(app: App, arguments: Sequence[str]) -> set[str]:
+    command = app.parse_commands(list(arguments))[1][-1]
+    if command.default_command is None:
+        return set()
+    takes_value = [argument for argument in command.assemble_argument_collection() if argument.token_count()[0]]
+    return {name for argument in takes_value for name in argument.names if not name.startswith("--empty-")}
+
+
 def is_option(argument: str) -> bool:
     """Whether an argument has the form of an option."""
     return argument.startswith(END_OF_OPTIONS) or _SHORT_OPTION.fullmatch(argument) is not None

@@ -17,6 +17,7 @@ from cli.flags import (
     Person,
     add_option_flags,
     check_options,
+    join_values,
     options_from_flags,
     switch,
 )
@@ -243,6 +244,7 @@ def _read_text(text: str | None, file: TextFile | None, *, is_needed: bool) -> s
 
 def _call(arguments: Sequence[str]) -> None:
     check_options(app, arguments)
+    arguments = join_values(app, arguments)
     _, called, _ = app.parse_commands(list(arguments))
     if called[-1].default_command is None or {*app.help_flags} & {*arguments}:
         for group in called:

@@ -7,8 +7,9 @@ import zlib
 from pathlib import Path
 
 import pytest
+from cyclopts import App
 
-from cli.flags import check_options
+from cli.flags import check_options, join_values
 from cli.main import app, run
 from lexicon.errors import InputError
 from tests.world import World
@@ -150,3 +151,56 @@ def test_languages_are_accepted_in_any_spelling(text: str, language: str, world:
     words = [text, "--language", language, "--voice", "espeak", *world.models, "--explain", "why.txt", "--quiet"]
     assert run(words) == 0
     assert (here / "why.txt").stat().st_size > 0
+
+
+def test_every_option_of_every_command_takes_a_value_that_begins_with_a_hyphen() -> None:
+    commands: list[tuple[list[str], App]] = [([], app)]
+    n_options = 0
+    for words, command in commands:
+        commands += [([*words, name], command[name]) for name in command if not name.startswith("-")]
+        if command.default_command is None:
+            continue
+        arguments = command.assemble_argument_collection()
+        options = [a.name for a in arguments if a.token_count()[0] and a.name.startswith("--")]
+        values = ["-1", "-60,20,400", "-.5"] * len(options)
+        given = [*words, *(word for pair in zip(options, values, strict=False) for word in pair)]
+        check_options(app, given)
+        expected = [f"{option}={value}" for option, value in zip(options, values, strict=False)]
+        assert join_values(app, given) == [*words, *expected]
+        n_options += len(options)
+    assert n_options > 300
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["Hi.", "--quiet", "-5,4"],  # a switch has no value
+        ["--out", "x.mp4", "--", "--camera", "-60,20"],
+        ["Hi.", "--camera", "--out", "x.mp4"],
+        ["Hi.", "--camera", "-o", "x.mp4"],
+        ["--file", "-"],
+        ["-60,20 degrees"],
+        ["corpus"],
+    ],
+)
+def test_only_values_are_joined_to_options(words: list[str]) -> None:
+    assert join_values(app, words) == words
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["--camera", "-60,20,40"], "camera '-60,20,40' is out of range; yaw is"),
+        (["--seed", "-1"], "seed must be 0 or more, not -1"),
+        (["--size", "-64x64"], "size must be width x height such as 640x480, not '-64x64'"),
+        (["--rate", "-1,2"], 'unable to convert "-1,2" into float'),
+        (["--camrea", "-60,20"], "there is no option --camrea; did you mean --camera?"),
+        (["--camera", "--quiet"], "--camera requires an argument"),
+    ],
+)
+def test_a_value_with_a_hyphen_is_refused_as_a_value(
+    words: list[str], reason: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["Hi.", *words, "--out", "x.mp4"]) == 2
+    assert reason in capsys.readouterr().err
+    assert not list(here.iterdir())
