@@ -160,7 +160,9 @@ def face_model() -> Path:
 def pytest_configure(config: pytest.Config) -> None:
     """Register the markers of the slow groups; tests that are named by their path run whatever group they are in."""
     for name, content in GROUPS.items():
-        config.addinivalue_line("markers", f"{name}: tests in folders of this name: {content}")
+        config.addinivalue_line(
+            "markers", f"{name}: tests in folders of this name, and long ones beside them: {content}"
+        )
     config.addinivalue_line("markers", "formats: other programs read files of the product, or write what it reads")
     config.addinivalue_line("markers", "smoke: one test of a promise; it runs by default though its folder does not")
     config.addinivalue_line(

@@ -106,6 +106,7 @@ def test_tables_that_are_none_are_refused(tmp_path: Path) -> None:
         read_people(tmp_path)
 
 
+@pytest.mark.build
 def test_the_shipped_file_is_learnt_and_its_people_are_no_further_from_people_than_these(
     shared_recordings: Path,
 ) -> None:

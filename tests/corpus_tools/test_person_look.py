@@ -198,6 +198,7 @@ def test_olive_hair_becomes_grey_and_blue_hair_stays_blue() -> None:
     np.testing.assert_allclose(hair_colour(blue)[1:], blue[1:], atol=1e-9)
 
 
+@pytest.mark.build
 @pytest.mark.parametrize(
     ("identity", "hair", "colour", "lengths", "names"),
     [
@@ -206,7 +207,7 @@ def test_olive_hair_becomes_grey_and_blue_hair_stays_blue() -> None:
         ("mei", "bob02", "blond", ("bob",), ("blond",)),
         ("kofi", "bald", None, ("bald",), ()),
         ("nia", "bald", None, ("bald",), ()),
-        ("kofi", "cropped", "black", ("cropped", "flat"), ("black", "dark-brown")),
+        pytest.param("kofi", "cropped", "black", ("cropped", "flat"), ("black", "dark-brown"), marks=pytest.mark.smoke),
         ("ravi", "short01", "black", ("flat", "short"), ("black",)),
         ("ingrid", "bob02", "white", ("bob",), ("white", "grey")),
     ],
@@ -222,6 +223,7 @@ def test_drawn_peoples_hair_is_found(
         assert min(off, key=off.__getitem__) in names
 
 
+@pytest.mark.build
 @pytest.mark.parametrize(
     ("identity", "gains", "is_told"),
     [

@@ -81,6 +81,7 @@ def test_an_error_names_no_path(tmp_path: Path) -> None:
     assert str(tmp_path) not in str(refused.value)
 
 
+@pytest.mark.build
 @pytest.mark.usefixtures("face_model")
 def test_a_photo_becomes_the_head_of_its_person(tmp_path: Path) -> None:
     photo, out = tmp_path / "face.upload", tmp_path / "checked"

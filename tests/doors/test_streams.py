@@ -38,6 +38,7 @@ def test_a_closed_standard_output_is_one_sentence() -> None:
     assert len(completed.stderr.splitlines()) == 1
 
 
+@pytest.mark.commands
 def test_a_closed_or_full_standard_error_changes_neither_answer_nor_exit_code() -> None:
     plain = run_redirected("phones", "Hello.")
     assert "həˈloʊ" in plain.stdout

@@ -3,6 +3,7 @@
 from itertools import combinations
 
 import numpy as np
+import pytest
 
 from tests.face.people import DRAWN
 from tts2face.models.face_loading import load_face
@@ -13,6 +14,7 @@ MOST_SHARED = 0.87  # of the pixels that either outline covers
 LEAST_APART = 25.0  # of 255, mean over a picture of 64 px
 
 
+@pytest.mark.build
 def test_each_has_an_outline_and_colours_of_its_own() -> None:
     pictures = {}
     for name in DRAWN:

@@ -24,6 +24,7 @@ print(held() - before)
 MOST_MB = 35.0  # 6 measured; 78 with the arena of ONNX Runtime
 
 
+@pytest.mark.build
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc, and the C library's setting is glibc's")
 def test_a_long_sentence_keeps_no_memory() -> None:
     done = subprocess.run([sys.executable, "-c", CODE], capture_output=True, text=True, check=False)

@@ -23,7 +23,14 @@ def spoken(name: str, rate: float) -> Speech:
     return speak_with(load_voice(name, "en-us"), TEXT, Prosody(rate), language="en-us")
 
 
-@pytest.mark.parametrize(("name", "rate"), [(name, rate) for name, rates in RATES.items() for rate in rates])
+@pytest.mark.parametrize(
+    ("name", "rate"),
+    [
+        pytest.param(name, rate, marks=[pytest.mark.build] * (name == "joe"))
+        for name, rates in RATES.items()
+        for rate in rates
+    ],
+)
 def test_words_last_as_long_as_the_rate_says(name: str, rate: float) -> None:
     if name == "joe":
         needs(JOE_PACKAGE)

@@ -33,6 +33,7 @@ def test_a_text_without_words_is_refused() -> None:
         pronounce_transcript("?!", "en-us")
 
 
+@pytest.mark.build
 def test_long_recordings_are_aligned_part_by_part(takes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Three sentences in a row: cut at pauses, the edges are those of one alignment of the whole."""
     clips = takes / "clips"

@@ -26,6 +26,7 @@ def same(found: np.ndarray, wanted: np.ndarray) -> bool:
     return (found.dtype, found.shape, found.tobytes()) == (wanted.dtype, wanted.shape, wanted.tobytes())
 
 
+@pytest.mark.fuzz
 @given(st.lists(st.sampled_from(TYPES).flatmap(lambda kind: arrays(kind, array_shapes(max_dims=4))), min_size=1))
 def test_arrays_come_back_bit_by_bit(several: list[np.ndarray]) -> None:
     named = {f"array{number}": array for number, array in enumerate(several)}

@@ -97,6 +97,7 @@ def test_a_rate_that_counts_ticks_is_read_from_the_frames(tmp_path):
     assert read_media_info(path).fps == pytest.approx(25.0, rel=0.01)
 
 
+@pytest.mark.fuzz
 @pytest.mark.parametrize("name", ["bbaf2n.mkv", "copy.mp4"])
 def test_damaged_films_are_read_or_refused_in_bounded_memory_and_time(name, rendered_takes, tmp_path):
     """A crash, another exception than a refusal, or more memory than the child may have ends the child."""

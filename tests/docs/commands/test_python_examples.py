@@ -13,7 +13,7 @@ WITH_EXAMPLES = [page for page in PAGES if code_blocks(page, "python") and page.
 @pytest.mark.parametrize(
     "page",
     [
-        pytest.param(page, marks=[pytest.mark.smoke] * (page.name == "python.md"), id=page.name)
+        pytest.param(page, marks=[pytest.mark.smoke] * (page.name == "animator.md"), id=page.name)
         for page in WITH_EXAMPLES
     ],
 )

@@ -102,7 +102,8 @@ def outcome(path: Path, table: Path) -> tuple[Face | None, str]:
         return None, str(error)
 
 
-@pytest.mark.parametrize("name", ["skinned", "quantised", "vrm"])
+@pytest.mark.fuzz
+@pytest.mark.parametrize("name", [pytest.param("skinned", marks=pytest.mark.smoke), "quantised", "vrm"])
 def test_a_mutated_file_loads_or_is_refused(
     name: str, sources: dict[str, tuple[dict[str, Any], bytes]], tmp_path: Path
 ) -> None:

@@ -182,6 +182,7 @@ def test_points_under_pixels_are_where_the_rays_meet_the_plane() -> None:
     assert (facing > 0.99).all()
 
 
+@pytest.mark.fuzz
 def test_the_nearest_triangle_under_a_pixel_is_that_of_a_brute_force_search() -> None:
     head = load_face("head")
     vertices, triangles = head.vertices.astype(np.float64), head.triangles.astype(np.int64)

@@ -280,6 +280,7 @@ def test_assimp_reads_parts_that_do_not_move(tmp_path):
     assert answer["seconds"] == pytest.approx(4 / 30, abs=1e-3)
 
 
+@pytest.mark.build
 def test_babylon_plays_the_weights_of_the_clip(tmp_path):
     packages = programs.node_package("@babylonjs/loaders")
     clip = made_clip(12)

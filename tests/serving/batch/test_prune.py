@@ -74,6 +74,7 @@ def test_unfinished_files_of_killed_processes_are_removed(tmp_path: Path) -> Non
     assert [path.name for path in scratch.iterdir()] == [".two.mov.tts2face-2"]
 
 
+@pytest.mark.server
 def test_the_segments_of_a_batch_stay_and_it_runs_again_without_rendering(
     plan_of: Planner, voices: list[LetterVoice], world: World, tmp_path: Path
 ) -> None:

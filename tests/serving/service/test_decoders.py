@@ -255,6 +255,7 @@ def test_a_picture_that_takes_too_much_memory_is_refused_before_it_is_decoded(
         assert decoding_bytes(picture) == 4 * 900**2
 
 
+@pytest.mark.server
 def test_who_sends_recordings_slowly_holds_places_of_the_own_key_only(host: HostService, tmp_path: Path) -> None:
     """Two builds whose bodies never end; the turn of a check was taken before the body came."""
     keys = {name: add_key(tmp_path / "keys.toml", name, ["build", "speak"]) for name in ("mallory", "ann")}

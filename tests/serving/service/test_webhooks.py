@@ -195,6 +195,7 @@ def test_a_host_that_was_taken_out_of_the_settings_is_told_no_more(tmp_path: Pat
         assert removed.messages == []
 
 
+@pytest.mark.server
 @pytest.mark.parametrize("drip", [b"H", b""], ids=["drips", "silent"])
 def test_a_server_ends_while_a_receiver_holds_a_call(tmp_path: Path, client: JobClient, drip: bytes) -> None:
     with Silent(drip) as silent:

@@ -169,6 +169,7 @@ def test_words_of_other_programs_are_imported(studio: TestClient) -> None:
     assert wrong.json()["error"]["message"].startswith("x.eaf is no file of ELAN")
 
 
+@pytest.mark.server
 def test_what_cannot_be_compared_is_refused(studio: TestClient) -> None:
     number = create(studio, TEXT)
     for reference, reason in (

@@ -44,6 +44,7 @@ def test_prompts_come_with_their_units(tmp_path):
     assert set(first["triphones"]) <= set(found["running"]["triphones"])
 
 
+@pytest.mark.server
 def test_takes_that_were_not_checked_are_checked_after_a_restart(tmp_path, rendered_takes, face_model):
     clips = sorted((rendered_takes / "clips").glob("*.mkv"))[:3]
     words = dict(line.split(",")[:2] for line in (rendered_takes / "manifest.csv").read_text().splitlines()[1:])
