@@ -8,15 +8,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from types import MappingProxyType
+from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.face.expressions import GAZE_SHAPES, add_expression_shapes, expression_weights
+from tts2face.face.expressions import GAZE_SHAPES, add_expression_shapes
 from tts2face.face.eyelids import EyelidModel, build_eyelid_model
 from tts2face.face.landmarks import axis_scales, landmark_positions, procrustes_rotation, scatter_landmarks
 from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES, LipConstraints, build_lip_constraints
+from tts2face.face.mood_targets import mood_weights, with_corner_shape
 from tts2face.face.shape_transfer import SCALE_LIMITS, append_shapes, spread_landmark_motion
 from tts2face.face.stand_in import stand_in, with_channels_of
 from tts2face.models.face import Face
@@ -36,6 +38,8 @@ MAX_MODE_MM = 10.0  # largest displacement of a landmark by one mode: brows rise
 LID_LANDMARKS = (*LID_RINGS[0], *LID_RINGS[1])
 # Landmarks added to a region for the fit of its size: corners of the eyes, root and base of the nose.
 FIT_LANDMARKS = (33, 133, 362, 263, 168, 6, 2)
+SMILES = ("mouthSmile", "cheekSquint")  # shapes whose sides differ a little in a person's smile
+SMILE_UNEVENNESS = (0.03, 0.08)  # sides of smiles differ by 6 to 16 %: posed symmetry is seen as a mask
 DEFAULT_GAZE_TURN = 0.4  # rad per weight of a gaze shape on a face whose eyes are part of its shapes
 
 NO_GAINS: Mapping[str, float] = MappingProxyType({})
@@ -78,7 +82,11 @@ class GestureFace:
     lids: EyelidModel
 
     def perform(
-        self, speech: Trajectory, gestures: Mapping[str, Float32Array], gains: Mapping[str, float] = NO_GAINS
+        self,
+        speech: Trajectory,
+        gestures: Mapping[str, Float32Array],
+        gains: Mapping[str, float] = NO_GAINS,
+        unevenness: float = 0.0,
     ) -> FaceMotion:
         """Shape weights and head pose of speech with gestures.
 
@@ -91,6 +99,8 @@ class GestureFace:
         gains
             Factors on the motion of features, and on the speech motion of ``jaw`` and ``lips``; closed lips stay
             closed.
+        unevenness
+            Share by which the left side of a smile is larger than the mean of both, as of `smile_unevenness`.
 
         Raises
         ------
@@ -103,7 +113,7 @@ class GestureFace:
         spoken[:, : self.n_speech_shapes] = speech.values
         features = {name: gains.get(name, 1.0) * values.astype(np.float64) for name, values in gestures.items()}
         spoken = self._scale_speech(spoken, gains)
-        added = self._gesture_weights(spoken, features)
+        added = self._gesture_weights(spoken, features, self._uneven_expressions(unevenness))
         shares = features.get("blink", np.zeros((len(speech), 2)))
         added = self.lids.close(spoken + added, shares) - spoken
         weights = self.mouth.combine(spoken, added)
@@ -123,13 +133,22 @@ class GestureFace:
         )
         return self.mouth.amplify(speech, jaw, lips)
 
-    def _gesture_weights(self, speech: FloatArray, features: Mapping[str, FloatArray]) -> FloatArray:
+    def _uneven_expressions(self, unevenness: float) -> FloatArray:
+        """Shape weights (5, K) of the expressions, of which smiles differ between the sides."""
+        sides = [name.endswith("Left") - name.endswith("Right") for name in self.face.shape_names]
+        smiles = np.where([name.startswith(SMILES) for name in self.face.shape_names], sides, 0)
+        uneven: FloatArray = self.expressions * (1.0 + unevenness * smiles)
+        return uneven
+
+    def _gesture_weights(
+        self, speech: FloatArray, features: Mapping[str, FloatArray], expressions: FloatArray
+    ) -> FloatArray:
         """Weights (T, K) that expression and gaze add to speech; clipped to the limits, except for the mouth's."""
         added = np.zeros_like(speech)
         if "expression" in features:
-            added += ordered_product(features["expression"], self.expressions)
+            added += ordered_product(features["expression"], expressions)
             lips = self.mouth.moving
-            added[:, lips] = ordered_product(mouth_response(features["expression"]), self.expressions[:, lips])
+            added[:, lips] = ordered_product(mouth_response(features["expression"]), expressions[:, lips])
             added = self.mouth.attenuate_on_rounded_lips(speech, self.mouth.attenuate_on_moved_lips(speech, added))
         if "gaze" in features:
             down, left = features["gaze"].T
@@ -146,6 +165,12 @@ class GestureFace:
             raise InputError("the speech is not in the shapes of this face; retarget it to the face first")
         widths = {name: columns.stop - columns.start for name, columns in self.regions.items()}
         check_gestures(gestures, gains, len(speech), widths)
+
+
+def smile_unevenness(name: str, seed: int) -> float:
+    """Share by which the left side of a face's smile exceeds the mean of both: of `SMILE_UNEVENNESS`, either sign."""
+    random = np.random.default_rng([crc32(name.encode()), seed])
+    return float(random.uniform(*SMILE_UNEVENNESS) * random.choice((-1.0, 1.0)))
 
 
 def mouth_response(expression: FloatArray) -> FloatArray:
@@ -189,7 +214,7 @@ def gesture_face(face: Face, palette: Palette) -> GestureFace:
     """
     own, face = face, stand_in(face)
     build_lip_constraints(face)  # raises for a face without lips before the transfer
-    extended_face = add_expression_shapes(face)
+    extended_face = with_corner_shape(add_expression_shapes(face))
     neutral = palette.neutral.astype(np.float64)
     shapes = [region_shapes(extended_face, neutral, palette.regions[name]) for name in REGION_FEATURES]
     firsts = np.cumsum([len(extended_face.shape_names), *(len(moved) for moved in shapes)]).tolist()
@@ -205,7 +230,7 @@ def gesture_face(face: Face, palette: Palette) -> GestureFace:
     return GestureFace(
         face=extended_face if own is face else with_channels_of(own, extended_face),
         n_speech_shapes=len(face.shape_names),
-        expressions=expression_weights(extended_face, mouth.with_smile_cost()),
+        expressions=mood_weights(extended_face, mouth.with_smile_cost()),
         regions=regions,
         gaze=gaze_weights(extended_face),
         mouth=mouth.with_gesture_cost(),

@@ -36,6 +36,7 @@ GESTURE_COST = 1.0  # of changes of all weights by gestures
 # Of sideways shapes where nothing rolls the lips: left and right together lift a jaw a little, and were used for it.
 SIDEWAYS, SIDEWAYS_COST = ("jawLeft", "jawRight", "mouthLeft", "mouthRight"), 20.0
 ROLLED = "mouthRollLower"
+CORNER_SHAPE = "mouthCorners"  # of moods, which bends both lips alike; does not shut them either
 OVERLAP = 3.0  # tolerance of lips pressed into each other, relative to that of a slit between them, which is seen
 USUAL_EXPRESSION = 0.3  # weight of a basis expression in speech, at which closed lips shall be so within the tolerance
 CLOSED_SMILE_COST = 0.3  # of the smile of a basis expression, whose lips are closed
@@ -62,7 +63,8 @@ class LipConstraints:
     limits : (k, 2)
         Least and greatest weight of the `moving` shapes.
     is_smile, is_sideways : (k,)
-        Whether each of the `moving` shapes smiles, and whether it moves a mouth sideways whose lips nothing rolls.
+        Whether each of the `moving` shapes smiles, and whether it bends a mouth, or moves one sideways whose lips
+        nothing rolls.
     tolerance
         By which gestures may part lips that touch, mm; they may press them together by `OVERLAP` times as much.
     """
@@ -189,6 +191,11 @@ def build_lip_constraints(face: Face) -> LipConstraints:
         width=motion[MOUTH_CORNER_LEFT, 0] - motion[MOUTH_CORNER_RIGHT, 0],
         limits=face.limits[moving].astype(np.float64),
         is_smile=np.array([face.shape_names[i].startswith(SMILE_PREFIX) for i in moving]),
-        is_sideways=np.array([face.shape_names[i] in SIDEWAYS and ROLLED not in face.shape_names for i in moving]),
+        is_sideways=np.array(
+            [
+                name == CORNER_SHAPE or (name in SIDEWAYS and ROLLED not in face.shape_names)
+                for name in np.array(face.shape_names)[moving]
+            ]
+        ),
         tolerance=face.lip_tolerance_mm,
     )

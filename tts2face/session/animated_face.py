@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from tts2face.articulation import NATURAL
 from tts2face.face.appearance_regression import AppearanceRegression, fit_appearance_regression
-from tts2face.face.gestures import SPEECH_GAINS, GestureFace, gesture_face
+from tts2face.face.gestures import SPEECH_GAINS, GestureFace, gesture_face, smile_unevenness
 from tts2face.face.landmarks import moved_landmarks
 from tts2face.face.own_face import OwnFaceGestures, build_own_face_gestures
 from tts2face.face.stand_in import stand_in
@@ -124,7 +124,9 @@ class AnimatedFace(Protocol):
     def with_gestures_of(self, palette: Palette) -> "AnimatedFace":
         """The face with the channels that the gestures of a palette need."""
 
-    def add_gestures(self, speech: Trajectory, gestures: Gestures, gains: Mapping[str, float]) -> FaceMotion:
+    def add_gestures(
+        self, speech: Trajectory, gestures: Gestures, gains: Mapping[str, float], seed: int = 0
+    ) -> FaceMotion:
         """Add gestures to speech motion.
 
         Parameters
@@ -135,6 +137,8 @@ class AnimatedFace(Protocol):
             (T, k) values of each feature of the palette, in the palette's units.
         gains
             Factors of the speech motion by feature (jaw, lips).
+        seed
+            Of the clip, by which a smile is uneven.
         """
 
     def renderer(self, picture: Picture) -> FrameRenderer:
@@ -220,11 +224,14 @@ class MeshFace:
         """The face with the shapes that a palette's gestures need."""
         return replace(self, gestures=gesture_face(self.face, palette))
 
-    def add_gestures(self, speech: Trajectory, gestures: Gestures, gains: Mapping[str, float]) -> FaceMotion:
+    def add_gestures(
+        self, speech: Trajectory, gestures: Gestures, gains: Mapping[str, float], seed: int = 0
+    ) -> FaceMotion:
         """Add gestures to speech motion; closed lips stay closed."""
         if self.gestures is None:
             raise InputError(NO_PALETTE)
-        performance = self.gestures.perform(speech, gestures, gains)
+        uneven = smile_unevenness(str(self.face.metadata.get("name", "")), seed)
+        performance = self.gestures.perform(speech, gestures, gains, uneven)
         return FaceMotion(performance.motion, performance.head)
 
     def renderer(self, picture: Picture) -> FrameRenderer:
@@ -324,7 +331,9 @@ class OwnAppearanceFace:
         """The face with the parameters of lids, brows, cheeks and expression that a palette's gestures need."""
         return replace(self, gestures=build_own_face_gestures(self.talker, palette))
 
-    def add_gestures(self, speech: Trajectory, gestures: Gestures, gains: Mapping[str, float]) -> FaceMotion:
+    def add_gestures(
+        self, speech: Trajectory, gestures: Gestures, gains: Mapping[str, float], seed: int = 0
+    ) -> FaceMotion:
         """Add gestures of lids, brows, cheeks and expression; all head channels are 0."""
         if self.gestures is None:
             raise InputError(NO_PALETTE)

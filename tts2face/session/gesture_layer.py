@@ -136,9 +136,12 @@ class GestureLayer:
         while not wait([drawn], POLL_S).done:
             self._yield_turn()
         history, timeline, (gestures, stream) = drawn.result()
+        seed = self._requested.seeds.get("expression", self._seed)
         moved = self._memory.recall(
             lambda: (history, lips.values.tobytes()),
-            lambda: self._face.add_gestures(lips, gestures, {name: timeline.gains.of(name) for name in SPEECH_GAINS}),
+            lambda: self._face.add_gestures(
+                lips, gestures, {name: timeline.gains.of(name) for name in SPEECH_GAINS}, seed
+            ),
             lambda made: made.face.values.nbytes + lips.values.nbytes,
         )
         self._next = _Progress(history, stream, self._marked(piece), self._now.seconds + lips.duration)
