@@ -90,6 +90,11 @@ class Sentence:
         """Index of the letter after it."""
         return self.utterances[-1].last
 
+    @property
+    def words(self) -> tuple[TextWord, ...]:
+        """Words as they are spoken, with the punctuation after them."""
+        return tuple(word for part in self.utterances for word in part.words or map(TextWord, part.text.split()))
+
     def relative(self) -> "Sentence":
         """The sentence with positions counted from its first letter: equal for equal sentences anywhere in a text."""
         first = self.first

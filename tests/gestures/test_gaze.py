@@ -10,6 +10,7 @@ import pytest
 from lexicon.errors import DataError
 from tts2face.gestures.gaze import HEAD_ONSET_DEG, HEAD_SHARE, GazeProcess, HeadFollower
 from tts2face.gestures.presentation import FrameContext
+from tts2face.gestures.speech_plan import NO_PLAN
 from tts2face.models.gaze import (
     FACE_DEG,
     LISTENING,
@@ -50,7 +51,7 @@ def made(
 def frames(times: np.ndarray, *, listens: bool = False, decibels: float = 0.0) -> FrameContext:
     """Frames of a derived style."""
     level, listening = np.full(len(times), decibels, np.float32), np.full(len(times), listens)
-    return FrameContext(times, level, np.zeros((0, 2)), np.ones(len(times), bool), listening)
+    return FrameContext(times, level, NO_PLAN, np.ones(len(times), bool), listening)
 
 
 def test_a_look_is_as_long_as_far_and_where_the_habit_says() -> None:

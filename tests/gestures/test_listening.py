@@ -124,13 +124,12 @@ def clips(starter_of: Callable[..., Palette]) -> dict[str, dict[str, np.ndarray]
     }  # fmt: skip
 
 
-def test_listeners_blink_less_and_hold_the_head_still(clips) -> None:
+def test_listeners_blink_as_in_silence_and_hold_the_head_still(clips) -> None:
     plain, heard = clips["neutral"], clips["neutral listens"]
     rates = [
         find_blinks(one["blink"], np.array([len(one["blink"])], np.int32), FPS).per_minute for one in (plain, heard)
     ]
-    assert rates[1] == pytest.approx(rates[0] * 17 / 26, rel=0.2)
-    assert 6 <= rates[1] <= 21  # Doughty 2001, Optometry and Vision Science 78: silence
+    assert all(10 <= rate <= 24 for rate in rates)  # 17 in silence: Bentivoglio et al. 1997
     spreads = [np.degrees(one["head"][60:, 1].std()) for one in (plain, heard)]
     assert spreads[1] < 0.7 * spreads[0]
 

@@ -21,19 +21,20 @@ PROFILE_LIMITS_S = (0.1, 0.5)  # from open to open; longer closures are not blin
 MAX_EDGE = 5  # frames before and after a blink in which the lid leaves and reaches its rest
 N_TAPER_FRAMES = 3  # in which a profile rises from rest and returns to it
 MAX_PROFILES = 256
-# Seconds between blinks: a gamma distribution. In conversation 10 to 26 blinks a minute are usual, most of them at
-# pauses and ends of phrases (Bentivoglio et al. 1997, Movement Disorders 12; Nakano and Kitazawa 2010, Experimental
-# Brain Research 205).
-MEAN_INTERVAL_S = 4.7
-# of the gamma distribution of intervals: the larger, the more regular
-INTERVAL_SHAPE = 10.0
-# seconds, between two presented blinks
-MIN_INTERVAL_S = 1.5
-LISTENING_INTERVALS = 26 / 17  # of those of speech: 17 blinks a minute at rest, 26 in conversation (Bentivoglio)
-EARLY_SHARE = 0.6  # of the interval after which a phrase end is used
-PATIENCE_S = 1.6  # an overdue blink waits this long for a pause
+OPEN_AT_END, OPENING_S = 0.3, 0.2  # largest closure at the last frame of a clip, and from when on lids open for it
+# Intervals of a gamma distribution about 2.3 s in speech and 3.5 s in silence: 26 and 17 blinks a minute (Bentivoglio
+# et al. 1997, Movement Disorders 12); their coefficient of variation is about .78 (decision 265).
+MEAN_INTERVAL_S = 2.5  # edges of phrases make it shorter
+INTERVAL_SHAPE = 1.0  # of the gamma distribution: the larger, the more regular
+MIN_INTERVAL_S = 0.5  # between the starts of two blinks
+LISTENING_INTERVALS = 26 / 17  # of those of speech
+# Blinks fall at edges of phrases more often than chance (Nakano and Kitazawa 2010, Experimental Brain Research 205).
+EDGE_SHARE = 0.42  # of edges of phrases have one, where a share of the interval has passed
+EARLY_SHARE = 0.5
+EDGE_DELAY_S = 0.3  # behind an edge, at most
+PATIENCE_S = 0.7  # a blink that is due waits so long for an edge that comes
 PAUSE_DB = -20.0  # intensity of a pause, relative to the mean level of speech
-PHRASE_END_FRAMES = 3  # of a pause, after which a phrase has ended; most closures of plosives are shorter
+TURN_PAUSE_S = 1.0  # of silence behind which a face no longer speaks
 
 
 def find_blinks(closure: FloatArray, lengths: NDArray[np.integer]) -> IntArray:
@@ -138,21 +139,22 @@ def lids_without_blinks(style: Style) -> Float32Array:
 
 
 class BlinkPresentation:
-    """Blinks of derived styles, played on lids that were sampled without blinks.
+    """Blinks of derived styles, played on lids that were sampled without blinks; none is cut by the end of a clip.
 
     Parameters
     ----------
     profiles
         Recorded profiles (n, 2).
     seed
-        Seed of the intervals and of the choice of profiles.
+        Seed of the intervals, of their places and of the choice of profiles.
     """
 
     def __init__(self, profiles: tuple[FloatArray, ...], seed: list[int]) -> None:
         self._profiles, self._generator = profiles, np.random.default_rng(seed)
-        self._interval = self._draw_interval(self._generator.random())
-        self._waited = self._interval * self._generator.random()
-        self._paused_frames = 0
+        self._waited = MEAN_INTERVAL_S * self._generator.random()
+        self._due = _interval(self._generator.random())  # seconds of speech after the last blink
+        self._edge: float | None = None  # seconds of the clip at which one begins because of an edge
+        self._quiet_s = 0.0
         self._frame = 0
         self._time = 0.0
         self._profile = np.zeros((0, 2))
@@ -167,34 +169,50 @@ class BlinkPresentation:
         """Lid closures (n, 2) with blinks."""
         if not self._profiles:
             return values
-        chances = self._generator.random((len(frames.times), 2))
-        shut = np.stack([self._closure(frames, at, chances[at]) for at in range(len(frames.times))])
-        return np.asarray(values + shut * (1.0 - values), np.float32)
+        chances = self._generator.random((len(frames.times), 4))
+        at_edge, before_edge = _near_edges(frames)
+        shown = np.zeros(values.shape)
+        is_calm = frames.is_listening.tolist()
+        for at, (time, chance) in enumerate(zip(frames.times.tolist(), chances.tolist(), strict=True)):
+            step, self._time = time - self._time, time
+            self._quiet_s = self._quiet_s + step if frames.intensity[at] < PAUSE_DB else 0.0
+            self._waited += step / (LISTENING_INTERVALS if is_calm[at] or self._quiet_s > TURN_PAUSE_S else 1.0)
+            if at_edge[at] and chance[2] < EDGE_SHARE and self._waited >= EARLY_SHARE * self._due:
+                self._edge = time + EDGE_DELAY_S * chance[3]
+            due = self._due + (PATIENCE_S if before_edge[at] else 0.0)
+            is_free = frames.is_presented[at] and self._waited >= MIN_INTERVAL_S and self._frame >= len(self._profile)
+            if is_free and (self._waited >= due if self._edge is None else time >= self._edge):
+                self._begin(time, frames.end, chance)
+            if self._frame < len(self._profile):
+                shown[at] = self._profile[self._frame]
+            self._frame += 1
+        return np.asarray(values + shown * (1.0 - values), np.float32)
 
-    def _closure(self, frames: FrameContext, at: int, chances: FloatArray) -> FloatArray:
-        """Closure (2,) of the lids by blinks at a frame."""
-        time = float(frames.times[at])
-        self._waited, self._time = self._waited + time - self._time, time
-        self._paused_frames = self._paused_frames + 1 if frames.intensity[at] < PAUSE_DB else 0
-        listens = bool(frames.is_listening[at])
-        if frames.is_presented[at] and self._frame >= len(self._profile) and self._begins(listens=listens):
-            self._interval, self._waited = self._draw_interval(float(chances[0])), 0.0
-            self._profile, self._frame = self._profiles[int(chances[1] * len(self._profiles))], 0
-        self._frame += 1
-        return self._profile[self._frame - 1] if self._frame <= len(self._profile) else np.zeros(2)
+    def _begin(self, time: float, end: float, chances: list[float]) -> None:
+        """Begin a blink, unless the clip ends before it does."""
+        profile = self._profiles[int(chances[0] * len(self._profiles))]
+        if time + (len(profile) + 1) / GESTURE_FPS < end:
+            self._due, self._waited, self._edge = _interval(chances[1]), 0.0, None
+            self._profile, self._frame = profile, 0
 
-    def _begins(self, *, listens: bool) -> bool:
-        if self._waited < MIN_INTERVAL_S:
-            return False
-        if not listens and self._paused_frames == PHRASE_END_FRAMES and self._waited >= EARLY_SHARE * self._interval:
-            return True
-        overdue = self._waited - (LISTENING_INTERVALS if listens else 1.0) * self._interval
-        return overdue >= (0.0 if self._paused_frames >= PHRASE_END_FRAMES else PATIENCE_S)
 
-    def _draw_interval(self, chance: float) -> float:
-        """Quantile `chance` of the distribution of intervals (Wilson and Hilferty 1931 for the gamma distribution)."""
-        # Wilson and Hilferty: the cube root of a gamma variable is nearly normal
-        spread = 1.0 / (9.0 * INTERVAL_SHAPE)
-        # the quantiles of 0 and 1 are infinite
-        normal = NormalDist().inv_cdf(min(max(chance, 1e-6), 1.0 - 1e-6))
-        return float(max(MEAN_INTERVAL_S * (1.0 - spread + normal * np.sqrt(spread)) ** 3, MIN_INTERVAL_S))
+def _near_edges(frames: FrameContext) -> tuple[list[bool], list[bool]]:
+    """(n,) whether each frame is the first at an edge of a phrase, and whether one follows within `PATIENCE_S`."""
+    edges = np.array([*frames.plan.edges, np.inf])
+    places = np.searchsorted(edges, frames.times, side="right")
+    return (np.diff(places, prepend=places[:1]) > 0).tolist(), (edges[places] - frames.times <= PATIENCE_S).tolist()
+
+
+def _interval(chance: float) -> float:
+    """Quantile `chance` of the distribution of intervals (Wilson and Hilferty 1931 for the gamma distribution)."""
+    # Wilson and Hilferty: the cube root of a gamma variable is nearly normal
+    spread = 1.0 / (9.0 * INTERVAL_SHAPE)
+    # the quantiles of 0 and 1 are infinite
+    normal = NormalDist().inv_cdf(min(max(chance, 1e-6), 1.0 - 1e-6))
+    return float(MEAN_INTERVAL_S * max(1.0 - spread + normal * np.sqrt(spread), 0.0) ** 3)
+
+
+def open_at_end(closure: Float32Array, times: FloatArray, end: float) -> Float32Array:
+    """Lid closures (T, 2) at times (T,) that leave the eyes open at the end of a clip, in seconds."""
+    most = OPEN_AT_END + (1.0 - OPEN_AT_END) * np.clip((end - times) / OPENING_S, 0.0, 1.0)
+    return np.minimum(closure, most[:, None].astype(np.float32))

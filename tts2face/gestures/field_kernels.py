@@ -1,4 +1,4 @@
-"""Compiled kernels of `tts2face.gestures.field`: search of similar moments and sampling."""
+"""Compiled kernels of gestures: search of similar moments, sampling, and low-pass filters of what is sampled."""
 
 from typing import Any
 
@@ -85,6 +85,18 @@ def generate_frames(corpus, tree, axes, options, track):  # type: ignore[no-unty
                 recent[r - 1] = recent[r]
             recent[len(recent) - 1] = chosen
         moment = moments[i] = chosen
+
+
+@kernel
+def low_pass(values, shares, stages):  # type: ignore[no-untyped-def]
+    """Replace values (n, k) by those behind stages (s, k) in series, each of which takes a share (n,) of the way."""
+    for at in range(len(values)):
+        for d in range(values.shape[1]):
+            passed = values[at, d]
+            for number in range(len(stages)):
+                stages[number, d] += shares[at] * (passed - stages[number, d])
+                passed = stages[number, d]
+            values[at, d] = passed
 
 
 @kernel

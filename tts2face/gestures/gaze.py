@@ -5,9 +5,10 @@ The viewer is the partner, to whom a silent face listens. Habits are drawn from 
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from copy import copy, deepcopy
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,10 @@ SACCADE_S, SACCADE_S_PER_DEG = 0.021, 0.0022
 LEAST_JUMP_DEG = 1.5  # smaller shifts are those of microsaccades, or the noise of the recordings
 LIMITS_DEG = np.array([[-18.0, 22.0], [-32.0, 32.0]])  # down and left; farther, the eyes of faces have no shapes
 DIRECTION_SPREAD_DEG = 20.0  # of looks about the side, up and down
+# In speech people look away as a phrase begins and back as it ends, and at the end of what they say (Kendon 1967):
+# looks at the face end at the beginning of a phrase, looks away at the end of one, a little before or after their time.
+NEAR_S, EARLY_S, PATIENCE_S = 0.1, 0.6, 0.6
+LAST_S, BACK_S = 1.0, 0.4  # before the end of a sentence, in which no look away begins, and from which on none lasts
 N_TRIES = 8  # for a place that differs visibly from the one before
 # At the beginning of a turn people look away: seven in ten long utterances (Kendon 1967, Acta Psychologica 26; the same
 # share in the rule of Cassell, Torres and Prevost 1999), and when they think, mostly up (Andrist et al. 2014, HRI).
@@ -66,6 +71,27 @@ class _Rest:
     fixation_s: float
 
 
+class _Place(NamedTuple):
+    """Whether a phrase begins or ends about a frame, and seconds to the end of the sentence; infinite in silence."""
+
+    begins: bool
+    ends: bool
+    left_s: float
+
+
+def _places(frames: FrameContext) -> Iterator[_Place]:
+    """The place in speech of each frame."""
+    times, left = frames.times, np.full(len(frames.times), np.inf)
+    begins, ends = np.zeros(len(times), bool), np.zeros(len(times), bool)
+    for sentence in frames.plan.sentences:
+        inside = (times >= sentence.span.start - NEAR_S) & (times < sentence.span.end)
+        left[inside] = sentence.span.end - times[inside]
+        for phrase in sentence.phrases:
+            begins |= np.abs(times - phrase.start) < NEAR_S
+            ends |= np.abs(times - phrase.end) < NEAR_S
+    return map(_Place, begins.tolist(), ends.tolist(), left.tolist())
+
+
 class GazeProcess:
     """Fixations of a person in conversation, frame by frame at `GESTURE_FPS`.
 
@@ -98,8 +124,8 @@ class GazeProcess:
     def extend(self, frames: FrameContext) -> None:
         """Draw fixations for the next frames, each 1 / `GESTURE_FPS` long."""
         quiet = frames.intensity < PAUSE_DB
-        for time, is_quiet, listens in zip(
-            frames.times.tolist(), quiet.tolist(), frames.is_listening.tolist(), strict=True
+        for time, is_quiet, listens, place in zip(
+            frames.times.tolist(), quiet.tolist(), frames.is_listening.tolist(), _places(frames), strict=True
         ):
             self._quiet_s = self._quiet_s + 1.0 / GESTURE_FPS if is_quiet and not listens else 0.0
             state = LISTENING if listens or self._quiet_s > TURN_END_S else SPEAKING
@@ -107,10 +133,19 @@ class GazeProcess:
                 self._change(state, time)
             self._rest.look_s -= 1.0 / GESTURE_FPS
             self._rest.fixation_s -= 1.0 / GESTURE_FPS
-            if self._rest.look_s <= 0.0:
+            if self._is_over(place):
                 self._look(time, is_away=self._fixations[-1].is_on_face)
             elif self._rest.fixation_s <= 0.0:
                 self._shift(time)
+
+    def _is_over(self, place: "_Place") -> bool:
+        """Whether the look ends at a place in speech."""
+        left = self._rest.look_s
+        if place.left_s == math.inf or self._state == LISTENING:
+            return left <= 0.0
+        if self._fixations[-1].is_on_face:
+            return place.begins and left <= EARLY_S and place.left_s > LAST_S
+        return place.left_s < BACK_S or left <= -PATIENCE_S or (place.ends and left <= EARLY_S / 2)
 
     def at(self, times: FloatArray) -> Float32Array:
         """Gaze (T, 2) in radians down and left at increasing times (T,); earlier fixations are forgotten."""

@@ -10,6 +10,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.gestures.speech_plan import NO_PLAN, SpeechPlan
 from tts2face.gestures.stream import NO_SEEDS, GestureFields, GestureValues, style_median
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import GESTURE_FPS
@@ -38,8 +39,8 @@ class NoiseStream:
         """A stream that continues as this one, independently of it."""
         return copy(self)
 
-    def next(self, sound: Waveform, n_frames: int, timeline: Timeline) -> GestureValues:
-        """Values (n_frames, k) of each feature for the next frames; the sound is not used."""
+    def next(self, sound: Waveform, n_frames: int, timeline: Timeline, plan: SpeechPlan = NO_PLAN) -> GestureValues:
+        """Values (n_frames, k) of each feature for the next frames; neither sound nor plan is used."""
         times = (self._n_frames + np.arange(n_frames)) / self._fps
         self._n_frames += n_frames
         return {

@@ -5,26 +5,36 @@ Derived styles keep the form of the recorded motion (profiles of blinks, slow pa
 often and how far; recorded styles and the style ``measured`` are unchanged.
 """
 
-from copy import copy, deepcopy
+from copy import copy
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.gestures.field_kernels import low_pass
+from tts2face.gestures.phrase_motion import PhraseMotion
 from tts2face.gestures.prosody import QUIET_DB
-from tts2face.models.palette import GESTURE_FPS
+from tts2face.gestures.speech_plan import SpeechPlan
+from tts2face.models.palette import GESTURE_FPS, FaceRegion
 from tts2face.numeric.arrays import Float32Array, FloatArray
 
 SMOOTHING_STAGES = 4  # low-pass stages in series: 80 dB per decade, so that scaled motion adds nothing above 6 Hz
 LOUD_DB = 0.0  # intensity relative to the mean level of speech at which the loudness is 1
-# Emphasis of a mood's expression: share in silence, gain with the smoothed loudness, and spread of a slow random part.
+# Emphasis of a mood's expression: share in silence, and gain with the smoothed loudness.
 SILENT_EMPHASIS = 0.86
 LOUDNESS_EMPHASIS = 0.21
-RANDOM_EMPHASIS = 0.07
 LISTENING_LOUDNESS = 1.2  # a listener shows the mood as in loud speech: a friendly one smiles
-EMPHASIS_HZ, RANDOM_HZ = 0.9, 0.25
+EMPHASIS_HZ = 0.9
 EMPHASIS_LIMITS = (0.6, 1.35)
+# Expression, brows and cheeks change between phrases: the slow part of the recorded motion, by these factors and to
+# these limits, is followed at the edges of phrases and nearly held within them.
+PHRASE_HZ = 0.5
+PHRASE_FACTORS = MappingProxyType({"expression": 3.0, "brows": 1.6, "cheeks": 1.6})
+PHRASE_LIMITS = MappingProxyType({"expression": 0.12, "brows": 2.0, "cheeks": 1.5})  # weights, and mm of each mode
+EDGE_S = 0.22  # about an edge, in which a change has its way
+HELD_RATE, MOVING_RATE, IDLE_RATE = 0.4, 8.0, 4.0  # 1/s: within phrases, at their edges, and in silence
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,19 +47,22 @@ class FrameContext:
         Increasing seconds of the whole clip.
     intensity : (n,)
         Sound level in dB relative to the mean level of speech.
-    accents : (m, 2)
-        Seconds and strength (0 to 1) of the accents of the current piece of sound.
+    plan
+        What is said in the current piece, in seconds of the whole clip.
     is_presented : (n,)
         Whether the style of each frame is a derived one.
     is_listening : (n,)
         Whether the face listens.
+    end
+        Seconds of the last frame of the clip, if the current piece is its last one; else infinite.
     """
 
     times: FloatArray
     intensity: Float32Array
-    accents: FloatArray
+    plan: SpeechPlan
     is_presented: NDArray[np.bool_]
     is_listening: NDArray[np.bool_]
+    end: float = np.inf
 
 
 class Presentation(Protocol):
@@ -85,17 +98,9 @@ class LowPass:
 
     def filter(self, values: FloatArray) -> FloatArray:
         """Filtered values (n, k) of the next values (n, k)."""
-        share, stages = float(self._share), self._stages.T.tolist()  # Python's numbers cost less than rows
-        columns = np.asarray(values, np.float64).T.tolist()
-        for column, stage in zip(columns, stages, strict=True):
-            for at, value in enumerate(column):
-                passed = value
-                for number in range(SMOOTHING_STAGES):
-                    stage[number] += share * (passed - stage[number])
-                    passed = stage[number]
-                column[at] = passed
-        self._stages = np.array(stages).T
-        return np.array(columns).T.reshape(values.shape)
+        filtered = np.array(values, np.float64)
+        low_pass(filtered, np.full(len(filtered), self._share), self._stages)
+        return filtered
 
 
 def filtered_spread(values: FloatArray, cutoff_hz: float) -> FloatArray:
@@ -108,25 +113,104 @@ def filtered_spread(values: FloatArray, cutoff_hz: float) -> FloatArray:
 
 
 class Emphasis:
-    """Emphasis of the expression of a mood: it grows with the loudness and varies slowly and randomly."""
+    """Emphasis of the expression of a mood: it grows with the loudness."""
 
-    def __init__(self, seed: list[int]) -> None:
-        self._generator = np.random.default_rng(seed)
-        self._loudness, self._random = LowPass(EMPHASIS_HZ, np.zeros(1)), LowPass(RANDOM_HZ, np.zeros(1))
-        # long enough for the response of the filter to end
-        impulse = np.zeros((round(20 * GESTURE_FPS / RANDOM_HZ), 1))
-        impulse[0] = np.sqrt(len(impulse))  # its spectrum is that of white noise of standard deviation 1
-        self._random_gain = float(1.0 / filtered_spread(impulse, RANDOM_HZ)[0])
+    def __init__(self) -> None:
+        self._loudness = LowPass(EMPHASIS_HZ, np.zeros(1))
 
     def copy(self) -> "Emphasis":
         """An emphasis that continues as this one, independently of it."""
-        return deepcopy(self)
+        new = copy(self)
+        new._loudness = self._loudness.copy()
+        return new
 
     def next(self, frames: FrameContext) -> FloatArray:
         """(n,) factors of a mood's expression at the next frames; 1 where the style is a recorded one."""
         loudness = np.clip((frames.intensity.astype(np.float64) - QUIET_DB) / (LOUD_DB - QUIET_DB), 0.0, 1.3)
         loudness = np.where(frames.is_listening, LISTENING_LOUDNESS, loudness)
         loud = self._loudness.filter(np.square(loudness)[:, None])[:, 0]
-        noise = self._random.filter(self._generator.normal(size=(len(frames.times), 1)))[:, 0]
-        emphasis = SILENT_EMPHASIS + LOUDNESS_EMPHASIS * loud + RANDOM_EMPHASIS * self._random_gain * noise
+        emphasis = SILENT_EMPHASIS + LOUDNESS_EMPHASIS * loud
         return np.where(frames.is_presented, np.clip(emphasis, *EMPHASIS_LIMITS), 1.0)
+
+
+class PhraseFollower:
+    """Values that are followed at the edges of phrases and nearly held within them; freely in silence.
+
+    Parameters
+    ----------
+    size
+        Number of values.
+    """
+
+    def __init__(self, size: int) -> None:
+        self._stages = np.zeros((2, size))
+
+    def copy(self) -> "PhraseFollower":
+        """A follower that continues as this one, independently of it."""
+        new = copy(self)
+        new._stages = self._stages.copy()
+        return new
+
+    def follow(self, values: FloatArray, frames: FrameContext) -> FloatArray:
+        """Followed values (n, k) of the next values (n, k)."""
+        followed = np.array(values, np.float64)
+        low_pass(followed, 1.0 - np.exp(-phrase_rates(frames.times, frames.plan) / GESTURE_FPS), self._stages)
+        return followed
+
+
+def phrase_rates(times: FloatArray, plan: SpeechPlan) -> FloatArray:
+    """(n,) rates in 1/s at which values that change between phrases are followed at times (n,)."""
+    is_spoken = np.zeros(len(times), bool)
+    for sentence in plan.sentences:
+        is_spoken |= (times >= sentence.span.start) & (times < sentence.span.end)
+    away = np.subtract.outer(times, np.array(plan.edges))
+    nearness = np.exp(-0.5 * np.square(away / EDGE_S)).max(axis=1, initial=0.0)
+    rest = np.where(is_spoken, HELD_RATE, IDLE_RATE)
+    return np.asarray(rest + (MOVING_RATE - rest) * nearness)
+
+
+class PhrasePresentation:
+    """Expression, brows or cheeks of derived styles: the slow part of the sampled motion changes between phrases.
+
+    Parameters
+    ----------
+    feature
+        One of `PHRASE_FACTORS`.
+    middle : (k,)
+        Median of the recordings.
+    raising
+        Movements of sentences and words, and the values (2, k) of a mm of the left and of the right brow; None: none.
+    """
+
+    def __init__(
+        self, feature: str, middle: Float32Array, raising: tuple[PhraseMotion, FloatArray] | None = None
+    ) -> None:
+        self._factor, self._limit = PHRASE_FACTORS[feature], PHRASE_LIMITS[feature]
+        self._middle, self._raising = middle.astype(np.float64), raising
+        self._slow = LowPass(PHRASE_HZ, np.zeros(len(middle)))
+        self._follower = PhraseFollower(len(middle))
+
+    def copy(self) -> "PhrasePresentation":
+        """A presentation that continues as this one, independently of it."""
+        new = copy(self)
+        new._slow, new._follower = self._slow.copy(), self._follower.copy()
+        new._raising = None if self._raising is None else (self._raising[0].copy(), self._raising[1])
+        return new
+
+    def apply(self, values: Float32Array, frames: FrameContext) -> Float32Array:
+        """Values (n, k) with slow changes between phrases, and brows that follow sentences and words."""
+        slow = self._slow.filter(values.astype(np.float64) - self._middle)
+        added = self._follower.follow(self._limit * np.tanh(self._factor * slow / self._limit), frames)
+        if self._raising is not None:
+            motion, lifts = self._raising
+            motion.add(frames.plan, float(frames.times[0]))
+            added += motion.at(frames.times)[:, 3:] @ lifts
+        return np.asarray(values + frames.is_presented[:, None] * added, np.float32)
+
+
+def brow_lifts(region: FaceRegion, neutral: Float32Array) -> FloatArray:
+    """(2, k) values of the modes of the brows that lift the left, and the right one, by a mm and leave the other."""
+    is_left = neutral[region.landmarks, 0] > 0
+    shares = np.stack([side / max(int(side.sum()), 1) for side in (is_left, ~is_left)])
+    heights = shares @ region.modes[:, :, 1].T.astype(np.float64)
+    return np.asarray(np.linalg.pinv(heights).T, np.float64)

@@ -1,5 +1,7 @@
 """Prosodic features of speech: intensity and pitch relative to the speaker's own level and median."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,27 +19,36 @@ LEVEL_STEP_S = 0.02  # between the instants from which the level of speech is ta
 MIN_PITCH_SOUND_S = 0.1  # shorter sounds have no pitch
 
 
-def speech_intensity(sound: Waveform) -> IntensityTrack | None:
-    """Intensity of a sound for `prosody_features` and `find_accents`; None for a sound too short to have a pitch."""
-    return intensity_track(sound) if sound.duration >= MIN_PITCH_SOUND_S else None
+@dataclass(frozen=True, slots=True, eq=False)
+class SpeechIntensity:
+    """Intensity of a sound, and the mean level of speech in it in dB; None where it contains none."""
+
+    track: IntensityTrack
+    level: float | None
+
+
+def speech_intensity(sound: Waveform) -> SpeechIntensity | None:
+    """Intensity of a sound for `prosody_features`; None for a sound too short to have a pitch."""
+    if sound.duration < MIN_PITCH_SOUND_S:
+        return None
+    track = intensity_track(sound)
+    levels = track.at(np.arange(0.0, sound.duration, LEVEL_STEP_S))
+    is_audible = levels.max() >= AUDIBLE_DB
+    return SpeechIntensity(track, speech_level(levels[:, None], LEVEL_STEP_S) if is_audible else None)
 
 
 def prosody_features(
-    sound: Waveform, times: NDArray[np.float64], track: IntensityTrack | None, *, with_pitch: bool
+    sound: Waveform, times: NDArray[np.float64], intensity: SpeechIntensity | None, *, with_pitch: bool
 ) -> Float32Array:
     """(T, 1 or 2) intensity in dB relative to the mean level of speech, and pitch in semitones relative to the median.
 
-    Times (T,) are in seconds; those outside the sound count as silence. `track` is its `speech_intensity`.
+    Times (T,) are in seconds; those outside the sound count as silence. `intensity` is its `speech_intensity`.
     """
     features = np.tile(SILENT_PROSODY[: 2 if with_pitch else 1], (len(times), 1))
-    if track is None:
+    if intensity is None or intensity.level is None:
         return features
-    levels = track.at(np.arange(0.0, sound.duration, LEVEL_STEP_S))
     inside = (times >= 0.0) & (times < sound.duration)
-    if levels.max() < AUDIBLE_DB:
-        return features
-    level = speech_level(levels[:, None], LEVEL_STEP_S)
-    features[inside, 0] = np.clip(track.at(times[inside]) - level, QUIET_DB, PROSODY_LOUD_DB)
+    features[inside, 0] = np.clip(intensity.track.at(times[inside]) - intensity.level, QUIET_DB, PROSODY_LOUD_DB)
     if with_pitch:
         features[inside, 1] = np.clip(pitch(sound, times[inside]), -HIGH_SEMITONES, HIGH_SEMITONES)
     return features

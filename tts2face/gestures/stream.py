@@ -15,7 +15,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.gestures.blinks import BlinkPresentation, blink_profiles, lids_without_blinks
+from tts2face.gestures.blinks import BlinkPresentation, blink_profiles, lids_without_blinks, open_at_end
 from tts2face.gestures.field import (
     Field,
     FieldOptions,
@@ -26,14 +26,22 @@ from tts2face.gestures.field import (
     transfer_state,
 )
 from tts2face.gestures.gaze import GazeProcess, HeadFollower
-from tts2face.gestures.head_presentation import HeadPresentation, find_accents, slow_scales
-from tts2face.gestures.presentation import Emphasis, FrameContext, Presentation
-from tts2face.gestures.prosody import prosody_features, speech_intensity
+from tts2face.gestures.head_presentation import HeadPresentation, slow_scales
+from tts2face.gestures.phrase_motion import PhraseMotion
+from tts2face.gestures.presentation import (
+    PHRASE_FACTORS,
+    Emphasis,
+    FrameContext,
+    PhrasePresentation,
+    Presentation,
+    brow_lifts,
+)
+from tts2face.gestures.prosody import SpeechIntensity, prosody_features, speech_intensity
+from tts2face.gestures.speech_plan import NO_PLAN, SpeechPlan
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.gaze import load_gaze
 from tts2face.models.palette import FEATURES, GESTURE_FPS, FeatureChange, Palette, Style
 from tts2face.numeric.arrays import Float32Array, interpolate_cubic
-from tts2face.sound.praat import IntensityTrack
 from tts2face.types import Waveform
 
 N_LOOKAHEAD_FRAMES = 2  # frames after a time that cubic interpolation needs
@@ -123,6 +131,7 @@ class GestureFields:
         if not self.has_presentation:
             return None
         style, key = self.palette.styles[source], [seed, crc32(f"presented {feature}".encode())]
+        motion = PhraseMotion([seed, crc32(b"phrases")])
         if feature == "blink":
             if source not in self._profiles:
                 self._profiles[source] = blink_profiles(style)
@@ -130,7 +139,10 @@ class GestureFields:
         if feature == "head":
             if source not in self._scales:
                 self._scales[source] = slow_scales(style)
-            return HeadPresentation(self.middle(source, feature), self._scales[source], key)
+            return HeadPresentation(self.middle(source, feature), self._scales[source], motion)
+        if feature in PHRASE_FACTORS:
+            lifts = brow_lifts(self.palette.regions["brows"], self.palette.neutral) if feature == "brows" else None
+            return PhrasePresentation(feature, self.middle(source, feature), None if lifts is None else (motion, lifts))
         return None
 
     def gaze_process(self, feature: str, seed: int) -> GazeProcess | None:
@@ -209,7 +221,7 @@ class GestureStream:
         new._tracks = {name: track.copy() for name, track in self._tracks.items()}
         return new
 
-    def next(self, sound: Waveform, n_frames: int, timeline: Timeline) -> GestureValues:
+    def next(self, sound: Waveform, n_frames: int, timeline: Timeline, plan: SpeechPlan = NO_PLAN) -> GestureValues:
         """Values (n_frames, k) of each feature for the next frames.
 
         Parameters
@@ -218,14 +230,19 @@ class GestureStream:
             Sound of these frames.
         timeline
             Styles, expressions, nods and gains, in seconds of the whole clip; all of them are applied.
+        plan
+            What is said in these frames, in seconds of them.
         """
         start = self._n_frames / self._fps
         times = (self._n_frames + np.arange(n_frames)) / self._fps
         self._n_frames += n_frames
-        values, prosody = {}, _SoundFeatures(sound, start, with_pitch=self._fields.with_pitch)
+        values, prosody = {}, _SoundFeatures(sound, start, plan, with_pitch=self._fields.with_pitch)
+        said = plan.shift(start)
         for name, track in self._tracks.items():
-            track.extend(prosody, float(times[-1]), timeline)
+            track.extend(prosody, float(times[-1]), timeline, said)
             values[name] = self._fields.apply_timeline(name, track.at(times, timeline), times, timeline)
+        if plan.is_last and "blink" in values and self._fields.has_presentation:
+            values["blink"] = open_at_end(values["blink"], times, float(times[-1]))
         if "gaze" in values and "head" in values:
             turned = self._follower.next(values["gaze"], self._fps) * timeline.strength("head", times)[:, None]
             shares = timeline.style_shares("head", times, default=self._style)
@@ -237,20 +254,15 @@ class GestureStream:
 class _SoundFeatures:
     """Prosodic features of a sound that starts at `begin` seconds, cached by the times of the request."""
 
-    def __init__(self, sound: Waveform, start: float, *, with_pitch: bool) -> None:
-        self._sound = sound
+    def __init__(self, sound: Waveform, start: float, plan: SpeechPlan, *, with_pitch: bool) -> None:
+        self._sound, self._plan = sound, plan
         self._start = start
         self._with_pitch = with_pitch
         self._found: dict[bytes, Float32Array] = {}
 
     @cached_property
-    def _intensity(self) -> IntensityTrack | None:
-        return speech_intensity(self._sound)
-
-    @cached_property
-    def accents(self) -> NDArray[np.float64]:
-        """Seconds of the whole clip and strength of the accents (m, 2)."""
-        return np.add(find_accents(self._sound, self._intensity), [self._start, 0.0])
+    def _intensity(self) -> SpeechIntensity | None:
+        return speech_intensity(self._sound) if self._plan.sound is None else self._plan.sound.intensity
 
     def at(self, times: NDArray[np.float64]) -> Float32Array:
         """(T, 1 or 2) as `prosody_features`."""
@@ -276,7 +288,7 @@ class _FeatureTrack:
         self._values = np.zeros((0, len(fields.palette.channels(feature))), np.float32)
         self._presentation = fields.presentation(self._source[0], feature, seed)
         self._gaze = fields.gaze_process(feature, seed)
-        self._emphasis = Emphasis([seed, crc32(b"emphasis")]) if feature == "expression" else None
+        self._emphasis = Emphasis() if feature == "expression" else None
         self._emphases = np.zeros(0)
 
     def copy(self) -> "_FeatureTrack":
@@ -288,7 +300,7 @@ class _FeatureTrack:
         new._gaze = None if self._gaze is None else self._gaze.copy()
         return new
 
-    def extend(self, sound: "_SoundFeatures", end: float, timeline: Timeline) -> None:
+    def extend(self, sound: "_SoundFeatures", end: float, timeline: Timeline, plan: SpeechPlan) -> None:
         """Generate frames up to `N_LOOKAHEAD_FRAMES` after `end` seconds."""
         first, style_of = len(self._times), timeline.style_finder(self._feature, default=self._style)
         while len(self._times) <= N_LOOKAHEAD_FRAMES or self._times[-1 - N_LOOKAHEAD_FRAMES] <= end:
@@ -304,7 +316,8 @@ class _FeatureTrack:
         borders = [0, *(i for i in range(1, len(new)) if sources[i] != sources[i - 1]), len(new)]
         parts = [self._sample(sources[low], prosody[low:high], chances[low:high]) for low, high in pairwise(borders)]
         values, is_presented = np.concatenate(parts), np.array([self._fields.presents(style) for style in styles])
-        frames = FrameContext(new, prosody[:, 0], sound.accents, is_presented, timeline.is_listening(new))
+        last = end if plan.is_last else np.inf
+        frames = FrameContext(new, prosody[:, 0], plan, is_presented, timeline.is_listening(new), last)
         if self._presentation is not None:
             values = self._presentation.apply(values, frames)
         if self._gaze is not None:

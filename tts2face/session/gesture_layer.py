@@ -21,6 +21,7 @@ from tts2face.gestures.gaze import microsaccades
 from tts2face.gestures.kinds import KINDS
 from tts2face.gestures.listening import with_responses
 from tts2face.gestures.noise import NoiseStream
+from tts2face.gestures.speech_plan import NO_PLAN, SpeechPlan, plan_speech
 from tts2face.gestures.stream import GestureFields, GestureStream, GestureValues
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import Palette
@@ -111,7 +112,7 @@ class GestureLayer:
         self.edits = ChannelEdits(self._requested.edits, face)
         self._body = Body(face.channels, request.known_seed)
         self._seed, self._options = request.known_seed, [getattr(request, name) for name in KEYED]
-        self._has_microsaccades = method.has_microsaccades
+        self._language, self._has_microsaccades = request.language, method.has_microsaccades
         self._thread = ThreadPoolExecutor(1, "gestures")
         # Building the fields takes 0.5 s, in parallel with loading the voice.
         self._first: Future[GestureStream | NoiseStream] = self._thread.submit(
@@ -157,15 +158,16 @@ class GestureLayer:
         times = self._now.seconds + piece.clip.motion.times
         timeline = self._requested.merge(self._marked(piece))
         timeline = with_responses(timeline, float(times[0]), float(times[-1]), self._seed)
-        history = self.key(times, sound, timeline) if self._memory.is_used else self._now.history
+        plan = plan_speech(replace(piece.speech, waveform=sound), piece.script, self._language, is_last=piece.is_last)
+        history = self.key(times, sound, timeline, plan) if self._memory.is_used else self._now.history
         drawn = self._memory.recall(
             lambda: history,
-            lambda: self._draw(sound, times, timeline),
+            lambda: self._draw(sound, times, timeline, plan),
             lambda made: STATE_BYTES + sum(values.nbytes for values in made[0].values()),
         )
         return history, timeline, drawn
 
-    def key(self, times: NDArray[np.float64], sound: Waveform, timeline: Timeline) -> bytes:
+    def key(self, times: NDArray[np.float64], sound: Waveform, timeline: Timeline, plan: SpeechPlan = NO_PLAN) -> bytes:
         """Digest of everything on which the gestures of a piece, after those before it, depend."""
         here = replace(timeline.restrict(times[0] - REACH_S, times[-1] + REACH_S), edits=())  # a later step
         elements = [
@@ -174,16 +176,16 @@ class GestureLayer:
             for part in getattr(here, name)
         ]
         maps = (dict(here.style), dict(here.gains.factors), sorted(here.seeds.items()))
-        found = blake2b(repr((self._now.history, self._options, elements, maps)).encode())
+        found = blake2b(repr((self._now.history, self._options, elements, maps, plan)).encode())
         found.update(times.tobytes())
         found.update(sound.samples.tobytes())
         return found.digest()
 
-    def _draw(self, sound: Waveform, times: NDArray[np.float64], timeline: Timeline) -> Drawn:
+    def _draw(self, sound: Waveform, times: NDArray[np.float64], timeline: Timeline, plan: SpeechPlan) -> Drawn:
         """Gestures of a piece, and the stream for the piece after it."""
         # a stream is used up by drawing; the copy keeps the state before the piece
         stream = (self._now.stream or self._first.result()).copy()
-        gestures = _gaze_relative_to_head(stream.next(sound, len(times), timeline))
+        gestures = _gaze_relative_to_head(stream.next(sound, len(times), timeline, plan))
         if "gaze" in gestures and self._has_microsaccades:
             seed = self._requested.seeds.get("gaze", self._seed)
             gestures = {**gestures, "gaze": gestures["gaze"] + microsaccades(times, seed).astype(np.float32)}

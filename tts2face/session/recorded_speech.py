@@ -1,8 +1,12 @@
 """First step of a recording: its phones and words are found, and its sound becomes pieces with the face at rest."""
 
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import replace
+from itertools import islice
 
+from lexicon.given_phones import TextWord
+from lexicon.normalize import spoken_form
+from lexicon.sequence import WordSpan
 from tts2face.models.talker import Talker
 from tts2face.request import FromSound, Recorded
 from tts2face.session.corrections import RECORDING
@@ -17,6 +21,7 @@ from tts2face.session.recording import (
 )
 from tts2face.session.speech import resolve_recording_marks
 from tts2face.session.speech_stream import Piece
+from tts2face.sound.retuned import matched_words
 from tts2face.storage.memory import ResultMemory
 from tts2face.types import Progress, frame_count
 
@@ -59,6 +64,7 @@ def recorded_pieces(prepared: PreparedRequest, source: Recorded, heard: TimedTra
         prepared.timeline.check_duration(n_frames / fps)
     timeline, marks = resolve_recording_marks(prepared.text, heard.phones, heard.words, prepared.request.language)
     before = 0
+    script = _script(spoken_form(prepared.text.text, prepared.request.language).split(), heard.words)
     for clip in recording_clips(source.audio, heard, n_frames, prepared.fps, volume=source.volume):
         after = before + len(clip.motion)
         start, end = before / fps, after / fps
@@ -71,5 +77,14 @@ def recorded_pieces(prepared: PreparedRequest, source: Recorded, heard: TimedTra
             tuple(mark for mark in marks if start <= mark.seconds < end),
             mismatches=tuple(mismatch for mismatch in heard.mismatches if start <= mismatch.begin < end),
             transcript=heard.phones if before == 0 else None,
+            script=tuple(islice(script, len(clip.speech.words))),
+            is_last=after == n_frames,
         )
         before = after
+
+
+def _script(written: Sequence[str], words: Sequence[WordSpan]) -> Iterator[TextWord]:
+    """The written word, with its punctuation, of each word of a recording."""
+    places = matched_words(written, [word.text for word in words])
+    for word, place in zip(words, places, strict=True):
+        yield TextWord(word.text if place is None else written[place])

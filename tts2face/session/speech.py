@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lexicon.errors import InputError, SilentTextError
+from lexicon.given_phones import TextWord
 from lexicon.marked_text import MAX_PAUSE_S, Mark, MarkedText, NameMark, NodMark, StyleRun
 from lexicon.pauses import PAUSES_S, last_mark
 from lexicon.sentence_length import n_letters
@@ -91,6 +92,7 @@ class SpokenPart(NamedTuple):
     n_steps: int
     text: str = ""
     is_last: bool = False  # of a clip, as far as is known before it is spoken
+    script: tuple[TextWord, ...] = ()  # its words, with punctuation
 
 
 class Shortened(NamedTuple):

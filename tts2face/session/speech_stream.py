@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lexicon.errors import InputError, SilentTextError
+from lexicon.given_phones import TextWord
 from lexicon.marked_text import NameMark
 from lexicon.sentence_length import n_letters
 from lexicon.sentences import Sentence, text_prefix
@@ -93,6 +94,10 @@ class Piece:
         Phones of the whole recording, with its first piece; None for all other pieces.
     voice_sound
         Sound as the voice returns it, which gestures follow; None where it is that of the clip.
+    script
+        Words that are said, with their punctuation; empty where they are not known.
+    is_last
+        Whether the clip ends with it, as far as is known.
     drawn
         Gestures that a thread draws (`tts2face.session.gesture_layer`), until they are added.
     """
@@ -108,6 +113,8 @@ class Piece:
     sentence: PhoneSequence | None = None
     transcript: PhoneSequence | None = None
     voice_sound: Waveform | None = None
+    script: tuple[TextWord, ...] = ()
+    is_last: bool = False
     drawn: "Future[Any] | None" = None
 
     @property
@@ -192,19 +199,22 @@ def spoken_pieces(
     """
     frames = WholeFrames(first_frame, prepared.fps, ends_on_frame=ends_on_frame)
     for framed, part in _framed(prepared, models, frames, has_phones=has_phones):
-        yield _piece(framed, prepared.fps) if part is None else _piece(framed, prepared.fps, part.n_steps, part.text)
+        piece = _piece(framed, prepared.fps, part)
+        yield replace(piece, is_last=False) if ends_on_frame else piece
 
 
-def _piece(part: FramedPart, fps: Fraction, n_steps: int = 0, text: str = "") -> Piece:
+def _piece(part: FramedPart, fps: Fraction, said: SpokenPart | None) -> Piece:
     spoken = part.spoken
     start, speech = float(part.first / fps), spoken.speech
     return Piece(
         Clip.at_rest(part.n_frames, float(fps), replace(speech, waveform=spoken.sound)),
         start,
-        n_steps,
+        0 if said is None else said.n_steps,
         spoken.timeline.restrict(0.0, speech.waveform.duration).shift(start),
         tuple(replace(mark, seconds=mark.seconds + start) for mark in spoken.marks),
-        text=text,
+        text="" if said is None else said.text,
+        script=() if said is None else said.script,
+        is_last=said is None or said.is_last,
         sentence=part.phones,
         voice_sound=speech.waveform,
     )
@@ -303,7 +313,8 @@ def speak_sentences(
         said[text] += 1
         before = long_silence(before_s, Timeline(), voice.sample_rate)
         after = long_silence(after_s, spoken.timeline, voice.sample_rate)
-        yield from _ending(chain(before, [SpokenPart(spoken, sentence.n_characters, text)], after), is_last=is_last)
+        part = SpokenPart(spoken, sentence.n_characters, text, script=sentence.words)
+        yield from _ending(chain(before, [part], after), is_last=is_last)
 
 
 def _expected(voice: Voice, sentence: Sentence) -> Shortened:

@@ -59,7 +59,7 @@ def is_retuned(prosody: Prosody, intended: Intention) -> bool:
 
 def retuned(speech: Speech, prosody: Prosody, intended: Intention) -> Speech:
     """Speech with a prosody, tones and movements; edges move with the sound."""
-    places = _matched(intended.words, [word.text for word in speech.words])
+    places = matched_words(intended.words, [word.text for word in speech.words])
     words = [_placed(speech, span, intended, place) for span, place in zip(speech.words, places, strict=True)]
     spans = {place: at for at, place in enumerate(places) if place is not None}
     moves = [
@@ -95,7 +95,7 @@ def _shaped(times: FloatArray, hertz: FloatArray, tune: Tune, phones: PhoneSeque
     return changed
 
 
-def _matched(known: Sequence[str], spoken: Sequence[str]) -> list[int | None]:
+def matched_words(known: Sequence[str], spoken: Sequence[str]) -> list[int | None]:
     """Index of the known word that each spoken one is, or is a part of; None where there is none."""
     if len(known) == len(spoken):
         return list(range(len(spoken)))

@@ -17,6 +17,7 @@ from corpus_tools.training.gaze_recordings import (
 )
 from tts2face.gestures.gaze import GazeProcess
 from tts2face.gestures.presentation import FrameContext
+from tts2face.gestures.speech_plan import NO_PLAN
 from tts2face.models.gaze import LISTENING, STATES, GazeModel, load_gaze
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.numeric.arrays import FloatArray
@@ -117,7 +118,7 @@ def made_person(model: GazeModel, state: str, seed: int) -> Fixations:
     process = GazeProcess.of_person(model, [seed])
     times = np.arange(MINUTES * 60 * GESTURE_FPS) / GESTURE_FPS
     listens, level = np.full(len(times), state == LISTENING), np.zeros(len(times), np.float32)
-    process.extend(FrameContext(times, level, np.zeros((0, 2)), np.ones(len(times), bool), listens))
+    process.extend(FrameContext(times, level, NO_PLAN, np.ones(len(times), bool), listens))
     return made_fixations(process.fixations[1:], float(times[-1]))
 
 
