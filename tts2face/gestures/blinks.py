@@ -192,7 +192,8 @@ class BlinkPresentation:
         """Begin a blink, unless the clip ends before it does."""
         profile = self._profiles[int(chances[0] * len(self._profiles))]
         if time + (len(profile) + 1) / GESTURE_FPS < end:
-            self._due, self._waited, self._edge = _interval(chances[1]), 0.0, None
+            self._due, self._waited = _interval(chances[1]), 0.0
+            self._edge = None
             self._profile, self._frame = profile, 0
 
 

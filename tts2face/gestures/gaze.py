@@ -27,7 +27,8 @@ LIMITS_DEG = np.array([[-18.0, 22.0], [-32.0, 32.0]])  # down and left; farther,
 DIRECTION_SPREAD_DEG = 20.0  # of looks about the side, up and down
 # In speech people look away as a phrase begins and back as it ends, and at the end of what they say (Kendon 1967):
 # looks at the face end at the beginning of a phrase, looks away at the end of one, a little before or after their time.
-NEAR_S, EARLY_S, PATIENCE_S = 0.1, 0.6, 0.6
+NEAR_S = 0.1  # of an edge
+EARLY_S, PATIENCE_S = 0.6, 0.6
 LAST_S, BACK_S = 1.0, 0.4  # before the end of a sentence, in which no look away begins, and from which on none lasts
 N_TRIES = 8  # for a place that differs visibly from the one before
 # At the beginning of a turn people look away: seven in ten long utterances (Kendon 1967, Acta Psychologica 26; the same
@@ -74,22 +75,9 @@ class _Rest:
 class _Place(NamedTuple):
     """Whether a phrase begins or ends about a frame, and seconds to the end of the sentence; infinite in silence."""
 
-    begins: bool
-    ends: bool
+    is_start: bool
+    is_end: bool
     left_s: float
-
-
-def _places(frames: FrameContext) -> Iterator[_Place]:
-    """The place in speech of each frame."""
-    times, left = frames.times, np.full(len(frames.times), np.inf)
-    begins, ends = np.zeros(len(times), bool), np.zeros(len(times), bool)
-    for sentence in frames.plan.sentences:
-        inside = (times >= sentence.span.start - NEAR_S) & (times < sentence.span.end)
-        left[inside] = sentence.span.end - times[inside]
-        for phrase in sentence.phrases:
-            begins |= np.abs(times - phrase.start) < NEAR_S
-            ends |= np.abs(times - phrase.end) < NEAR_S
-    return map(_Place, begins.tolist(), ends.tolist(), left.tolist())
 
 
 class GazeProcess:
@@ -144,8 +132,8 @@ class GazeProcess:
         if place.left_s == math.inf or self._state == LISTENING:
             return left <= 0.0
         if self._fixations[-1].is_on_face:
-            return place.begins and left <= EARLY_S and place.left_s > LAST_S
-        return place.left_s < BACK_S or left <= -PATIENCE_S or (place.ends and left <= EARLY_S / 2)
+            return place.is_start and left <= EARLY_S and place.left_s > LAST_S
+        return place.left_s < BACK_S or left <= -PATIENCE_S or (place.is_end and left <= EARLY_S / 2)
 
     def at(self, times: FloatArray) -> Float32Array:
         """Gaze (T, 2) in radians down and left at increasing times (T,); earlier fixations are forgotten."""
@@ -282,3 +270,16 @@ def microsaccades(times: FloatArray, seed: int) -> FloatArray:
             later = times >= start
             found[later] = place * np.exp(-(times[later, None] - start) / DRIFT_S)
     return found
+
+
+def _places(frames: FrameContext) -> Iterator[_Place]:
+    """The place in speech of each frame."""
+    times, left = frames.times, np.full(len(frames.times), np.inf)
+    at_start, at_end = np.zeros(len(times), bool), np.zeros(len(times), bool)
+    for sentence in frames.plan.sentences:
+        inside = (times >= sentence.span.start - NEAR_S) & (times < sentence.span.end)
+        left[inside] = sentence.span.end - times[inside]
+        for phrase in sentence.phrases:
+            at_start |= np.abs(times - phrase.start) < NEAR_S
+            at_end |= np.abs(times - phrase.end) < NEAR_S
+    return map(_Place, at_start.tolist(), at_end.tolist(), left.tolist())

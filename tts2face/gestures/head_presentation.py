@@ -72,7 +72,8 @@ class HeadPresentation:
     """
 
     def __init__(self, middle: Float32Array, scales: FloatArray, motion: PhraseMotion) -> None:
-        self._middle, self._scales, self._motion = middle.astype(np.float64), scales, motion
+        self._middle, self._scales = middle.astype(np.float64), scales
+        self._motion = motion
         self._slow, self._lasting = (LowPass(cutoff, np.zeros(len(scales))) for cutoff in (SLOW_HZ, RETURN_HZ))
         self._limits = np.array([LARGEST_RATIO * TARGET_SPREAD.get(channel, 1e9) for channel in HEAD_CHANNELS])
         self._presented, self._still = Glide(ONSET_S), Glide(STILL_S)

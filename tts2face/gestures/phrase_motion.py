@@ -15,34 +15,43 @@ from tts2face.numeric.arrays import FloatArray, smoothstep
 
 # Course of a sentence: share of it, degrees of pitch, mm of the brows. 104 sentences of 4 to 7 s of free English.
 COURSE = ((0.10, -1.0, 0.45), (0.25, -2.2, 0.8), (0.50, -0.9, 0.7), (0.75, 0.5, 0.35))
-FALL_S, FALL, END = 0.30, (3.4, -1.1), (2.6, -0.9)  # on its last accent, from so long before, and to its end
+FALL_S = 0.30  # before its last accent, from which on it falls
+FALL, END = (3.4, -1.1), (2.6, -0.9)  # there, and at its end
 BEFORE_S = 0.30  # the rise begins so long before the first phone
 HOLD_S, RETURN_S = 0.25, 0.9  # behind the end, before and in which the head comes back
 ROUND_S = 0.10  # by which movements begin earlier and end later, so that they join smoothly
 USUAL_S, LENGTH_LIMITS = 4.5, (0.45, 1.15)  # sentences of this length have all of it; shorter ones less
 # Of that speaker's pitch and brows, and spread of their logarithm between sentences. Means over sentences lose a third.
-COURSE_SHARE, BROW_COURSE_SHARE, COURSE_SPREAD = 0.95, 1.3, 0.3
+COURSE_SHARE, BROW_COURSE_SHARE = 0.95, 1.3
+COURSE_SPREAD = 0.3
 COMMA_SHARE = 0.35  # of the course, between phrases
 COMMA = ((-0.12, 2.2, -0.7, 0.15), (0.48, -2.0, 0.7, 0.26))  # seconds from the end of a phrase, degrees, mm, width in s
 # An accent of prominence 1: degrees up, spread of the logarithm, share of those that go down, seconds behind the
 # middle of the vowel, width, and the movement back.
-ACCENT_DEG, ACCENT_SPREAD, DOWN_SHARE = 1.6, 0.5, 0.15
+ACCENT_DEG, ACCENT_SPREAD = 1.6, 0.5
+DOWN_SHARE = 0.15
 ACCENT_DELAY_S, ACCENT_WIDTH_S = 0.06, 0.10
 REBOUND, REBOUND_S = 0.5, 0.42
 ASIDE = (0.3, 0.2)  # spread of its yaw and roll, relative to its size
-BROW_MM, BROW_SHARE, BROW_SPREAD = 0.9, 0.2, 0.35  # of a rise of the brows, and of content words that have one
-BROW_DELAY_S, BROW_WIDTH_S, BROW_GAP_S = 0.03, 0.14, 0.5
-BROW_TAIL, BROW_TAIL_S, BROW_TAIL_WIDTH_S = 0.35, 0.25, 0.16  # that stays up a little longer
+BROW_MM, BROW_SPREAD = 0.9, 0.35  # of a rise of the brows
+BROW_SHARE = 0.2  # of content words have one
+BROW_DELAY_S, BROW_WIDTH_S = 0.03, 0.14
+BROW_GAP_S = 0.5
+BROW_TAIL = 0.35  # of it stays up a little longer
+BROW_TAIL_S, BROW_TAIL_WIDTH_S = 0.25, 0.16
 SIDE_SPREAD = 0.16  # of left against right, which people's brows have
 EMPHASIS_DEG, EMPHASIS_MM = 2.6, 1.3  # chin down and brows up on an emphasised word
 # A question: brows up and the head a little aside from its stressed word on, and the chin falls less at its end.
-QUESTION_MM, QUESTION_TILT_DEG, QUESTION_FALL = 1.7, 2.6, 0.25
+QUESTION_MM, QUESTION_TILT_DEG = 1.7, 2.6
+QUESTION_FALL = 0.25
 OPEN_QUESTION = 0.6  # share where the tune falls: who, when, why
 ASK_S, ASKED_S = 0.3, 0.6  # in which that begins and ends
 # A list is counted: the chin falls on each item, and the head turns from one side to the other.
-ITEM_DEG, ITEM_WIDTH_S, LIST_TURN_DEG = 2.0, 0.13, 3.0
+ITEM_DEG, LIST_TURN_DEG = 2.0, 3.0
+ITEM_WIDTH_S = 0.13
 # Contrasts: to one side, then to the other.
-SIDE_TURN_DEG, SIDE_TILT_DEG, SIDE_S = 3.6, 1.4, 0.3
+SIDE_TURN_DEG, SIDE_TILT_DEG = 3.6, 1.4
+SIDE_S = 0.3
 KEPT_S = 2.0  # after their end, movements are forgotten
 NOTHING = np.zeros(5)
 
@@ -113,21 +122,21 @@ class PhraseMotion:
             asked = share * np.array([-0.8, 0.0, side * QUESTION_TILT_DEG, QUESTION_MM, QUESTION_MM])
             self._hold(asked, (sentence.question.start, ASK_S), (sentence.question.end + 0.1, ASKED_S), start)
         self._add_list(sentence.items, side, sentence.span.end, start)
-        for one, other in sentence.sides:
+        for denied, said in sentence.sides:
             turn = side * np.array([0.0, SIDE_TURN_DEG, -SIDE_TILT_DEG, 0.0, 0.0])
-            self._hold(turn, (one.start, SIDE_S), (other.start - 0.1, SIDE_S), start)
-            self._hold(-turn, (other.start - 0.1, SIDE_S), (other.end + 0.2, 2 * SIDE_S), start)
+            self._hold(turn, (denied.start, SIDE_S), (said.start - 0.1, SIDE_S), start)
+            self._hold(-turn, (said.start - 0.1, SIDE_S), (said.end + 0.2, 2 * SIDE_S), start)
 
     def _add_course(self, sentence: SpokenSentence, start: float, chances: np.random.Generator) -> None:
-        begin, end = sentence.span.start, sentence.span.end
-        length = end - begin
+        onset, end = sentence.span.start, sentence.span.end
+        length = end - onset
         size = np.exp(COURSE_SPREAD * chances.normal()) * np.clip(length / USUAL_S, *LENGTH_LIMITS)
         sizes = size * np.array([COURSE_SHARE, 0.0, 0.0, BROW_COURSE_SHARE, BROW_COURSE_SHARE])
-        late = [accent.time for accent in sentence.accents if accent.time > begin + 0.6 * length]
-        fall = (late[-1] if late else begin + 0.93 * length) + ACCENT_DELAY_S
+        late = [accent.time for accent in sentence.accents if accent.time > onset + 0.6 * length]
+        fall = (late[-1] if late else onset + 0.93 * length) + ACCENT_DELAY_S
         depth = QUESTION_FALL if sentence.rises else 1.0
-        keys = [(begin + share * length, pitch, brows) for share, pitch, brows in COURSE]
-        keys = [(begin - BEFORE_S, 0.0, 0.0), *(key for key in keys if key[0] < fall - FALL_S)]
+        keys = [(onset + share * length, pitch, brows) for share, pitch, brows in COURSE]
+        keys = [(onset - BEFORE_S, 0.0, 0.0), *(key for key in keys if key[0] < fall - FALL_S)]
         keys += [(fall - FALL_S, *keys[-1][1:]), (fall, depth * FALL[0], depth * FALL[1])]
         keys += [(max(end, fall + 0.05), depth * END[0], depth * END[1])]
         keys += [(keys[-1][0] + HOLD_S, *keys[-1][1:]), (keys[-1][0] + HOLD_S + RETURN_S, 0.0, 0.0)]
@@ -172,14 +181,14 @@ class PhraseMotion:
             until = items[number + 1] - SIDE_S / 2 if number + 1 < len(items) else end + SIDE_S
             self._hold(turn, (time - SIDE_S / 2, SIDE_S), (until, SIDE_S if until < end else 2 * SIDE_S), start)
 
-    def _hold(self, pose: FloatArray, begin: tuple[float, float], end: tuple[float, float], start: float) -> None:
+    def _hold(self, pose: FloatArray, onset: tuple[float, float], end: tuple[float, float], start: float) -> None:
         """Take a pose at a second, within some seconds about it, and leave it likewise."""
-        self._step(begin[0] - begin[1] / 2, begin[0] + begin[1] / 2, pose, start)
+        self._step(onset[0] - onset[1] / 2, onset[0] + onset[1] / 2, pose, start)
         self._step(end[0] - end[1] / 2, end[0] + end[1] / 2, -pose, start)
 
-    def _step(self, begin: float, end: float, change: FloatArray, start: float) -> None:
-        begin = max(begin, start)
-        self._steps.append(_Step(begin, max(end, begin + 2 * ROUND_S), change))
+    def _step(self, onset: float, end: float, change: FloatArray, start: float) -> None:
+        onset = max(onset, start)
+        self._steps.append(_Step(onset, max(end, onset + 2 * ROUND_S), change))
 
     def _bell(self, time: float, width: float, size: FloatArray, start: float) -> None:
         # what would have begun before is later or smaller, so that nothing jumps

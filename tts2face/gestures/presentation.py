@@ -34,7 +34,8 @@ PHRASE_HZ = 0.5
 PHRASE_FACTORS = MappingProxyType({"expression": 3.0, "brows": 1.6, "cheeks": 1.6})
 PHRASE_LIMITS = MappingProxyType({"expression": 0.12, "brows": 2.0, "cheeks": 1.5})  # weights, and mm of each mode
 EDGE_S = 0.22  # about an edge, in which a change has its way
-HELD_RATE, MOVING_RATE, IDLE_RATE = 0.4, 8.0, 4.0  # 1/s: within phrases, at their edges, and in silence
+HELD_RATE, MOVING_RATE = 0.4, 8.0  # 1/s: within phrases, and at their edges
+IDLE_RATE = 4.0  # in silence
 
 
 @dataclass(frozen=True, slots=True, eq=False)

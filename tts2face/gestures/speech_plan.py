@@ -1,4 +1,4 @@
-"""What is said in a piece of a clip, for gestures: its sentences, phrases, accents, questions, lists and contrasts.
+"""Speech of a piece of a clip, for gestures: its sentences, phrases, accents, questions, lists and contrasts.
 
 Where words are known, they and their punctuation decide; in other sound its pauses, loudness and pitch do.
 """
@@ -31,8 +31,10 @@ CLAUSE_WORDS = frozenset({
 })  # fmt: skip
 # Common words that carry an accent like others.
 SPOKEN_OUT = frozenset({"hello", "hi", "yes", "no", "not", "never", "please", "thanks", "good", "why"})
-PEAK_GAP_S, PEAK_DB, PEAK_RANGE_DB = 0.35, -8.0, 6.0  # of accents that are found in sound
-MEAN_PROMINENCE, PROMINENCE_SPREAD, MOST_PROMINENT = 0.5, 0.6, 1.6  # of the vowels of a sentence, and the largest
+PEAK_GAP_S = 0.35  # of accents that are found in sound
+PEAK_DB, PEAK_RANGE_DB = -8.0, 6.0
+MEAN_PROMINENCE, PROMINENCE_SPREAD = 0.5, 0.6  # of the vowels of a sentence
+MOST_PROMINENT = 1.6
 LEAST_PROMINENCE, LEAST_GAP_S = 0.15, 0.25  # of an accent, and between two
 ASKED_S = 0.9  # before the end, in which a question whose tune does not rise is shown
 LEAD_S = 0.25  # before its stressed word, in which it is shown
@@ -96,13 +98,13 @@ class SpokenSentence:
             None if self.question is None else self.question.shift(seconds),
             self.rises,
             tuple(item + seconds for item in self.items),
-            tuple((one.shift(seconds), other.shift(seconds)) for one, other in self.sides),
+            tuple((denied.shift(seconds), said.shift(seconds)) for denied, said in self.sides),
         )
 
 
 @dataclass(frozen=True, slots=True)
 class SpeechPlan:
-    """What is said in a piece of a clip, in seconds of it; `is_last` where the clip ends with it.
+    """Speech of a piece of a clip, in seconds of it; `is_last` where the clip ends with it.
 
     `sound` is that from which it was made, in seconds of the piece.
     """
@@ -233,7 +235,7 @@ def _vowels(speech: Speech, word: WordSpan) -> list[tuple[float, float]]:
 
 @cache
 def content_finder(language: str) -> Callable[[str], bool]:
-    """Function that tells whether a word in small letters carries meaning of its own in a language."""
+    """Function that returns whether a word in small letters carries meaning of its own in a language."""
     common = common_words(language)
     if language.startswith("en"):
         common = common.union(WORDS["auxiliary"], WORDS["pronoun"], WORDS["preposition"], WORDS["unstressed"])
@@ -279,9 +281,9 @@ def _sentence(words: Sequence[_Word], places: range, tunes: Sequence[Movement]) 
 def _apart(accents: Sequence[Accent]) -> tuple[Accent, ...]:
     """Accents of which each is the most prominent within `LEAST_GAP_S`."""
     return tuple(
-        one
-        for one in accents
-        if all(abs(one.time - other.time) >= LEAST_GAP_S or one.prominence >= other.prominence for other in accents)
+        found
+        for found in accents
+        if all(abs(found.time - other.time) >= LEAST_GAP_S or found.prominence >= other.prominence for other in accents)
     )
 
 
@@ -302,7 +304,7 @@ def _phrases(words: Sequence[_Word]) -> Iterator[Span]:
 
 
 def _contrasts(words: Sequence[_Word]) -> Iterator[tuple[Span, Span]]:
-    """What is denied and what is said instead: not the red one, but the blue one."""
+    """Spans of a thing that is denied and of what is said instead: not the red one, but the blue one."""
     texts = [word.text for word in words]
     for at, text in enumerate(texts):
         if text != "not" and not text.endswith("n't"):

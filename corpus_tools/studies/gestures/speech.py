@@ -44,7 +44,8 @@ MONOLOGUE = (
     "is a great pity. I shall miss her very much, and the cat will miss her even more. Perhaps the new people will be "
     "just as kind as she has always been."
 )
-BAND_HZ, COURSE_HZ, BROW_HZ = (0.5, 5.0), (0.03, 1.5), (0.3, 5.0)
+BAND_HZ, BROW_HZ = (0.5, 5.0), (0.3, 5.0)
+COURSE_HZ = (0.03, 1.5)
 COURSE_AT = (0.0, 0.25, 0.9, 1.0)  # of a sentence
 SENTENCE_S = (2.5, 7.5)  # of those whose course is measured
 ACCENT_S = np.linspace(-0.04, 0.12, 9)  # about the middle of a vowel
