@@ -11,11 +11,11 @@ from tts2face.models.baked_light import BLACK_SHARE, N_PAGES, BakedLight
 from tts2face.models.face import Face
 from tts2face.models.light import Lit
 from tts2face.numeric.arrays import connected_pieces, decode_srgb
+from tts2face.picture.baked.closed_mouth import close_mouth, wall_colours
 from tts2face.picture.baked.response import LightTerms, light_terms
 from tts2face.picture.baked.visibility import MAX_TRIANGLES, N_COLUMNS, RED, U, V
 from tts2face.processes.shared import shared
 
-DARK = (17.0, 6.0, 5.5)  # colour of skin that is seen from behind, in the mouth
 OPAQUE, COVER_SHIFT = 255, 24  # cover of pages without any, and its bits in a texel
 TEXELS_A_PIXEL = 1.0  # beyond which the next smaller texels are read
 
@@ -70,17 +70,20 @@ def build_surface(face: Face, own: Lit) -> LitSurface:
     DataError
         The face has more triangles than a picture can tell apart.
     """
-    light, rig = own.baked.of_drawn(face.triangles), build_rig(face)
+    part_of = np.repeat(np.arange(len(face.parts), dtype=np.int32), [part.count for part in face.parts])
+    # a photograph has walls of its own, behind whose skin everything lies
+    whole = own.baked if own.is_flat else close_mouth(face, own.baked, part_of)
+    light, rig = whole.of_drawn(face.triangles), build_rig(face)
     if len(light.triangles) > MAX_TRIANGLES:
         raise DataError(f"a face with light may have {MAX_TRIANGLES} triangles, not {len(light.triangles)}")
     backs = light.triangles < 0
     numbers = light.triangle_numbers
     corners = face.triangles[numbers]
     corners[backs] = corners[backs][:, ::-1]
-    part_of = np.repeat(np.arange(len(face.parts), dtype=np.int32), [part.count for part in face.parts])[numbers]
+    part_of = part_of[numbers]
     pages = np.array([light.page_of.get(part.name, N_PAGES) for part in face.parts])
     n_vertices = len(face.vertices)
-    dark = backs & (pages[part_of] == 0) & light.is_inside
+    dark = (pages[part_of] == 0) & light.is_inside
     keys = corners + np.where(dark, n_vertices, 0)[:, None]  # a vertex of the dark is another row
     lit = np.concatenate([light.rows, light.mouth_rows, light.ball_rows])
     others = np.setdiff1d(keys, lit)
@@ -93,7 +96,7 @@ def build_surface(face: Face, own: Lit) -> LitSurface:
     uv = np.zeros((n_vertices, 2)) if face.uv is None else face.uv
     template = np.zeros((len(order), N_COLUMNS), np.float32)
     template[:, U : V + 1] = page_places(uv[source].astype(np.float64), page_of[order], light.turn_side)
-    template[order >= n_vertices, RED:] = DARK
+    template[order >= n_vertices, RED:] = wall_colours(face)[source[order >= n_vertices]]
     eye_of = np.full(len(corners), -1, np.int32)
     for number, eye in enumerate(face.eyes):
         eye_of[((corners >= eye.first) & (corners < eye.first + eye.count)).all(axis=1)] = number
