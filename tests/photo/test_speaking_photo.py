@@ -20,7 +20,7 @@ from tts2face.models.landmarks import inner_lip_gaps, lip_opening
 from tts2face.models.light import Photographed
 from tts2face.photo.found_face import FoundFace
 from tts2face.photo.photograph import Photograph, split_number
-from tts2face.photo.surface import EYES, LIDS, SKIN
+from tts2face.photo.surface import EYES, LASHES, LID_OVER_EYE, LIDS, SKIN
 from tts2face.picture.baked.scene import BEHIND_SHARE
 from tts2face.picture.baked.visibility import NEAR, TRIANGLE_MASK, nearest_triangles, project
 from tts2face.picture.options import Picture
@@ -103,9 +103,11 @@ def test_shapes_move_the_skin_without_folds(face: Face) -> None:
 
 def test_lids_cover_the_eyes(renderer: MeshRenderer) -> None:
     open_eyes, shut = samples_of_parts(renderer), samples_of_parts(renderer, **BLINK)
-    assert LIDS not in open_eyes
-    assert shut.get(EYES, 0) < 0.05 * open_eyes[EYES]
-    assert shut[LIDS] > 0.2 * open_eyes[EYES]
+    assert not {LASHES, LID_OVER_EYE} & set(open_eyes)
+    assert open_eyes.get(LIDS, 0) < 0.01 * open_eyes[EYES]  # in the corners of the eyes
+    assert shut.get(EYES, 0) < 0.01 * open_eyes[EYES]
+    assert shut[LID_OVER_EYE] > 0.2 * open_eyes[EYES]
+    assert min(shut[LIDS], shut[LASHES]) > 0.1 * open_eyes[EYES]
     half = samples_of_parts(renderer, eyeBlinkLeft=0.5, eyeBlinkRight=0.5)
     assert 0.3 < half[EYES] / open_eyes[EYES] < 0.7
 
@@ -272,7 +274,7 @@ def test_the_stage_shows_it_as_the_picture_does(face: Face) -> None:
         apart, _ = cKDTree(expected).query(shown)
         assert apart.max() < 1e-6
         assert material["extras"]["unlit"]
-        assert material["extras"]["behind"] == (material["name"] not in (SKIN, LIDS))
+        assert material["extras"]["behind"] == (material["name"] not in (SKIN, LIDS, LASHES))
     stage = made.json["asset"]["extras"]
     assert list(stage["views"]) == ["front", "close"]
     assert stage["photo"]["gain"] == pytest.approx(leaning.light.view.head_gain)

@@ -29,7 +29,7 @@ from tts2face.photo.lines import LEAST_BLUR_PX, colours_at, grey_at
 from tts2face.photo.mesh import PhotoMesh
 from tts2face.photo.mouth import PICTURED
 from tts2face.photo.shapes import PhotoPerson
-from tts2face.photo.surface import EYES, LIDS, SKIN
+from tts2face.photo.surface import EYES, LASHES, LID_OVER_EYE, LIDS, SKIN
 from tts2face.picture.baked.response import MOVE_MM
 
 LIGHT_BLUR = 0.03  # of the width of the face
@@ -42,7 +42,7 @@ CLEAR, WITHIN_OVAL = 0.06, 0.04  # of the width: from features and within the ov
 LIT_FADE = (-0.015, 0.08)  # of the width outside the oval, over which the light of the skin ends
 GAMMA = 2.2  # of a display
 LEAST_SHADE = 0.25  # of the median, of skin in the shade
-MOST_TURNED = 30.0  # of 255, change of the skin's light
+MOST_TURNED, MOST_CHANGED = 30.0, 120.0  # of 255, change of the light of skin, and of that around lashes
 MOUTH_OPEN = 1.1  # of the colour in open light, where the lips are wide open
 SHADE_TINT = np.array([0.8, 1.05, 1.1])  # of what wrinkles darken: light between them is redder
 NO_EYES = np.array([0.2, 0.4], np.float32)  # edges of pupil and iris, of which a photographed face has none
@@ -104,6 +104,22 @@ class MouthRows:
                 bases.append(base * colours)
                 responses.append(answer)
         return np.concatenate(rows), np.concatenate(bases), np.concatenate(responses, axis=2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Changing:
+    """Vertices (N,) whose colours change by (N, 3) as they go some ways (N, 3), mm."""
+
+    vertices: IntArray
+    ways: FloatArray
+    change: FloatArray
+
+    def responses(self) -> FloatArray:
+        """(10, 3, N) responses of their light."""
+        found = np.zeros((N_TERMS, 3, len(self.vertices)))
+        way = float(MOVE_MM) * self.ways / (self.ways**2).sum(axis=1, keepdims=True)
+        found[MOVE_TERMS] = np.einsum("nt,nc->tcn", way, self.change)
+        return found
 
 
 def skin_light(
@@ -173,6 +189,7 @@ def picture_light(
     skin: tuple[PhotoMesh, FloatArray, FloatArray],
     drawn: IntArray,
     mouth: MouthRows,
+    lashes: Changing,
 ) -> BakedLight:
     """Light of a face in a picture (H, W, 3): that of the skin turns with it, that of the mouth comes through the lips.
 
@@ -186,8 +203,13 @@ def picture_light(
         Triangles that move.
     mouth
         Vertices behind the lips.
+    lashes
+        Vertices of lashes that move.
     """
     rows, responses = skin_light(pixels, *skin)
+    limits = [equal_limits(MOST_TURNED, len(rows)), equal_limits(MOST_CHANGED, len(lashes.vertices))]
+    rows = np.concatenate([rows, lashes.vertices])
+    responses = np.concatenate([responses, lashes.responses()], axis=2)
     answers, sizes = quantised(responses, least=LEAST_RESPONSE)
     mouth_rows, lit, openings = mouth.light()
     mouth_answers, mouth_sizes = quantised(openings, least=LEAST_RESPONSE)
@@ -203,11 +225,11 @@ def picture_light(
         camera_yaws_deg=np.zeros(0, np.float32),
         camera_modes=np.zeros((0, 3, LEAST_SIDE**2), np.int8),
         camera_sizes=np.zeros(0, np.float32),
-        page_of={SKIN: 0, LIDS: 0, EYES: 1, PICTURED: 1},
+        page_of={SKIN: 0, LASHES: 0, LIDS: 1, LID_OVER_EYE: 1, EYES: 1, PICTURED: 1},
         rows=rows.astype(np.int32),
         responses=answers,
         response_sizes=sizes,
-        limits=equal_limits(MOST_TURNED, len(rows)),
+        limits=np.concatenate(limits, axis=2),
         partners=rows.astype(np.int32),
         mouth_rows=mouth_rows.astype(np.int32),
         mouth_base=np.rint(lit).astype(np.uint8),

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import binary_opening, distance_transform_edt, label
 from scipy.spatial import cKDTree
 
 from tts2face.models.landmarks import (
@@ -13,7 +14,7 @@ from tts2face.models.landmarks import (
     OUTER_LIP_UPPER,
     RIGHT_LIDS,
 )
-from tts2face.numeric.arrays import FloatArray, IntArray, Pixels
+from tts2face.numeric.arrays import FloatArray, IntArray, Pixels, points_in_polygon
 from tts2face.photo.found_face import FoundFace
 
 N_LIP = 41  # along a lip, from the person's right corner to the left one
@@ -44,6 +45,9 @@ COST = 1.2  # of a step, over its length
 GAIN, LEAST_STEP = 0.15, 0.012  # of a step that is taken
 LARGE_EYES, LARGE_EYES_TRUST = 0.165, 0.4  # opening of drawn eyes, and the share of cost and gain that they need
 LARGE_EYES_MORE = 0.025  # so that no rim of the eye is left when its lids are shut
+GROWN_REACH, GROWN_STEP, GROWN_MORE = 0.12, 0.006, 0.008  # way that drawn eyes grow, steps of it, and way beyond
+GROWN_UP, GROWN_THICK = 0.02, 2  # way above the upper margin, and half of the least thickness in steps
+GROWN_SKIN, DARK_LASHES = 0.4, 0.45  # likeness to skin, and lightness over that of skin, at which they end
 CORNER_STEPS, CORNER_SKIN = np.arange(0.006, 0.05, 0.006), 0.25  # of corners, up to where there is skin
 MIDDLE = slice(4, -4)
 FOLD_STEPS = np.arange(0.04, 0.13, 0.006)  # of the fold above an upper lid: where skin begins
@@ -247,8 +251,18 @@ def find_lid_lines(pixels: Pixels, landmarks: FloatArray, scale: float) -> LidLi
     step = _lower_step(eyes)
     if step > 0:
         lines = [eye.enlarged(step * scale) for eye in eyes]
+    if min(eye.opening for eye in eyes) > LARGE_EYES:
+        lines = [eye.grown(*line) for eye, line in zip(eyes, lines, strict=True)]
     (first, second) = lines
     return LidLines((first[0], second[0]), (first[1], second[1]), _fold(eyes) * scale)
+
+
+def _hull(places: FloatArray) -> FloatArray:
+    """Corners (M, 2) of the convex polygon around places (N, 2)."""
+    from scipy.spatial import ConvexHull
+
+    found: FloatArray = places[ConvexHull(places).vertices]
+    return found
 
 
 def _lower_step(eyes: "list[_Eye]") -> float:
@@ -316,6 +330,43 @@ class _Eye:
             upper[:, :2] += shift
             lower[:, :2] += shift
         return [upper, lower]
+
+    def grown(self, upper: FloatArray, lower: FloatArray) -> list[FloatArray]:
+        """Margins (25, 3) of a drawn eye around all that is joined to it and neither skin nor as dark as lashes."""
+        reach, corner = GROWN_REACH * self._scale, upper[0, :2]
+        across = np.array([-self._along[1], self._along[0]])
+        across *= np.sign(across @ self._down)
+        every = (np.concatenate([upper, lower])[:, :2] - corner) @ np.stack([self._along, across]).T
+        low, high = every.min(axis=0) - reach, every.max(axis=0) + reach
+        step = max(GROWN_STEP * self._scale, 0.5)
+        columns, rows = (np.arange(first, last, step) for first, last in zip(low, high, strict=True))
+        grid = np.stack(np.broadcast_arrays(columns[None], rows[:, None]), axis=-1)
+        places = corner + grid[..., :1] * self._along + grid[..., 1:] * across
+        colours = self._lab(places)
+        skin = self._lab(self._landmarks[[*BELOW[self._eye], *ABOVE[self._eye]], :2])
+        off = (colours[..., None, :] - skin) / (BRIGHT_SPREAD, HUE_SPREAD, HUE_SPREAD)
+        n = len(upper)
+        least = np.interp(columns, every[:n, 0], every[:n, 1]) - GROWN_UP * self._scale
+        inside = points_in_polygon(grid.reshape(-1, 2), np.concatenate([every[:n], every[:n:-1]])).reshape(
+            grid.shape[:2]
+        )
+        is_eye = (np.exp(-(off**2).sum(axis=-1) / 2).max(axis=-1) < GROWN_SKIN) & (
+            colours[..., 0] > DARK_LASHES * self._skin[0]
+        )
+        is_eye = binary_opening(is_eye, iterations=GROWN_THICK) & (grid[..., 1] > least)
+        pieces, _ = label((is_eye & (distance_transform_edt(~inside) * step < reach)) | inside)
+        eye = pieces == np.bincount(pieces[inside], minlength=1).argmax()
+        hull = points_in_polygon(grid.reshape(-1, 2), _hull(grid[eye])).reshape(eye.shape) | eye
+        seen = np.flatnonzero(eye.any(axis=0))
+        edges = [np.where(part, rows[:, None], sign * np.inf) for part, sign in ((eye, 1), (hull, -1))]
+        heights = [edges[0].min(axis=0)[seen], edges[1].max(axis=0)[seen]]
+        at = np.linspace(columns[seen[0]], columns[seen[-1]], n)
+        lines = []
+        for line, height, sign in zip((upper, lower), heights, (-1, 1), strict=True):
+            way = _smooth(np.interp(at, columns[seen], height)[:, None], SMOOTHING) + sign * GROWN_MORE * self._scale
+            way[[0, -1]] = [[np.mean([one[end] for one in heights])] for end in (0, -1)]
+            lines.append(np.column_stack([corner + at[:, None] * self._along + way * across, line[:, 2]]))
+        return lines
 
     def skin_above(self) -> FloatArray:
         """(K,) likeness to skin below the brow, at `FOLD_STEPS` above the upper margin; 1 too near to that skin."""

@@ -1,7 +1,6 @@
-"""Mesh over a photograph: slits between lips and lids, the folds above the eyes, landmarks, and grids around them.
+"""Mesh over a photograph: slits between lips and lids, bands of lashes, landmarks, and grids around them.
 
-Between the fold and the margin of an upper lid lies a band that moves with the margin, as lashes do; where it leaves
-the fold, the lid appears (`tts2face.photo.shapes`).
+The band above the margin of an upper lid moves with it, as lashes do.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,7 +26,7 @@ LIP_RINGS = (
     (62, 183, 42, 41, 38, 12, 268, 271, 272, 407, 292),
     (62, 96, 89, 179, 86, 15, 316, 403, 319, 325, 292),
 )  # landmarks within the red of the upper and the lower lip, from the person's right to the left
-BAND_ROWS = (0.5, 1.0)  # rows of the band above an upper lid, the last of which is the fold; of its height
+BAND_ROWS = (0.5, 1.0)  # rows of the band of lashes above an upper lid, of its height
 BAND_AT_CORNER = 0.35  # of these in the corners of the eye
 PART = 0.12  # by which lips are parted to find their triangles, of the eye distance
 PART_REACH = 0.5  # over which that fades
@@ -57,8 +56,6 @@ class PhotoMesh:
         Of the person's right and left eye, from the outer corner to the inner one.
     bands : two of (rows, 23)
         Vertices of the bands above the upper lids.
-    folds : two of (25,)
-        Vertices that lie in the fold and stay there; the last row of the band lies at the same places.
     landmarks : (N,), landmark_vertices : (N,)
         Landmarks that are vertices.
     outside : (V,)
@@ -78,7 +75,6 @@ class PhotoMesh:
     upper_lids: tuple[IntArray, IntArray]
     lower_lids: tuple[IntArray, IntArray]
     bands: tuple[IntArray, IntArray]
-    folds: tuple[IntArray, IntArray]
     landmarks: IntArray
     landmark_vertices: IntArray
     outside: FloatArray
@@ -126,28 +122,16 @@ def build_mesh(
     for line, side in ((upper_lip, -1.0), (lower_lip, 1.0)):
         parted[line] = mouth.part(places[line], np.full(len(line), side))
     triangles = _triangles(parted, [(upper_lip, lower_lip), *zip(upper_lids, lower_lids, strict=True)])
-    folds = []
-    for upper, row, polygon in zip(upper_lids, rows, bands, strict=True):
-        fold = row[-1]
-        copies = len(places) + np.arange(len(fold))
-        places = np.concatenate([places, places[fold]])
-        number = np.arange(len(places))
-        number[fold] = copies
-        is_band = points_in_polygon(places[triangles].mean(axis=1), polygon)
-        triangles = np.where(is_band[:, None], triangles, number[triangles])
-        folds.append(np.concatenate([upper[:1], copies, upper[-1:]]))
-    depth_of_folds = np.concatenate([known[row[-1], 2] for row in rows])
     return PhotoMesh(
         places=places,
-        known=np.concatenate([np.arange(len(known)), *[fold[1:-1] for fold in folds]]),
-        depths=np.concatenate([known[:, 2], depth_of_folds]),
+        known=np.arange(len(known)),
+        depths=known[:, 2],
         triangles=triangles,
         upper_lip=upper_lip,
         lower_lip=lower_lip,
         upper_lids=(upper_lids[0], upper_lids[1]),
         lower_lids=(lower_lids[0], lower_lids[1]),
         bands=(np.array(rows[0]), np.array(rows[1])),
-        folds=(folds[0], folds[1]),
         landmarks=used,
         landmark_vertices=landmark_vertices,
         outside=way_outside(places, oval),
@@ -179,7 +163,7 @@ class _Points:
 
 
 def _band(margin: FloatArray, fold: float) -> Iterator[FloatArray]:
-    """Rows (23, 3) of the band above the margin (25, 3) of an upper lid, up to the fold."""
+    """Rows (23, 3) of the band above the margin (25, 3) of an upper lid."""
     along = margin[-1, :2] - margin[0, :2]
     up = np.array([along[1], -along[0]]) / np.linalg.norm(along)
     up *= -np.sign(up[1])

@@ -17,28 +17,24 @@ from tts2face.models.landmarks import (
 )
 from tts2face.numeric.arrays import FloatArray, IntArray, smoothstep
 from tts2face.photo.camera import PhotoCamera
+from tts2face.photo.lids import LID_MEETING
 from tts2face.photo.lines import LID_MARGINS, N_LID, N_LIP, InnerLips, spline_weights
 from tts2face.photo.mesh import LIP_RINGS, PhotoMesh
 from tts2face.photo.spreading import Spreading
 
 OWN_SHAPES = ("eyeBlink", "eyeLook", "tongue")  # prefixes of the head's shapes whose skin is moved otherwise
-# Towards landmarks of the skin, of the face's oval, of brows, the folds above the eyes, and lips and lids.
-SKIN_PULL, OVAL_PULL, BROW_PULL, FOLD_PULL, LINE_PULL = 0.05, 0.003, 0.2, 0.3, 1e3
+# Towards landmarks of the skin, of the face's oval, of brows, and lips and lids.
+SKIN_PULL, OVAL_PULL, BROW_PULL, LINE_PULL = 0.05, 0.003, 0.2, 1e3
 STILL_FROM = 0.75  # of the eye distance from the face, beyond which no shape moves it
 BROWS = (
     ((70, 46), (63, 53), (105, 52), (66, 65), (107, 55)),
     ((300, 276), (293, 283), (334, 282), (296, 295), (336, 285)),
 )  # upper and lower landmarks of each brow, which move as one
-LID_MEETING = 0.10  # of the opening of an eye from its lower lid, where the lids meet
-ABOVE_LIDS = (
-    (247, 30, 29, 27, 28, 56, 190),
-    (467, 260, 259, 257, 258, 286, 414),
-)  # landmarks of the fold, from the outer corner to the inner one
 BELOW_LIDS = ((25, 110, 24, 23, 22, 26, 112), (255, 339, 254, 253, 252, 256, 341))
 AROUND_EYES = ((130, 243), (359, 463))
-FOLD_FOLLOW, BELOW_FOLLOW = 0.12, 0.35  # of the way of the lid beside them, by which folds and lower lids follow
+BELOW_FOLLOW = 0.35  # of the way of the lower margin, by which the landmarks below it follow
 FEATURES_STILL = 0.2  # of the eye distance outside the face, beyond which blinks and closing lips move nothing
-GAZE_LIDS = {"eyeLookDown": 0.22, "eyeLookUp": -0.10}  # of a blink, by which the lids follow the gaze
+LOOK_DOWN, LOOK_UP = 0.22, -0.10  # of a blink, by which the lids follow the gaze
 UPPER_SHARE, SMILING_SHARE = 0.25, 0.3  # of the way on which lips meet, of the upper lip; more in a smile
 LOWER_FOLLOW = (0.97, 1.05)  # of that way, by which the red of the lower lip and its outer edge follow
 PARTED = 0.03  # of the eye distance: a gap of lips that do not touch
@@ -106,10 +102,6 @@ def face_shapes(
         known.append(vertices)
         values.append(np.einsum("ij,jkc->ikc", weights, moved[list(numbers)]))
         pulls.append(np.full(len(vertices), LINE_PULL))
-    for fold, margin in zip(mesh.folds, (3, 5), strict=True):  # upper lids among what is known
-        known.append(fold[1:-1])
-        values.append(values[margin][1:-1])
-        pulls.append(np.full(len(fold) - 2, FOLD_PULL))
     still = _still(mesh, STILL_FROM * person.scale, known)
     found = spreading.near(np.concatenate(known), np.concatenate(values), np.concatenate(pulls), still)
     for rows, upper in zip(mesh.bands, mesh.upper_lids, strict=True):
@@ -123,37 +115,45 @@ def _still(mesh: PhotoMesh, way: float, others: Sequence[IntArray]) -> IntArray:
     return np.setdiff1d(far, np.concatenate(others))
 
 
-def blink(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson, eye: int) -> FloatArray:
-    """(V, 3) displacement that shuts an eye, pixels and depths."""
+def lid_ways(mesh: PhotoMesh, eye: int) -> tuple[FloatArray, FloatArray]:
+    """(25, 3) ways of the margins of an upper and a lower lid that shut an eye, pixels and depths."""
     points = np.column_stack([mesh.places, np.zeros(len(mesh.places))])
     points[mesh.known, 2] = mesh.depths
     upper, lower = points[mesh.upper_lids[eye]], points[mesh.lower_lids[eye]]
     meeting = lower + LID_MEETING * (upper - lower)
-    ways = {"upper": meeting - upper, "lower": meeting - lower}
-    along = upper[-1, :2] - upper[0, :2]
-    at_line = (upper[:, :2] - upper[0, :2]) @ along / (along @ along)
+    return meeting - upper, meeting - lower
+
+
+def lid_motion(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson, eye: int) -> tuple[FloatArray, FloatArray]:
+    """(V, 3) displacements of the skin around an eye that is shut, pixels and depths, and of what its upper lid lowers.
+
+    In the first the upper lid rests: what comes over the eye is `tts2face.photo.lids`.
+    """
+    ways = lid_ways(mesh, eye)
+    upper, lower = mesh.places[mesh.upper_lids[eye]], mesh.lower_lids[eye]
+    along = upper[-1] - upper[0]
+    at_line = (upper - upper[0]) @ along / (along @ along)
     vertex_of = mesh.vertex_of
-    found: dict[int, FloatArray] = dict(zip(mesh.upper_lids[eye].tolist(), ways["upper"], strict=True))
-    found |= dict(zip(mesh.lower_lids[eye].tolist(), ways["lower"], strict=True))
-    for row in mesh.bands[eye]:
-        found |= dict(zip(row.tolist(), ways["upper"][1:-1], strict=True))
-    for numbers, share, way in (
-        (ABOVE_LIDS[eye], FOLD_FOLLOW, ways["upper"]),
-        (BELOW_LIDS[eye], BELOW_FOLLOW, ways["lower"]),
-    ):
-        for number in numbers:
-            if number in vertex_of:
-                at = np.clip((person.landmarks[number, :2] - upper[0, :2]) @ along / (along @ along), 0, 1)
-                found[vertex_of[number]] = share * np.array([np.interp(at, at_line, way[:, k]) for k in range(3)])
-    free = {*AROUND_EYES[eye]}
     zero = np.zeros(3)
+    found: dict[int, tuple[FloatArray, FloatArray]] = {
+        int(at): (way, zero) for at, way in zip(lower, ways[1], strict=True)
+    }
+    for row in (mesh.upper_lids[eye][1:-1], *mesh.bands[eye]):
+        found |= {int(at): (zero, way) for at, way in zip(row, ways[0][1:-1], strict=True)}
+    for number in BELOW_LIDS[eye]:
+        if number in vertex_of:
+            at = np.clip((person.landmarks[number, :2] - upper[0]) @ along / (along @ along), 0, 1)
+            way = np.array([np.interp(at, at_line, ways[1][:, k]) for k in range(3)])
+            found[vertex_of[number]] = (BELOW_FOLLOW * way, zero)
+    free = {*AROUND_EYES[eye]}
     for number, vertex in vertex_of.items():
         if number not in free:
-            found.setdefault(vertex, zero)
+            found.setdefault(vertex, (zero, zero))
     still = [mesh.upper_lids[1 - eye], mesh.lower_lids[1 - eye], mesh.upper_lip, mesh.lower_lip]
     for vertex in np.concatenate([*still, _still(mesh, FEATURES_STILL * person.scale, still)]).tolist():
-        found.setdefault(vertex, zero)
-    return spreading.exact(np.array(list(found)), np.array(list(found.values())))
+        found.setdefault(vertex, (zero, zero))
+    moved = spreading.exact(np.array(list(found)), np.array(list(found.values())))
+    return moved[:, 0], moved[:, 1]
 
 
 def closing(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson) -> FloatArray:

@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -21,20 +21,47 @@ from tts2face.photo.camera import PhotoCamera, find_camera
 from tts2face.photo.eyes import EYE_BEHIND_MM, SIDES, EyePatch, eye_patches, gaze_shapes
 from tts2face.photo.fit import NOTHING_GIVEN, PhotoFit, PhotoPlaces
 from tts2face.photo.found_face import PhotographedFace
-from tts2face.photo.light import SMILING, MouthRows, picture_light, wrinkles
+from tts2face.photo.lids import (
+    EYE_FORWARD_MM,
+    FORWARD_MM,
+    LASHES_INTO,
+    LASHES_MM,
+    LidFrame,
+    LidPicture,
+    LidSheet,
+    ShutEye,
+    sheet_over_eye,
+    sheets_over_skin,
+    shut_eye,
+)
+from tts2face.photo.light import SMILING, Changing, MouthRows, picture_light, wrinkles
 from tts2face.photo.lines import InnerLips, LidLines, darken_lip_edges, find_lid_lines, find_lip_line
 from tts2face.photo.mesh import PhotoMesh, build_mesh
 from tts2face.photo.mouth import MouthInside, MouthPlace, cheek_light, mouth_light, mouth_walls
 from tts2face.photo.photograph import OPAQUE, Photograph
-from tts2face.photo.shapes import GAZE_LIDS, PhotoPerson, blink, breathing, closing, depths, face_shapes, head_follow
+from tts2face.photo.shapes import (
+    LOOK_DOWN,
+    LOOK_UP,
+    PhotoPerson,
+    breathing,
+    closing,
+    depths,
+    face_shapes,
+    head_follow,
+    lid_motion,
+    lid_ways,
+)
 from tts2face.photo.spreading import Spreading
 from tts2face.photo.surface import (
     EYES,
+    LASHES,
+    LID_OVER_EYE,
+    LIDS,
     SKIN,
     PhotoPages,
     PhotoSurface,
     Vertices,
-    add_lids,
+    between_vertices,
     lay_pages,
     moves,
     place_landmarks,
@@ -101,10 +128,12 @@ class Skinned(Traced):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Pictured(Skinned):
-    """The face with pictures of what lies behind its skin: patches of both eyes, and the person's own teeth."""
+    """The face with pictures of what lies behind its skin: patches and lids of its eyes, and the person's own teeth."""
 
     patches: Sequence[Sequence[EyePatch]]
     teeth: OwnTeeth | None
+    frames: Sequence[LidFrame]
+    shut: Sequence[ShutEye]
     pages: PhotoPages
 
 
@@ -115,6 +144,7 @@ class Laid(Pictured):
     surface: PhotoSurface
     corners: NDArray[np.int32]
     weights: Float32Array
+    lashes: Changing
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -198,12 +228,14 @@ def _picture_eyes_and_teeth(face: Skinned, teeth: OwnTeeth | None) -> Pictured:
         teeth = find_teeth(pixels, face.seen.found, person.lips, face.camera, face.model.head)
     if teeth is not None:
         teeth = teeth.in_light_of(cheek_light(pixels, face.landmarks))
-    pictures: list[EyePatch | OwnTeeth] = [*patches[0], *patches[1]]
+    frames = [LidFrame.of(face.landmarks, face.lids, eye, person.scale) for eye in (0, 1)]
+    shut = [shut_eye(pixels, frame) for frame in frames]
+    pictures: list[EyePatch | LidPicture | OwnTeeth] = [*(eye.picture for eye in shut), *patches[0], *patches[1]]
     if teeth is not None:
         pictures.append(teeth)
     darkened = darken_lip_edges(pixels, person.lips, person.scale)
     pages = lay_pages(darkened, face.mesh, moves(face.skin), pictures)
-    return _and(Pictured, face, patches=patches, teeth=teeth, pages=pages)
+    return _and(Pictured, face, patches=patches, teeth=teeth, frames=frames, shut=shut, pages=pages)
 
 
 def _lay_surface(face: Pictured) -> Laid:
@@ -211,17 +243,69 @@ def _lay_surface(face: Pictured) -> Laid:
     mesh, pages, surface = face.mesh, face.pages, PhotoSurface()
     surface.add(face.skin, uv=pages.uv(_shown_places(mesh, face.person)))
     surface.parts.append((SKIN, mesh.triangles))
-    add_lids(surface, mesh, pages, face.person.scale)
-    eyes, corners_of = [], iter(pages.patch_corners)
+    lashes = [_add_lids(face, surface, eye) for eye in (0, 1)]
+    eyes, corners_of = [], iter(pages.patch_corners[len(lashes) :])
     for eye, parts in enumerate(face.patches):
         for patch in parts:
-            vertices = _eye_vertices(patch, eye, face.photo, face.camera, face.model)
+            vertices = _eye_vertices(face, patch.places, patch.ahead_mm)
+            for name, way in gaze_shapes(face.model.head, patch.turning, eye).items():
+                vertices.shapes[face.model.names.index(name)] = way
             rows = surface.add(vertices, uv=pages.uv(patch.places, next(corners_of)))
             surface.parts.append((EYES, rows[_before_person(patch, face.seen.picture)]))
             if patch is parts[0]:  # the others are catchlights before it
                 eyes.append((patch, rows))
-    corners, weights = place_landmarks(mesh, face.landmarks, eyes)
-    return _and(Laid, face, surface=surface, corners=corners, weights=weights)
+    margins = [_add_margin(face, surface, eye) for eye in (0, 1)]
+    corners, weights = place_landmarks(mesh, face.landmarks, eyes, margins)
+    joined = Changing(*(np.concatenate([getattr(rows, one.name) for rows in lashes]) for one in fields(Changing)))
+    return _and(Laid, face, surface=surface, corners=corners, weights=weights, lashes=joined)
+
+
+def _add_lids(face: Pictured, surface: PhotoSurface, eye: int) -> Changing:
+    """Add what comes over an eye that shuts; returns the vertices of its lashes."""
+    mesh, frame = face.mesh, face.frames[eye]
+    own = face.pages.patch_corners[eye]
+
+    def add(part: str, sheet: LidSheet, vertices: Vertices, way: FloatArray, uv: FloatArray) -> IntArray:
+        _blink(face, vertices, eye, way)
+        numbers = surface.add(vertices, uv=uv)
+        surface.parts.append((part, numbers[sheet.triangles]))
+        return numbers
+
+    def forward(places: FloatArray, mm: FloatArray | float) -> FloatArray:
+        photo = np.column_stack([places, np.zeros(len(places))])
+        nearer = np.column_stack([places, np.broadcast_to(mm * face.camera.scale, len(places))])
+        return face.camera.to_head(nearer) - face.camera.to_head(photo)
+
+    for sheet in sheets_over_skin(frame):
+        skin = face.skin.between(*between_vertices(mesh, sheet.places))
+        placed = replace(skin, places=skin.places - forward(sheet.places, FORWARD_MM * sheet.come))
+        add(LIDS, sheet, placed, forward(sheet.places, FORWARD_MM), face.pages.uv(sheet.places, own))
+    sheet = sheet_over_eye(frame)
+    over = _eye_vertices(face, sheet.places, 0.0)
+    over = replace(over, places=over.places - forward(sheet.places, EYE_FORWARD_MM * sheet.come))
+    add(LID_OVER_EYE, sheet, over, forward(sheet.places, EYE_FORWARD_MM), face.pages.uv(sheet.places, own))
+    upper = mesh.upper_lids[eye]
+    rows = np.stack([*(np.concatenate([upper[:1], row, upper[-1:]]) for row in mesh.bands[eye][::-1]), upper])
+    sheet = LidSheet.of(mesh.places[rows], np.zeros(rows.shape))
+    skin = face.skin.at(rows.ravel())
+    placed = replace(skin, places=skin.places - forward(sheet.places, LASHES_MM))
+    way = np.tile(face.camera.ways_to_head(lid_ways(mesh, eye)[0]), (len(rows), 1)) + forward(sheet.places, FORWARD_MM)
+    shown = sheet.places + LASHES_INTO * frame.scale * frame.up
+    numbers = add(LASHES, sheet, placed, way, face.pages.uv(shown))
+    return Changing(numbers, way, face.shut[eye].change.reshape(-1, 3))
+
+
+def _add_margin(face: Pictured, surface: PhotoSurface, eye: int) -> IntArray:
+    """Add the margin (25,) of an upper lid, which no triangle shows: it moves as the lashes do, and not forward."""
+    margin = face.skin.at(face.mesh.upper_lids[eye])
+    _blink(face, margin, eye, face.camera.ways_to_head(lid_ways(face.mesh, eye)[0]))
+    return surface.add(margin)
+
+
+def _blink(face: Pictured, vertices: Vertices, eye: int, way: FloatArray) -> None:
+    """Add a way (N, 3), mm, to what moves vertices (N,) in a blink of an eye, and a share of it as the gaze does."""
+    for name, share in (("eyeBlink", 1.0), ("eyeLookDown", LOOK_DOWN), ("eyeLookUp", LOOK_UP)):
+        vertices.shapes[face.model.names.index(f"{name}{SIDES[eye]}")] += share * way
 
 
 def _fill_mouth(face: Laid) -> Filled:
@@ -270,7 +354,7 @@ def _face(face: Filled, metadata: Mapping[str, Any]) -> Face:
         metadata={**metadata, "fit": used.as_json()},
         scores=head.scores,
         light=Photographed(
-            picture_light(face.pixels, face.pages.pages, skin, drawn, face.mouth),
+            picture_light(face.pixels, face.pages.pages, skin, drawn, face.mouth, face.lashes),
             _view(face.seen.picture, face.camera, every.follow, face.pages),
         ),
     )
@@ -299,9 +383,9 @@ def _skin(mesh: PhotoMesh, person: PhotoPerson, camera: PhotoCamera, model: _Mod
     found = face_shapes(mesh, spreading, model.motion(), person)
     follow = head_follow(mesh, person)
     for eye, side in enumerate(SIDES):
-        shut = camera.ways_to_head(blink(mesh, spreading, person, eye))
+        shut, lowered = (camera.ways_to_head(way) for way in lid_motion(mesh, spreading, person, eye))
         found[f"eyeBlink{side}"] = shut
-        found |= {f"{name}{side}": share * shut for name, share in GAZE_LIDS.items()}
+        found[f"eyeLookDown{side}"], found[f"eyeLookUp{side}"] = LOOK_DOWN * shut, LOOK_UP * (shut + lowered)
     found[BREATH] = camera.ways_to_head(breathing(mesh, person, follow, camera.scale))
     depth = depths(mesh, spreading, person, camera, model.head.pivot.astype(np.float64))
     photo = np.column_stack([mesh.places, depth])
@@ -335,16 +419,15 @@ def _before_person(patch: EyePatch, picture: Photograph) -> IntArray:
     return np.asarray(patch.triangles[(picture.alpha[down, across] == OPAQUE)[patch.triangles].all(axis=1)])
 
 
-def _eye_vertices(patch: EyePatch, eye: int, photo: FloatArray, camera: PhotoCamera, model: _Model) -> Vertices:
-    """Vertices of a patch behind the skin around it, which is given by the pixels and depths (V, 3) of all skin."""
-    away, near = cKDTree(photo[:, :2]).query(patch.places, N_NEAR)
+def _eye_vertices(face: Pictured, places: FloatArray, ahead_mm: float) -> Vertices:
+    """Vertices without motion at places (N, 2), behind the skin around them, or some way before that."""
+    away, near = cKDTree(face.photo[:, :2]).query(places, N_NEAR)
     shares = 1 / (np.asarray(away) + 1)
-    depth = (photo[near, 2] * shares).sum(axis=1) / shares.sum(axis=1) + (patch.ahead_mm - EYE_BEHIND_MM) * camera.scale
-    shapes = np.zeros((len(model.names), len(patch.places), 3))
-    for name, way in gaze_shapes(model.head, patch.turning, eye).items():
-        shapes[model.names.index(name)] = way
-    places = camera.to_head(np.column_stack([patch.places, depth]))
-    return Vertices(places, shapes, np.ones(len(places)))
+    depth = (face.photo[near, 2] * shares).sum(axis=1) / shares.sum(axis=1) + (
+        ahead_mm - EYE_BEHIND_MM
+    ) * face.camera.scale
+    still = np.zeros((len(face.model.names), len(places), 3))
+    return Vertices(face.camera.to_head(np.column_stack([places, depth])), still, np.ones(len(places)))
 
 
 def _add_inside(surface: PhotoSurface, inside: MouthInside, pages: PhotoPages) -> tuple[IntArray, FloatArray]:

@@ -10,17 +10,17 @@ from tts2face.models.baked_light import LEAST_SIDE
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
 from tts2face.numeric.arrays import Float32Array, FloatArray, IntArray, Mask, Pixels
 from tts2face.photo.eyes import IRISES, EyePatch
+from tts2face.photo.lids import LidPicture
 from tts2face.photo.lines import LID_MARGINS, N_LID, N_LIP
-from tts2face.photo.mesh import PhotoMesh, grid_triangles
+from tts2face.photo.mesh import PhotoMesh
 from tts2face.photo.teeth import OwnTeeth
 
-SKIN, LIDS, EYES = "skin", "lids", "eyes"  # parts, of which the first two show the picture itself
+SKIN, EYES = "skin", "eyes"  # parts
+LIDS, LASHES, LID_OVER_EYE = "lids", "lashes", "lid_over_eye"  # before the skin, and behind it
 PAGE_MARGIN = 1 / 64  # of a page, beyond what it shows: the places nearest to its edges are not read
 BETWEEN_PX = 4  # of patches on their page
 MOVED = 1e-3  # mm, or share of the head's motion, from which a vertex moves
 UNSEEN = 128.0  # colour of vertices whose colour is a picture's
-N_LID_ROWS = 5  # of vertices, from the fold to the band
-SHOWN_ABOVE = 0.018  # of the eye distance above the fold, whose skin a lid shows on its way there and back
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,19 +31,15 @@ class Vertices:
     shapes: FloatArray
     follow: FloatArray
 
-    def between(self, others: "Vertices", share: float) -> "Vertices":
-        """Vertices on the way to others (V, 3)."""
-        mixed = (
-            (1 - share) * own + share * other
-            for own, other in zip(
-                (self.places, self.shapes, self.follow), (others.places, others.shapes, others.follow), strict=True
-            )
-        )
-        return Vertices(*mixed)
-
     def at(self, numbers: IntArray) -> "Vertices":
         """Those of some numbers (N,)."""
         return Vertices(self.places[numbers], self.shapes[:, numbers], self.follow[numbers])
+
+    def between(self, numbers: IntArray, weights: FloatArray) -> "Vertices":
+        """Vertices (N,) at weights (N, 3) between three others (N, 3) each."""
+        places = np.einsum("nc,ncx->nx", weights, self.places[numbers])
+        shapes = np.einsum("nc,kncx->knx", weights, self.shapes[:, numbers])
+        return Vertices(places, shapes, np.asarray((weights * self.follow[numbers]).sum(axis=1)))
 
 
 @dataclass(slots=True, eq=False)
@@ -106,7 +102,9 @@ class PhotoPages:
         return found.clip(0, 1)
 
 
-def lay_pages(pixels: Pixels, mesh: PhotoMesh, is_moving: Mask, patches: Sequence[EyePatch | OwnTeeth]) -> PhotoPages:
+def lay_pages(
+    pixels: Pixels, mesh: PhotoMesh, is_moving: Mask, patches: Sequence[EyePatch | LidPicture | OwnTeeth]
+) -> PhotoPages:
     """Pages of a picture (H, W, 3) whose vertices (V,) move, and of patches."""
     shown = mesh.places[mesh.triangles[is_moving[mesh.triangles].any(axis=1)]].reshape(-1, 2)
     low = np.clip(np.floor(shown.min(axis=0)).astype(int) - 2, 0, None)
@@ -134,32 +132,24 @@ def _page_side(least: int) -> int:
     return side
 
 
-def add_lids(surface: PhotoSurface, mesh: PhotoMesh, pages: PhotoPages, scale: float) -> None:
-    """Add the lids, whose skin is that above the fold, mirrored: it fits at both ends."""
-    skin = surface.vertices[0]
-    bow = np.sin(np.linspace(0, np.pi, N_LID))[:, None] ** 0.5
-    for fold, band, margin in zip(mesh.folds, mesh.bands, mesh.upper_lids, strict=True):
-        moving = np.concatenate([fold[:1], band[-1], fold[-1:]])
-        up = mesh.places[fold] - mesh.places[margin]
-        way = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-6) * (SHOWN_ABOVE * scale) * bow
-        rows = []
-        for share in np.linspace(0, 1, N_LID_ROWS):
-            shown = mesh.places[fold] + way * (1 - abs(2 * share - 1))
-            rows.append(surface.add(skin.at(fold).between(skin.at(moving), float(share)), uv=pages.uv(shown)))
-        triangles = grid_triangles(np.stack(rows))
-        is_mirrored = mesh.places[fold[0], 0] > mesh.places[fold[-1], 0]
-        surface.parts.append((LIDS, triangles[:, ::-1] if is_mirrored else triangles))
+def between_vertices(mesh: PhotoMesh, places: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Three vertices (N, 3) of the triangle around each place (N, 2), or nearest to it, and its weights in them."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    corners = mesh.places[mesh.triangles]
+    near = mesh.triangles[((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1)]
+    found = [_triangle_around(place, mesh.places, near) for place in places]
+    return np.array([numbers for numbers, _ in found]), np.array([weights for _, weights in found])
 
 
 def place_landmarks(
-    mesh: PhotoMesh, landmarks: FloatArray, eyes: Sequence[tuple[EyePatch, IntArray]]
+    mesh: PhotoMesh, landmarks: FloatArray, eyes: Sequence[tuple[EyePatch, IntArray]], lashes: Sequence[IntArray]
 ) -> tuple[NDArray[np.int32], Float32Array]:
     """Three vertices (478, 3) and their weights for each landmark (478, 2 or more), pixels.
 
-    Eyes are given with the numbers of their vertices.
+    Eyes are given with the numbers of their vertices, and `lashes` are those of the upper margins that move (25,).
     """
     corners, weights = np.zeros((N_LANDMARKS, 3), np.int32), np.tile(np.array([1, 0, 0], np.float32), (N_LANDMARKS, 1))
-    own = _vertices(mesh)
+    own = _vertices(mesh, lashes)
     for number in range(N_LANDMARKS):
         place = landmarks[number, :2]
         eye = next((eye for eye, iris in enumerate(IRISES) if number in iris), None)
@@ -174,13 +164,13 @@ def place_landmarks(
     return corners, weights
 
 
-def _vertices(mesh: PhotoMesh) -> Mapping[int, int]:
+def _vertices(mesh: PhotoMesh, lashes: Sequence[IntArray]) -> Mapping[int, int]:
     """Vertices that are landmarks: their own, and those of lips and lids on the lines through them."""
     lines: list[tuple[IntArray, Sequence[int], int]] = [
         (mesh.upper_lip, INNER_LIP_UPPER, (N_LIP - 1) // (len(INNER_LIP_UPPER) - 1)),
         (mesh.lower_lip, INNER_LIP_LOWER, (N_LIP - 1) // (len(INNER_LIP_LOWER) - 1)),
     ]
-    for upper, lower, lids in zip(mesh.upper_lids, mesh.lower_lids, LID_MARGINS, strict=True):
+    for upper, lower, lids in zip(lashes, mesh.lower_lids, LID_MARGINS, strict=True):
         lines += [
             (line, numbers, (N_LID - 1) // (len(numbers) - 1))
             for line, numbers in zip((upper, lower), lids, strict=True)

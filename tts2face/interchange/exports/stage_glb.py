@@ -176,7 +176,7 @@ def _material(surface: ExportSurface, built: Surface, face: Face, *, unlit: bool
         "opacity": part.opacity,
         "cutout": part.cutout,
         "unlit": unlit or is_flat,  # also the colours of its mouth are those of the picture's light
-        "behind": is_flat and part.texture != 0,  # eyes and mouth, which the skin hides anywhere
+        "behind": face.light.is_in_opening(part.name),  # eyes and mouth, which the skin hides anywhere
         **more,
     }
     material = {"name": part.name, "doubleSided": True, "pbrMetallicRoughness": shading, "extras": extras}

@@ -92,6 +92,8 @@ def build_surface(face: Face, own: Lit) -> LitSurface:
     row_of[order] = np.arange(len(order))
     page_of = np.full(2 * n_vertices, N_PAGES)
     page_of[keys] = np.where(dark, N_PAGES, pages[part_of])[:, None]
+    is_behind = np.zeros(2 * n_vertices, bool)
+    is_behind[keys] = np.array([own.is_in_opening(part.name) for part in face.parts])[part_of][:, None]
     source = (order % n_vertices).astype(np.int32)
     uv = np.zeros((n_vertices, 2)) if face.uv is None else face.uv
     template = np.zeros((len(order), N_COLUMNS), np.float32)
@@ -108,7 +110,7 @@ def build_surface(face: Face, own: Lit) -> LitSurface:
         rig=rig,
         terms=light_terms(face, rig, light),
         source=source,
-        behind=(page_of[order] != 0) if own.is_flat else np.zeros(len(order), bool),
+        behind=is_behind[order],
         template=template,
         triangles=np.ascontiguousarray(row_of[keys]),
         piece_of=connected_pieces(corners, n_vertices)[corners[:, 0]],  # edges of a part's pieces lie over each other
