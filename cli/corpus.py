@@ -15,6 +15,7 @@ from cli.process import ask, write_message
 from cli.progress import progress_bar, stage_bar
 from cli.tool_flags import READING_DEFAULTS, ReadingFlags, Tier
 from lexicon.errors import InputError
+from tts2face.models.consent import THREE_ANSWERS, consent_record
 from tts2face.storage.files import write_atomically
 from tts2face.storage.output_paths import check_file_name, refuse_overwriting
 
@@ -105,7 +106,7 @@ def build(  # noqa: PLR0913 - one parameter a flag
     appearance: Annotated[bool, switch("Also train the talker's appearance model, for `--face self`.")] = False,
     consent: Annotated[
         str | None,
-        Parameter(help="With --appearance: statement of consent of the person shown, stored with name and date."),
+        Parameter(help=f"With --appearance: consent of the person shown, stored with name and date: {THREE_ANSWERS}."),
     ] = None,
     report: Annotated[
         Path | None,
@@ -162,10 +163,8 @@ def check_suffix(out: Path, kind: str) -> None:
 
 def _request_consent(name: str, statement: str | None) -> Mapping[str, str]:
     """The consent of the person shown; read from the terminal if there is no statement."""
-    from tts2face.models.consent import consent_record
-
     if statement is None:
-        statement = ask(f"The output will contain pictures of {name}'s face. Statement of consent:")
+        statement = ask(f"The output will contain pictures of {name}'s face. State the consent: {THREE_ANSWERS}:")
     return consent_record(name, statement)
 
 
@@ -180,7 +179,7 @@ def face(  # noqa: PLR0913 - one parameter a flag
     ] = None,
     consent: Annotated[
         str | None,
-        Parameter(help="Statement of consent of the person shown, stored with name and date; by default requested."),
+        Parameter(help=f"Consent of the person shown, asked for by default, stored with the date: {THREE_ANSWERS}."),
     ] = None,
     basis: Annotated[
         int,

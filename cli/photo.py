@@ -14,7 +14,7 @@ from cyclopts import Parameter
 from cli.flags import END_OF_OPTIONS, switch
 from cli.process import ask, write_message
 from lexicon.errors import BackendError, InputError
-from tts2face.models.consent import consent_record
+from tts2face.models.consent import THREE_ANSWERS, consent_record
 
 if TYPE_CHECKING:
     from tts2face.models.face import Face
@@ -25,7 +25,7 @@ Photo = Annotated[
 ]
 Consent = Annotated[
     str | None,
-    Parameter(help="Statement of consent of the person in --photo, asked for once; drawn for a face that is nobody's."),
+    Parameter(help=f"Consent of the person in the photo, asked for once and stored with the date: {THREE_ANSWERS}."),
 ]
 Fit = Annotated[
     Path | None, Parameter(help="Corrections of lips, lids, teeth and pivot in the photo (.json, see docs/photo.md).")
@@ -65,7 +65,7 @@ def agreed(photo: str, consent: str | None, name: str | None) -> str | None:
 
     shown = name or split_number(photo)[0].stem
     if consent is None:
-        consent = ask(f"The clips will show {shown} speaking. Statement of consent of the person (or: drawn):") or None
+        consent = ask(f"The clips will show {shown} speaking. State the consent: {THREE_ANSWERS}:") or None
     consent_record(shown, consent)  # before anything is downloaded
     return consent
 

@@ -14,6 +14,7 @@ from corpus_tools.appearance.transfer import build_appearance_transfer
 from lexicon.errors import InputError
 from tts2face.face.appearance_regression import fit_appearance_regression
 from tts2face.lips.cloning import ParameterTransfer, build_parameter_transfer, extend_talker
+from tts2face.models.consent import stated_consent
 from tts2face.models.talker import NOT_STATED, Talker, Utterance, speech_channels
 from tts2face.models.talker_file import load_talker, write_talker
 from tts2face.types import Trajectory
@@ -146,7 +147,7 @@ def _metadata(
         "language": source.get("language", NOT_STATED),
         **{key: _merge_statements(source.get(key, NOT_STATED), target.get(key, NOT_STATED)) for key in LICENCE_FIELDS},
         "content": CONTENT_WITH_PICTURES if has_pictures else CONTENT,
-        **({"consent": target["consent"]} if has_pictures and "consent" in target else {}),
+        **({"consent": target["consent"]} if has_pictures and stated_consent(target) is not None else {}),
         "cloning": {**about, **origins},
     }
 

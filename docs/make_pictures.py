@@ -281,16 +281,16 @@ def shelves(side: int) -> Image.Image:
 
 def photo_row(photo: Path, label: str, background: str) -> list[Image.Image]:
     """A picture as it is, then its face in each pose before a background."""
-    face, shown = face_from_photo(photo, consent="drawn"), replace(PHOTO_PICTURE, background=background)
+    face, shown = face_from_photo(photo, consent="nobody"), replace(PHOTO_PICTURE, background=background)
     return [photo_still(face, label), *posed(mesh_renderer(face, shown))]
 
 
 def avatar_row(photo: Path) -> list[Image.Image]:
     """A picture as it is, then its head in each pose, turned twice as far."""
     with tempfile.TemporaryDirectory() as folder:
-        build_avatar([photo], Path(folder) / "head.face", consent="drawn")
+        build_avatar([photo], Path(folder) / "head.face", consent="nobody")
         head = load_face(str(Path(folder) / "head.face"))
-    picture = photo_still(face_from_photo(photo, consent="drawn"), "picture and head")
+    picture = photo_still(face_from_photo(photo, consent="nobody"), "picture and head")
     return [picture, *posed(mesh_renderer(head, PHOTO_PICTURE), 2)]
 
 

@@ -51,7 +51,7 @@ def main() -> None:
             took = []
             for _ in range(N_MADE):
                 began = time.perf_counter()
-                face = face_from_photo(path, consent="drawn")
+                face = face_from_photo(path, consent="nobody")
                 took.append(time.perf_counter() - began)
         faces.append(face)
         picture = Picture(size=f"{side}x{side}")

@@ -57,7 +57,7 @@ def build(folder: Path, appearance: bool) -> tuple[tuple[float, float], Path]:
     Session().write(TEXT, take, size="256x256", fps=25)
     take.with_suffix(".txt").write_text(TEXT)
     order = {
-        "folder": str(folder), "name": "anna", "provenance": {}, "consent": "I agree to this." if appearance else None,
+        "folder": str(folder), "name": "anna", "provenance": {}, "consent": "me" if appearance else None,
         "with_appearance": appearance, "max_bytes": 1e9,
     }  # fmt: skip
     return cost(Program(TALKER_BUILDER, replace(TALKER_LIMITS, cpu_s=1200)), TALKER_TOOL, order), take

@@ -185,5 +185,5 @@ def test_pictures_of_a_person_need_a_statement(statement):
 
 
 def test_a_consent_is_kept_with_name_and_date():
-    kept = consent_record("Ada", " I agree to this. ", date="2026-01-02")
-    assert kept == {"name": "Ada", "statement": "I agree to this.", "date": "2026-01-02"}
+    kept = consent_record("Ada", " Me, for a test. ", date="2026-01-02")
+    assert kept == {"name": "Ada", "statement": "me: for a test.", "date": "2026-01-02"}

@@ -322,6 +322,6 @@ def test_the_command_offers_the_eye_colours_and_refuses_others(
     shown = " ".join(re.sub("[^a-z-]", " ", capsys.readouterr().out).split())
     assert " ".join(EYE_COLOURS) in shown
     Image.new("RGB", (64, 64)).save(tmp_path / "me.png")
-    words = ["face", "photo", str(tmp_path / "me.png"), "--out", str(tmp_path / "me.face"), "--consent", "drawn"]
+    words = ["face", "photo", str(tmp_path / "me.png"), "--out", str(tmp_path / "me.face"), "--consent", "nobody"]
     assert run([*words, "--eye-color", "pink"]) == 2
     assert "there is no eye colour 'pink'; give #rrggbb or one of dark-brown" in capsys.readouterr().err

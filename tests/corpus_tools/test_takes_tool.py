@@ -92,11 +92,11 @@ def test_a_photo_becomes_the_head_of_its_person(tmp_path: Path) -> None:
     (tmp_path / STATEMENT).write_text(json.dumps(stated))
     with pytest.raises(InputError, match="state the consent"):
         ordered(TAKES, "avatar", order)
-    (tmp_path / STATEMENT).write_text(json.dumps(stated | {"consent": "drawn"}))
+    (tmp_path / STATEMENT).write_text(json.dumps(stated | {"consent": "nobody"}))
     _, made = ordered(TAKES, "avatar", order)
     assert str(made["look"]).startswith("hair: ")
     face = read_face(out / CONTENT)
     assert not face.light.is_flat
-    assert face.metadata["consent"]["statement"] == "drawn"
+    assert face.metadata["consent"]["statement"] == "nobody"
     assert face.hairdo is not None
     assert "green" in str(made["look"])

@@ -39,6 +39,7 @@ from tests.running import ServeProcess, eventually
 from tests.serving.service.job_requests import SMALL
 from tests.serving.service.receiver import Receiver
 from tests.serving.studio.chromium import Browser
+from tests.serving.studio.consents import give_consent
 from tts2face.serving.service.keys import LOCAL_KEY
 from tts2face.serving.studio.recordings import RecordingStore
 from tts2face.serving.work.database import database_url
@@ -153,7 +154,7 @@ def speak_photo(traced: Traced) -> None:
     path, pixels = traced.folder / "me.png", still("head", 512)
     pixels[0, :8, 0] = np.frombuffer(time.time_ns().to_bytes(8), np.uint8)
     Image.fromarray(pixels).save(path)
-    traced.speak("--photo", str(path), "--consent", "I agree to this.")
+    traced.speak("--photo", str(path), "--consent", "me")
 
 
 def post_clip(traced: Traced) -> None:
@@ -194,7 +195,7 @@ def build_in_browser(page: str) -> None:
     browser = Browser()
     try:
         browser.open(page)
-        browser.type("Statement of consent", "I, Test person, agree to this test.")
+        give_consent(browser, "Test person", "2026-01-02")
         browser.click("Build the talker")
         browser.wait("return document.body.innerText.match(/The talker .* is made of.*/)?.[0]", seconds=400)
     finally:

@@ -34,7 +34,7 @@ COMMANDS = {
     "an instant of a video": ["corpus", "gestures", "other.wav", "--style", "a", "--still", "sad=in.mp4@1.5", "--out",
                               "hard.palette"],
     "a manifest": ["corpus", "evaluate", "--recordings", ".", "--out", "in.csv"],
-    "a model": ["corpus", "face", ".", "--model", "in.face", "--out", "in.face", "--consent", "I agree"],
+    "a model": ["corpus", "face", ".", "--model", "in.face", "--out", "in.face", "--consent", "me"],
     "a talker to study": ["report", "similarity", "in.json", "--out", "in.json"],
     "a palette to study": ["report", "gestures", "in.json", "--out", "in.json"],
     "a video to study": ["report", "retarget", "in.mp4", "--out", "in.mp4"],

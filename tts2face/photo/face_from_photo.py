@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError, InputError
-from tts2face.models.consent import consent_record
+from tts2face.models.consent import consent_record, parse_consent, stated_consent
 from tts2face.models.face import Face
 from tts2face.models.face_file import FORMAT_VERSION, KIND, read_face, write_face
 from tts2face.models.face_loading import load_face
@@ -49,7 +49,8 @@ def face_from_photo(  # noqa: PLR0913 - one parameter an option
     photo
         Picture file; ``photo.jpg@2`` is its second largest face.
     consent
-        Statement of consent of the person shown, kept in the face with its date; ``drawn`` for a face that is nobody's.
+        Consent of the person shown, kept in the face with the date: ``me``, ``agreed: NAME, YYYY-MM-DD``, or ``nobody``
+        for a face that is drawn or generated; words may follow after a comma.
     name
         The person's name; the file's name if omitted.
     fit
@@ -141,10 +142,17 @@ def kept_path(photo: str | Path, fit: Path | None = None, smile: str | Path | No
 
 
 def find_kept(kept: Path, consent: str | None) -> bool:
-    """Whether a kept face can be read, and has the statement of consent that is given, if any."""
+    """Whether a kept face can be read, and has the consent that is given, if any.
+
+    Raises
+    ------
+    InputError
+        The given consent is none.
+    """
+    given = None if consent is None else parse_consent(consent)
     with suppress(InputError, DataError, OSError):
-        stated = read_face(kept).metadata["consent"]["statement"]
-        if consent is None or consent.strip() == stated:
+        stated = stated_consent(read_face(kept).metadata)
+        if stated is not None and given in (None, stated):
             FolderStore(kept.parent).touch(kept.name)
             return True
     return False

@@ -55,8 +55,8 @@ class Session:
     identity
         Name of a preset of the face's age, sex and ancestry.
     photo, consent, smile
-        Picture of a person who speaks in place of a face, that person's consent, and a picture of the person's smile,
-        as for `tts2face.face_from_photo`.
+        Picture of a person who speaks in place of a face, that person's consent (``me``, ``agreed: NAME, YYYY-MM-DD``
+        or ``nobody``), and a picture of the person's smile, as for `tts2face.face_from_photo`.
     hair, hair_color
         Haircut and colour of the hair, as for `tts2face.load_face`; None for the face's own.
     person

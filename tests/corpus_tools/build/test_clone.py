@@ -28,7 +28,7 @@ TARGET_STATED = {
     "sources": "t",
     "licence": "CC0",
     "attribution": "a",
-    "consent": {"x": 1},
+    "consent": {"name": "B", "statement": "me", "date": "2026-01-02"},
 }
 
 

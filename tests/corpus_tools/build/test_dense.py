@@ -152,7 +152,7 @@ def test_a_talkers_head(
     few_takes: Path, face_model: Path, tmp_path: Path, head: Face, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("corpus_tools.dense.skin_colour.N_FRAMES", 12)  # no texture is judged
-    consent = consent_record("Speaker 1", "The corpus is published for research.", date="2026-01-31")
+    consent = consent_record("Speaker 1", "agreed: the speakers of GRID, 2006-01-01", date="2026-01-31")
     out, steps = tmp_path / "me.face", []
     built = build_face(
         few_takes,

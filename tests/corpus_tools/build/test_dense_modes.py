@@ -216,7 +216,7 @@ def test_more_modes_than_frames_are_refused(
 
 @pytest.mark.parametrize("n_modes", [-1, MOST_MODES + 1])
 def test_a_basis_out_of_range_is_refused_before_any_video(n_modes: int, tmp_path: Path, capsys) -> None:
-    words = ["corpus", "face", "nowhere", "--out", str(tmp_path / "me.face"), "--consent", "I, Ada, agree to this."]
+    words = ["corpus", "face", "nowhere", "--out", str(tmp_path / "me.face"), "--consent", "me"]
     assert run([*words, "--basis", str(n_modes)]) == 2
     assert f"a basis has 0 to 100 dense modes, not {n_modes}" in capsys.readouterr().err
 
@@ -232,7 +232,7 @@ def test_a_talkers_modes(few_takes: Path, face_model: Path, tmp_path: Path, caps
         "--out",
         str(out),
         "--consent",
-        "Published for research.",
+        "agreed: the speakers of GRID, 2006-01-01",
         "--basis",
         "8",
     ]

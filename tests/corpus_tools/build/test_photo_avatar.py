@@ -48,7 +48,7 @@ def photos(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 def avatars(photos: dict[str, Path], tmp_path_factory: pytest.TempPathFactory, face_model: Path) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("avatars")
     for name, photo in photos.items():
-        build_avatar([photo], folder / f"{name}.face", consent="drawn", model=face_model)
+        build_avatar([photo], folder / f"{name}.face", consent="nobody", model=face_model)
     return {name: folder / f"{name}.face" for name in photos}
 
 
@@ -66,7 +66,7 @@ def test_avatars_of_real_people_are_nearest_to_their_own_pictures(
         photos.append(tmp_path / f"{video.stem}.png")
         Image.fromarray(next(iter(read_frames(video))).pixels).save(photos[-1])
         avatars.append(photos[-1].with_suffix(".face"))
-        build_avatar([photos[-1]], avatars[-1], consent="corpus published for research", model=face_model)
+        build_avatar([photos[-1]], avatars[-1], consent="agreed: the speakers of GRID, 2006-01-01", model=face_model)
     check_likeness(photos, avatars, face_model)
 
 
@@ -96,7 +96,7 @@ def test_an_avatar_is_a_head_like_any_other(avatars: dict[str, Path]) -> None:
     path = avatars["tomas"]
     assert path.stat().st_size < 8_000_000
     face = load_face(str(path))
-    assert face.metadata["consent"]["statement"] == "drawn"
+    assert face.metadata["consent"]["statement"] == "nobody"
     assert face.synthetic_notice
     clip = Session(face=face).clip("Hello.", fps=10)
     assert len(clip.motion) > 5
@@ -122,7 +122,7 @@ def test_eyes_have_the_colour_that_is_chosen_and_wrinkles_stay_on_request(
     photos: dict[str, Path], avatars: dict[str, Path], face_model: Path, tmp_path: Path
 ) -> None:
     path = tmp_path / "noor.face"
-    built = build_avatar([photos["noor"]], path, consent="drawn", eye_color="blue", age_keep=True, model=face_model)
+    built = build_avatar([photos["noor"]], path, consent="nobody", eye_color="blue", age_keep=True, model=face_model)
     chosen, usual = load_face(str(path)), load_face(str(avatars["noor"]))
     assert "eyes: blue" in built.look.summary()
     assert "eyes: dark brown" in str(usual.metadata["look"])
@@ -131,7 +131,7 @@ def test_eyes_have_the_colour_that_is_chosen_and_wrinkles_stay_on_request(
     assert before[0] > before[2]
     assert _line_depth(chosen) > 1.1 * _line_depth(usual)
     with pytest.raises(InputError, match="there is no eye colour 'pink'; give #rrggbb or one of dark-brown, brown"):
-        build_avatar([photos["noor"]], path, consent="drawn", eye_color="pink", model=face_model)
+        build_avatar([photos["noor"]], path, consent="nobody", eye_color="pink", model=face_model)
 
 
 def _line_depth(face: Face) -> float:

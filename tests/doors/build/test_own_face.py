@@ -15,7 +15,7 @@ from tts2face.models.talker_file import read_talker
 from tts2face.video.tracking import FaceTracker
 
 N_RECORDINGS = 10
-CONSENT = "The speakers of GRID agreed to research and publication"
+CONSENT = "agreed: the speakers of GRID, 2006-01-01, to research and publication"
 TEXT = "Bob may move. We were away."
 
 

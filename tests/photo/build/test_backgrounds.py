@@ -51,7 +51,7 @@ def photo(person: np.ndarray, tmp_path: Path) -> Path:
 
 def test_a_person_is_told_from_a_room(photo: Path, person: np.ndarray, segmenter: Path, face_model: Path) -> None:
     said: list[str] = []
-    face = face_from_photo(photo, consent="drawn", model=face_model, on_warning=said.append)
+    face = face_from_photo(photo, consent="nobody", model=face_model, on_warning=said.append)
     assert not said
     view, true = face.light.view, person[..., 3] / 255.0
     apart = np.abs(view.alpha / 255.0 - true)
@@ -84,7 +84,7 @@ def test_a_person_whose_surroundings_look_like_him_is_not_cut_out(
     share = shown[..., 3:] / 255.0
     Image.fromarray((share * shown[..., :3] + (1 - share) * wall).astype(np.uint8)).save(tmp_path / "me.png")
     said: list[str] = []
-    face = face_from_photo(tmp_path / "me.png", consent="drawn", model=face_model, on_warning=said.append)
+    face = face_from_photo(tmp_path / "me.png", consent="nobody", model=face_model, on_warning=said.append)
     assert face.light.view.alpha is None
     assert any("is not told from the background" in sentence for sentence in said)
 
@@ -94,6 +94,6 @@ def test_without_the_segmentation_model_it_is_said(
 ) -> None:
     monkeypatch.setattr("tts2face.video.networks.is_segmenter", lambda _: False)
     said: list[str] = []
-    face = face_from_photo(photo, consent="drawn", model=face_model, on_warning=said.append)
+    face = face_from_photo(photo, consent="nobody", model=face_model, on_warning=said.append)
     assert face.light.view.alpha is None
     assert any("`tts2face corpus setup` adds the model" in sentence for sentence in said)

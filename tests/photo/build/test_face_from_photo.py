@@ -35,7 +35,7 @@ def photo(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 
 @pytest.fixture(scope="module")
 def face(photo: Path, face_model: Path) -> Face:
-    return face_from_photo(photo, consent="drawn", model=face_model)
+    return face_from_photo(photo, consent="nobody", model=face_model)
 
 
 def test_what_is_said_is_seen(face: Face, face_model: Path) -> None:
@@ -47,7 +47,7 @@ def test_real_people_speak(person: str, shared_recordings: Path, face_model: Pat
     frame = next(iter(read_frames(shared_recordings / "grid_talkers" / f"{person}.mpg")))
     Image.fromarray(frame.pixels).save(tmp_path / f"{person}.png")
     said: list[str] = []
-    face = face_from_photo(tmp_path / f"{person}.png", consent="drawn", model=face_model, on_warning=said.append)
+    face = face_from_photo(tmp_path / f"{person}.png", consent="nobody", model=face_model, on_warning=said.append)
     assert not said
     check_speech(face, face_model)
 
@@ -77,7 +77,7 @@ def closures(clip: Clip, landmarks: np.ndarray) -> list[int]:
 
 
 def test_the_same_photo_gives_the_same_face(photo: Path, face: Face, face_model: Path) -> None:
-    again = face_from_photo(photo, consent="drawn", model=face_model)
+    again = face_from_photo(photo, consent="nobody", model=face_model)
     np.testing.assert_array_equal(again.vertices, face.vertices)
     np.testing.assert_array_equal(again.shapes, face.shapes)
     assert face.metadata["name"] == photo.stem
@@ -94,7 +94,7 @@ def test_a_second_picture_gives_the_teeth(smile: Path, tmp_path: Path, face_mode
     photo, other = tmp_path / "me.png", tmp_path / "other.png"
     Image.fromarray(still("head", SIDE)).save(photo)
     Image.fromarray(still("zuri", SIDE, **SMILE)).save(other)
-    plain, own = (face_from_photo(photo, consent="drawn", model=face_model, smile=one) for one in (None, smile))
+    plain, own = (face_from_photo(photo, consent="nobody", model=face_model, smile=one) for one in (None, smile))
     assert PICTURED not in {part.name for part in plain.parts}
     assert PICTURED in {part.name for part in own.parts}
     for wrong, reason in (
@@ -103,11 +103,11 @@ def test_a_second_picture_gives_the_teeth(smile: Path, tmp_path: Path, face_mode
         (f"{smile}@2", r"smile\.png has one face, and no face 2"),
     ):
         with pytest.raises((DataError, InputError), match=reason):
-            face_from_photo(photo, consent="drawn", model=face_model, smile=wrong)
+            face_from_photo(photo, consent="nobody", model=face_model, smile=wrong)
 
 
 def test_a_session_shows_a_photo(photo: Path) -> None:
     with pytest.raises(InputError, match="a photo has its own face and hair"):
-        Session(face="ada", photo=photo, consent="drawn")
+        Session(face="ada", photo=photo, consent="nobody")
     with pytest.raises(InputError, match="state the consent"):
         Session(photo=photo)

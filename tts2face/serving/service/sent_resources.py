@@ -9,6 +9,7 @@ from typing import Any
 
 from tts2face.models.face_file import FORMAT_VERSION
 from tts2face.models.face_schema import PHOTOGRAPH
+from tts2face.serving.service.consents import check_consent
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.library import check_new_name
@@ -33,7 +34,7 @@ NO_PHOTOS = "this service has no faces of photos; its operator allows them with 
 
 @dataclass(frozen=True, slots=True)
 class SentPhoto:
-    """Statements with a photo: the statement of the person shown, what it makes, and the choices of each.
+    """Statements with a photo: the consent of the person shown, what it makes, and the choices of each.
 
     A picture that speaks takes the JSON of a ``fit``, a head the colour of its eyes and whether wrinkles stay.
     """
@@ -70,11 +71,12 @@ async def store_resource(state: ServiceState, key: ApiKey, sent: Sent) -> Stored
     Raises
     ------
     RefusedError
-        The key may not build, the name is wrong or taken, the quota is used up, too many files are checked, or this
-        one is refused.
+        The key may not build, the name is wrong or taken, the consent is none, the quota is used up, too many files are
+        checked, or this one is refused.
     """
     key = state.keys.with_scope(key, "build")
     check_new_name(sent.kind, sent.name)
+    check_consent(sent.photo.consent)
     await asyncio.to_thread(state.library.check_room, key, sent.kind, sent.name, sent.size)
     async with upload_folder(state.settings, state.decoders, key.name) as folder:
         given = folder.path / f"{sent.kind}.upload"

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import BackendError, InputError
+from tts2face.models.consent import consent_record
 from tts2face.processes.async_parent import AsyncChild
 from tts2face.processes.parent import ChildEndedError
 from tts2face.processes.program import ProcessLimits, Program
@@ -103,11 +104,12 @@ class Recordings:
         Raises
         ------
         InputError
-            There is no accepted take, or the recording is at work already.
+            There is no accepted take, the consent is none, or the recording is at work already.
         """
         if not self.accepted(number):
             raise InputError("there is no accepted take; record some prompts")
-        self._start(number, {"task": BUILD, "consent": consent})
+        stated = consent_record(self.store.name(number), consent)
+        self._start(number, {"task": BUILD, "consent": stated["statement"]})
 
     def speak(self, number: str, text: str) -> None:
         """Start to make the clip of a sentence.

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import DataError, InputError
-from tts2face.models.consent import PHOTO_TOOL, states_consent
+from tts2face.models.consent import PHOTO_TOOL, stated_consent
 from tts2face.photo.photograph import HEIC_BRANDS
 from tts2face.serving.work.character_archive import MAGIC as ARCHIVE_MAGIC
 from tts2face.serving.work.character_archive import unpack_character
@@ -143,7 +143,7 @@ def _check_talker(source: Path, out: Path) -> dict[str, Any]:
 
     _rewrite(source, out, TALKER, FORMAT_VERSION)
     found = read_talker(out)
-    if found.appearance is not None and not states_consent(found.metadata):
+    if found.appearance is not None and stated_consent(found.metadata) is None:
         raise DataError("it shows a person's face, but states no consent; build it with --consent")
     _try_speech(out)
     return without_name(asdict(describe_talker(out)))
@@ -167,7 +167,7 @@ def _check_face(source: Path, out: Path, character: bytes | None = None) -> dict
 
     _rewrite(source, out, FACE, face_file.FORMAT_VERSION, character)
     face = face_file.read_face(out)
-    if is_of_photo(face.metadata, in_picture=face.light.is_flat) and not states_consent(face.metadata):
+    if is_of_photo(face.metadata, in_picture=face.light.is_flat) and stated_consent(face.metadata) is None:
         raise DataError("it shows a person's photograph, but states no consent; make it with --consent")
     for identity in describe_face(out).identities:
         face_file.read_face(out, identity)

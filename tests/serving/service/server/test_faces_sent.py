@@ -40,11 +40,11 @@ def photo(picture: np.ndarray, **parts: str) -> dict[str, Any]:
 
 
 def test_photos_are_refused_where_the_operator_does_not_allow_them(ask: Ask) -> None:
-    answer = ask("ann", "POST", "/v1/faces", **photo(np.zeros((100, 100, 3), np.uint8), consent="I agree to this."))
+    answer = ask("ann", "POST", "/v1/faces", **photo(np.zeros((100, 100, 3), np.uint8), consent="me: for a test"))
     assert refusal(answer) == (403, "forbidden")
     assert "its operator allows them with the setting photos" in answer.json()["error"]["message"]
     words = form("names")
-    words["data"]["consent"] = "I agree."
+    words["data"]["consent"] = "I agree to this."
     assert refusal(ask("ann", "POST", "/v1/dictionaries", **words)) == (422, "invalid_request")
 
 
@@ -64,7 +64,7 @@ def test_parts_that_belong_to_a_photo_are_checked(ask_with_photos: Ask) -> None:
     pink = ask_with_photos("ann", "POST", "/v1/faces", **photo(plain, makes="avatar", eye_color="pink"))
     assert refusal(pink) == (400, "invalid_request")
     assert "there is no eye colour 'pink'; give #rrggbb or one of dark-brown, brown," in pink.text
-    barred = ask_with_photos("eve", "POST", "/v1/faces", **photo(plain, consent="drawn"))
+    barred = ask_with_photos("eve", "POST", "/v1/faces", **photo(plain, consent="nobody"))
     assert refusal(barred) == (403, "forbidden")
     assert "the key eve may make no faces of photos" in barred.json()["error"]["message"]
     no_picture = form("tom") | {"data": {"name": "tom", "makes": "avatar"}}
@@ -77,11 +77,11 @@ def test_a_photo_becomes_a_head_and_is_not_kept(
 ) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     picture = still("tomas", 400)
-    parts = {"consent": "I agree to this.", "makes": "avatar", "eye_color": "green", "age_keep": "true"}
+    parts = {"consent": "me: for a test", "makes": "avatar", "eye_color": "green", "age_keep": "true"}
     made = ask_with_photos("ann", "POST", "/v1/faces", **photo(picture, **parts))
     assert made.status_code == 201, made.text
     assert made.json()["about"]["takes_haircuts"]
-    parts = photo(still("tomas", 480), name="large", consent="drawn", makes="avatar")
+    parts = photo(still("tomas", 480), name="large", consent="nobody", makes="avatar")
     large = ask_with_photos("ann", "POST", "/v1/faces", **parts)
     assert refusal(large) == (422, "invalid_data")
     assert "the photo has 480 x 480 pixels, more than 200000" in large.json()["error"]["message"]
@@ -98,7 +98,7 @@ def test_heads_of_photos_are_refused_as_photos_are(ask: Ask, ask_with_photos: As
     """The file of a head that was made of pictures elsewhere, also one whose photograph is not in it."""
     write_made_face(tmp_path / "a.face")
     arrays, header = read_tensors(tmp_path / "a.face", "face", 1)
-    header["metadata"] |= {"made_by": PHOTO_TOOL, "consent": dict(consent_record("Tom", "I agree to this."))}
+    header["metadata"] |= {"made_by": PHOTO_TOOL, "consent": dict(consent_record("Tom", "me: for a test"))}
     write_tensors(tmp_path / "a.face", "face", 1, arrays, header)
     content = (tmp_path / "a.face").read_bytes()
     refused = ask("ann", "POST", "/v1/faces", **form("tom", content))
@@ -122,7 +122,7 @@ def test_a_model_that_is_missing_here_is_no_fault_of_the_file(
     monkeypatch.setattr(importing, "import_face", find)
     monkeypatch.setattr(face_from_photo, "face_from_photo", find)
     monkeypatch.setattr(decoders, "run_take_tool", run)
-    parts = photo(np.zeros((100, 100, 3), np.uint8), consent="I agree to this.", makes=makes)
+    parts = photo(np.zeros((100, 100, 3), np.uint8), consent="me: for a test", makes=makes)
     for answer in (
         ask("ann", "POST", "/v1/faces", **form("x", GLB)),
         ask_with_photos("ann", "POST", "/v1/faces", **parts),

@@ -267,12 +267,12 @@ def test_a_photo_becomes_a_face_that_keeps_the_consent(tmp_path: Path) -> None:
     message, _ = check("face", tmp_path / "photo.jpg", tmp_path)
     assert "state the consent" in message
     (tmp_path / "checked").rmdir()
-    state(tmp_path, consent="I agree to this.", fit='{"pivot": [170, 200]}')
+    state(tmp_path, consent="me", fit='{"pivot": [170, 200]}')
     message, checked = check("face", tmp_path / "photo.jpg", tmp_path)
     assert message == ""
     face = read_face(checked / "content")
     assert isinstance(face.light, Photographed)
-    assert face.metadata["consent"]["statement"] == "I agree to this."
+    assert face.metadata["consent"]["statement"] == "me"
     assert face.metadata["name"] == "tom"
     assert face.metadata["fit"]["pivot"] == pytest.approx([170, 200], abs=0.2)
     with Image.open(checked / "picture.png") as picture:
@@ -290,7 +290,7 @@ def test_a_picture_without_a_face_is_refused(tmp_path: Path) -> None:
 
 def state(folder: Path, **more: Any) -> None:
     """State who is shown in a photo of a folder."""
-    stated = {"name": "tom", "consent": "drawn", "max_pixels": 1_000_000} | more
+    stated = {"name": "tom", "consent": "nobody", "max_pixels": 1_000_000} | more
     (folder / STATEMENT).write_text(json.dumps(stated))
 
 

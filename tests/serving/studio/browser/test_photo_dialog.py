@@ -15,12 +15,13 @@ from tests.photo.pictures import still
 from tests.running import ServeProcess, eventually, serve_process
 from tests.serving.studio.browser.test_animate_page import AXE
 from tests.serving.studio.chromium import Browser
+from tests.serving.studio.consents import give_consent
 from tests.serving.studio.served import Page
 from tts2face.models.face_file import read_face
 from tts2face.serving.studio.app import RECONNECT_S
 
 SIDE = 480
-CONSENT = "I agree that my face speaks this."
+CONSENT = "agreed: Tom Smith, 2026-01-02"
 DROP = """const bytes = Uint8Array.from(atob(arguments[0]), (one) => one.charCodeAt(0)), data = new DataTransfer();
     data.items.add(new File([bytes], arguments[1], {type: 'image/png'}));
     const options = {dataTransfer: data, bubbles: true, cancelable: true};
@@ -99,7 +100,7 @@ def test_places_are_dragged_and_the_face_is_made_with_them(
     assert place(dialog, "left_eye-upper-0") == corner
     dialog.click("Make the face")
     dialog.wait("return document.body.innerText.includes('state the consent')", seconds=60)
-    dialog.type("Statement of consent of the person, or: drawn", CONSENT)
+    give_consent(dialog, "Tom Smith", "2026-01-02")
     dialog.click("Make the face")
     dialog.wait("return !document.querySelector('.q-dialog .photo-dialog')", seconds=120)
     faces = {one["name"]: one for one in httpx.get(f"{service.url}/v1/faces").json()["data"]}
@@ -143,7 +144,7 @@ def test_a_head_is_made_in_place_of_a_picture_that_speaks(dialog: Browser, servi
     dialog.run(f"{blue}.click()")
     dialog.wait("return document.querySelector('.photo-found .q-select').innerText.includes('blue')")
     dialog.type("Name of the face", "tom-head")
-    dialog.type("Statement of consent of the person, or: drawn", CONSENT)
+    give_consent(dialog, "Tom Smith", "2026-01-02")
     dialog.click("Make the face")
     dialog.wait("return !document.querySelector('.q-dialog .photo-dialog')", seconds=240)
     made = httpx.get(f"{service.url}/v1/faces/tom-head").json()

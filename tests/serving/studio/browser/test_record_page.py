@@ -9,6 +9,7 @@ import pytest
 from corpus_tools.prompts.coverage import count_units, sentence_units
 from corpus_tools.tools.recordings import prompts_answer
 from tests.serving.studio.chromium import Browser
+from tests.serving.studio.consents import give_consent
 from tts2face.models.talker_file import load_talker
 from tts2face.serving.service.keys import LOCAL_KEY
 from tts2face.serving.studio.recordings import RecordingStore
@@ -83,11 +84,14 @@ def wait_for_states(browser: Browser, *states: str) -> None:
 def build_and_speak(browser: Browser, folder: Path) -> None:
     browser.click("Build the talker")
     browser.wait("return document.body.innerText.includes('state the consent')")
-    browser.type("Statement of consent", "I, Test person, agree to this test.")
+    give_consent(browser, "Test person", "2026-01-02", "for this test")
     browser.click("Build the talker")
     done = "const text = document.body.innerText; return text.match(/(The talker .* is made of|.* refused).*/)?.[0]"
     check_takes(browser.wait(done, seconds=240))
-    assert load_talker(str(folder / "talker.talker")).metadata["consent"]["statement"].startswith("I, Test person")
+    assert (
+        load_talker(str(folder / "talker.talker")).metadata["consent"]["statement"]
+        == "agreed: Test person, 2026-01-02, for this test"
+    )
     browser.type("First sentence", "Now I speak.")
     browser.click("Speak")
     browser.wait("return document.querySelector('video[aria-label^=First]')?.readyState >= 2", seconds=240)

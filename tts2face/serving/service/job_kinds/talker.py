@@ -8,7 +8,8 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.datastructures import UploadFile
 
-from tts2face.models.consent import states_consent
+from tts2face.models.consent import EXAMPLE, THREE_ANSWERS
+from tts2face.serving.service.consents import check_consent
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.job_kinds.order import FormPart, JobKind, JobOrder
 from tts2face.serving.service.uploads import MAX_TRANSCRIPT_BYTES
@@ -45,8 +46,8 @@ class TalkerRequest(BaseModel):
         str | None,
         Field(
             max_length=2000,
-            description="Statement of consent of the person shown; required with appearance, stored in the talker.",
-            examples=["I, Anna Example, agree that my face is used for this service."],
+            description=f"Consent of the person shown, required with appearance and stored in it: {THREE_ANSWERS}.",
+            examples=[EXAMPLE],
         ),
     ] = None
 
@@ -80,8 +81,8 @@ async def prepare_talker(order: JobOrder) -> dict[str, Any]:
     asked: TalkerRequest = order.options
     if order.upload.seconds is None:
         raise RefusedError(422, "invalid_request", "there is no recording; send it as the part `video` of a form")
-    has_words = bool(asked.consent and asked.consent.strip())
-    if asked.appearance != has_words or (has_words and not states_consent({"consent": {"statement": asked.consent}})):
+    consent = check_consent(asked.consent)
+    if asked.appearance != (consent is not None):
         raise RefusedError(
             422, "consent",
             "a talker with its own face needs the consent of the person shown; give appearance and consent, or neither",
@@ -90,7 +91,7 @@ async def prepare_talker(order: JobOrder) -> dict[str, Any]:
     await _check_open_jobs(order)
     await asyncio.to_thread(library.check_room, order.key, TALKER, asked.name, 0)
     return {
-        "owner": order.key.name, "name": asked.name, "appearance": asked.appearance, "consent": asked.consent,
+        "owner": order.key.name, "name": asked.name, "appearance": asked.appearance, "consent": consent,
         "provenance": {
             "name": asked.name, "language": asked.language, "licence": asked.licence,
             "attribution": asked.attribution, "sources": "a recording sent to the service",

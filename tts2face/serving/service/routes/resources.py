@@ -15,6 +15,7 @@ from fastapi.responses import JSONResponse, Response
 from starlette.datastructures import FormData, UploadFile
 
 from tts2face.interchange.characters.shapes import TRANSFER
+from tts2face.models.consent import EXAMPLE, THREE_ANSWERS
 from tts2face.models.named_colours import EYE_COLOURS, parse_eye_colour
 from tts2face.serving.service.access import require_scope
 from tts2face.serving.service.errors import RefusedError
@@ -138,8 +139,8 @@ def _form(kind: str) -> dict[str, Any]:
         }  # fmt: skip
         parts["consent"] = {
             "type": "string",
-            "example": "I agree that my face speaks what this service is asked for.",
-            "description": "With a photo: the person's statement, kept in the face; drawn if it is nobody's.",
+            "example": EXAMPLE,
+            "description": f"With a photo: the person's consent, kept in the face: {THREE_ANSWERS}.",
         }
         parts["makes"] = {
             "type": "string",

@@ -15,7 +15,6 @@ from nicegui import events, ui
 from tts2face.models.named_colours import EYE_COLOURS
 from tts2face.serving.service.sent_resources import (
     AVATAR,
-    MAX_CONSENT,
     MAX_NAME,
     SPEAKING_PICTURE,
     Sent,
@@ -25,6 +24,7 @@ from tts2face.serving.service.sent_resources import (
 )
 from tts2face.serving.service.uploads import UPLOAD_PREFIX, UploadFolder
 from tts2face.serving.studio.components.photo_places import PhotoPlacesElement
+from tts2face.serving.studio.pages.consent_form import ConsentForm
 from tts2face.serving.studio.pages.frame import file_field, heading, held_dialog, shown_errors
 from tts2face.serving.studio.pages.open_page import OpenPage
 from tts2face.serving.work.resource_check import FACE
@@ -74,9 +74,7 @@ class PhotoDialog:
                     self._age_keep = ui.checkbox("Keep wrinkles")
                 self._places = PhotoPlacesElement(self._change)
                 self._name = ui.input("Name of the face").props(f"dense outlined maxlength={MAX_NAME}")
-                self._consent = ui.textarea("Statement of consent of the person, or: drawn").props(
-                    f"outlined autogrow dense maxlength={MAX_CONSENT}"
-                )
+                self._consent = ConsentForm()
             self._status = ui.label().props("role=status").classes("note")
             with ui.row():
                 self._make = ui.button("Make the face", on_click=self._store)
@@ -129,7 +127,7 @@ class PhotoDialog:
         async def save(path: Path) -> None:
             await asyncio.to_thread(shutil.copyfile, photo, path)
 
-        consent = self._consent.value or None
+        consent = self._consent.statement or None
         made = SentPhoto(consent)
         if self._makes.value == AVATAR:
             made = SentPhoto(consent, AVATAR, eye_color=self._eyes.value or None, age_keep=self._age_keep.value)
@@ -158,7 +156,8 @@ class PhotoDialog:
         self._upload.reset()
         self._places.hide()
         self._show_found(False)
-        self._name.value = self._consent.value = self._status.text = ""
+        self._name.value = self._status.text = ""
+        self._consent.clear()
         self._makes.value = SPEAKING_PICTURE
         self._eyes.value, self._age_keep.value = "", False
         self._show_choice()

@@ -13,6 +13,7 @@ from tts2face.interchange.exports.visemes import viseme_table
 from tts2face.serving.service.page_addresses import PAGES, RECORDINGS
 from tts2face.serving.studio.components.recorder import STYLE, Recorder, VisemeMap
 from tts2face.serving.studio.pages.choices import languages
+from tts2face.serving.studio.pages.consent_form import ConsentForm
 from tts2face.serving.studio.pages.frame import RECORD_PAGE, begin_page, confirm, heading, page_bar, sentence
 from tts2face.serving.studio.recorded_talker import CLIP, REPORT, TALKER
 from tts2face.serving.studio.recording_work import Recordings, recording_owner
@@ -173,12 +174,11 @@ class _RecordingPage:
     def _build_panel(self) -> None:
         heading(2, "Your talker")
         self._count = ui.label()
-        consent = ui.input("Statement of consent", placeholder="I, NAME, agree that my face is used for ...")
-        consent.props("outlined dense")
+        consent = ConsentForm()
         with ui.row():
             self._build = ui.button(
                 "Build the talker",
-                on_click=_reporting(lambda: self._recordings.build(self._number, consent.value or "")),
+                on_click=_reporting(lambda: self._recordings.build(self._number, consent.statement)),
             )
             self._cancel = ui.button("Cancel", on_click=lambda: self._recordings.cancel(self._number))
             self._cancel.props("flat")
