@@ -81,7 +81,7 @@ def build_avatar(  # noqa: PLR0913 - one parameter an option
     seen, neutral = _read(photos, head, model, on_warning)
     mirrored = [_mirrored(observed, mirror_table(head)) for observed in seen]
     fitted = fit_person(head, np.mean(neutral, axis=0))
-    face, look = paint_person(fitted, [*seen, *mirrored], lambda done, of: None, choices)
+    face, look = paint_person(fitted, [*seen, *mirrored], lambda done, of: None, choices, model=model)
     face = replace(
         face,
         metadata={

@@ -36,7 +36,7 @@ from tts2face.picture.occlusion import bake_occlusion
 from tts2face.processes.threads import available_cores
 from tts2face.storage.shipped import find_file
 from tts2face.types import Progress, ignore_progress
-from tts2face.video.networks import find_bundle
+from tts2face.video.networks import LandmarkNetwork, find_bundle, find_segmenter
 
 AROUND_GLOSS = 30.0  # texels, Gaussian, about 5 mm, whose colours lie under gloss
 SOURCE_FACE = "head"  # the shipped face that is adapted
@@ -102,7 +102,10 @@ def build_face(
         mode = mode_fitter(fitted.shaped, fitted.used)
         model = dense_model(fitted.shaped, mode, landmarks, fitted.person, n_modes)
     face, look = paint_person(
-        fitted, landmarks, lambda done, of: on_progress(len(videos) + done * len(videos) // of, 2 * len(videos))
+        fitted,
+        landmarks,
+        lambda done, of: on_progress(len(videos) + done * len(videos) // of, 2 * len(videos)),
+        model=run_options.model,
     )
     words = ["tts2face", "corpus", "face", recordings.name, "--out", out.name]
     metadata = {
@@ -145,13 +148,22 @@ def fit_person(head: Face, person: FloatArray) -> FittedHead:
 
 
 def paint_person(
-    fitted: FittedHead, seen: Sequence[TrackedPictures], on_progress: Progress, choices: LookChoices = AS_SEEN
+    fitted: FittedHead,
+    seen: Sequence[TrackedPictures],
+    on_progress: Progress,
+    choices: LookChoices = AS_SEEN,
+    *,
+    model: Path | None = None,
 ) -> tuple[Face, PersonLook]:
-    """The head with the skin, eyes, hair and shirt that frames show, and what was found or chosen."""
+    """The head with the skin, eyes, hair and shirt that frames show, and what was found or chosen.
+
+    `model` is the bundle of landmark models beside which the network lies that reads persons; found if None.
+    """
     canvas = build_canvas(fitted.shaped)
     seen_vertices = np.unique(canvas.texels.corners[canvas.share > 0])
     fit = build_picture_fitter(fitted.shaped, canvas.opened, fitted.used, seen_vertices)
-    sampler = LookSampler(fit)
+    segmenter = find_segmenter(model)
+    sampler = LookSampler(fit, None if segmenter is None else LandmarkNetwork(segmenter.read_bytes()))
     skin = average_skin_colours(fitted.shaped, canvas, fit, seen, on_frame=sampler.add, on_progress=on_progress)
     look = choices.applied(sampler.look())
     shown, side = canvas.texels.at(skin.rows), len(canvas.texture)

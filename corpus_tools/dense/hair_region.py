@@ -1,4 +1,4 @@
-"""Hair in videos: a head's median picture, the hair in it, how far it reaches, and its colour."""
+"""Hair in pictures: what of a person is hair, and its colour."""
 
 from dataclasses import dataclass
 
@@ -6,39 +6,34 @@ import numpy as np
 
 from corpus_tools.dense.light_colour import log_colour
 from corpus_tools.dense.skin_canvas import polygon_depth
-from tts2face.models.landmarks import CHIN, FACE_OVAL
+from tts2face.models.landmarks import CHIN, FACE_OVAL, LID_RINGS, OUTER_LIP_LOWER, OUTER_LIP_UPPER
 from tts2face.numeric.arrays import FloatArray, Mask
 
 # of the grid in which hair is sought
 CELL_MM = 3.0
-ACROSS_MM = np.arange(-165.0, 165.1, CELL_MM)  # of the picture, from between the eyes
-UP_MM = np.arange(190.0, -200.1, -CELL_MM)
+ACROSS_MM = np.arange(-180.0, 180.1, CELL_MM)  # of the picture, from between the eyes
+UP_MM = np.arange(201.0, -231.1, -CELL_MM)
 DEPTH_PERCENTILE = 20  # of the face's outline: the depth of the plane, near that of the hair's outline
-FOREHEAD = 10  # landmark; skin on most people, hair on some
-CROWN_MM, CROWN_HALF_MM = (24.0, 38.0), 36.0  # above it, and beside it: inside the skull of everyone, never background
+FOREHEAD, BROW_TOPS = 10, (105, 66, 334, 296)  # landmarks; the first is skin on most people, hair on some
+LIP_RING = (*OUTER_LIP_UPPER, *OUTER_LIP_LOWER[-2:0:-1])
+PERSON = 0.5  # share from which a cell shows the person
+# Cells of surely something: skin below the brows, inside the face and off eyes and lips; the crown above the forehead;
+# clothes below and beside the neck, and before it.
+IN_FACE_MM, BELOW_BROWS_MM, OFF_EYES_MM, OFF_LIPS_MM = 8.0, 12.0, 9.0, 5.0
+SURE_SKIN = 0.75  # of these cells: the others are glasses, beards and shadows
+CROWN_MM, CROWN_HALF_MM, OFF_OVAL_MM, INSIDE_CELLS = 10.0, 75.0, 4.0, 2
+CLOTHES_MM, SHOULDER_MM, CHEST_MM, COLLAR_MM, COLLAR_HALF_MM = 70.0, 95.0, 110.0, 20.0, 28.0
 # Difference from skin, as a distance: 1 for these logarithms of luminance (darker) and of R/G and B/G.
 DARKER, OTHER_HUE, IS_HAIR = 0.45, 0.28, 0.9
-SHADED = 1.2  # the first of them outside the crown, where skin is in the shadow of jaw and hair
-MIN_HAIRY_SHARE = 0.6  # of the crown: bald people .23 to .29, white stubble .43, others from .92
-LUMINANCE_SCALE, CHROMA_SCALE, WEAK_LIGHT = 1.0, 0.3, 0.01  # distances between colours of hair; dark ones have no hue
-VIVID = 0.4  # of the hair's difference in hue from skin: chroma scale of vivid hair, whose shine varies in hue
-LIGHT_SHARE = 0.9  # of the crown's cells: the others are shine
-LIGHTER, DARK = 1.0, -0.5  # logarithm by which other hair is lighter at most, and off skin what may always be hair
-BESIDE_SKIN = 0.3  # logarithm of luminance: no hair has so much darker and so much lighter cells than skin
-NEAR_HAIR, OFF_BACKGROUND = 0.35, 0.6
-WALL_MM = 150.0  # of height, over which a wall may change by a distance of 1
-N_GROWTHS = 6
-MIN_GROWTH = 1.5  # of the crown's cells: hair that grows less cannot be distinguished from the wall
-EDGE_CELLS, MIN_ROW_CELLS = 4, 20
-INSIDE_MM = 4.0  # of the face's oval: no hair
-TEMPLE_MM, MIN_LOCK_MM = 36.0, 9.0  # hair beside the face, from the middle of it; thinner locks do not count
-NECK_MM = 45.0  # half width, in which nothing below the chin is hair
-# Lowest hair beside the face, from the chin, mean of both sides: haircuts with free ears -95 and higher up, bobs -58 to
-# -7, long hair from 8. A side that shows none beside the temple does not count: its hair is like the wall.
-BOB_MM, LONG_MM, TEMPLE_HAIR_MM = -75.0, 0.0, 10.0
-FLAT_MM = (55.0, 30.0)  # hair above `FOREHEAD`, and both sides' at the temples: less of both lies on the skull
-# Flat hair is cropped where the skin shows through, up to this difference from it, or where the temples show so little.
-SEE_THROUGH, CROPPED_MM = 2.0, 6.0
+CHROMA_SCALE, WEAK_LIGHT = 0.3, 0.01  # of distances between colours, beside luminance; dark ones have no hue
+N_NEAREST, MIN_SEEDS = 8, 60
+SMALL, MOST_APART = 0.05, 2.5  # added to distances before logarithms, and most of their difference
+SMOOTH_CELLS = 1.0  # Gaussian
+BROW_MM, NECK_MM = 4.0, 12.0  # above the brows nothing inside the face is sure; below the chin clothes may be like hair
+THROAT_HALF_MM, CLOTHES_APART, FALL_CELLS = 30.0, 0.35, 2  # hair falls: it lies below hair, at most so far beside it
+MIN_HAIRY = 0.35  # share of the crown: bald people .19 to .31, cropped ones from .39
+# Without a segmentation network, the person is what differs from the edges of the picture.
+EDGE_CELLS, MIN_ROW_CELLS, OFF_BACKGROUND, WALL_MM = 4, 20, 0.6, 150.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,70 +46,103 @@ class Portrait:
         By `UP_MM` and `ACROSS_MM`; NaN outside of the pictures.
     marks : (468, 3)
         The head's landmarks, mm.
+    share : (R, C)
+        Share of the person in each cell; None where no network has read it.
+    fine : (2 R - 1, 2 C - 1, 3)
+        One picture, in cells of half the size; None if there is none.
     """
 
     srgb: FloatArray
     marks: FloatArray
+    share: FloatArray | None = None
+    fine: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeenHair:
-    """Length class, hair cells (R, C), background's or skin's cells (R, C), and colour (3,), `log_colour`, or NaN."""
+    """Hair cells (R, C), background's or skin's cells (R, C), colour (3,), `log_colour`, or NaN; share of the crown.
 
-    length: str
+    `hairy` is the share that is darker than skin where no hair is found, NaN if the crown is outside of the picture.
+    """
+
     region: Mask
     other: Mask
     colour: FloatArray
+    hairy: float
 
 
-def portrait_grid(marks: FloatArray) -> FloatArray:
-    """(R * C, 3) places of a portrait's cells on the head, mm."""
-    across, up = np.meshgrid(ACROSS_MM, UP_MM)
+def portrait_grid(marks: FloatArray, step: int = 1) -> FloatArray:
+    """(R * C, 3) places of a portrait's cells on the head, mm; of half the size with a `step` of 2."""
+    across, up = (np.linspace(axis[0], axis[-1], step * (len(axis) - 1) + 1) for axis in (ACROSS_MM, UP_MM))
+    wide, high = np.meshgrid(across, up)
     depth = np.percentile(marks[list(FACE_OVAL), 2], DEPTH_PERCENTILE)
-    return np.column_stack([across.ravel(), up.ravel(), np.full(across.size, depth)])
+    return np.column_stack([wide.ravel(), high.ravel(), np.full(wide.size, depth)])
 
 
 def find_hair(portrait: Portrait, skin: FloatArray) -> SeenHair:
     """Hair in a portrait of a person with a skin colour (3,), `log_colour`.
 
-    Colours of the crown, inside the skull, separate hair from skin; neighbours that are nearer to hair already found
-    than to the background at the picture's edges, and are not shaded skin, follow in turn.
+    Cells of the person are hair where their colours are nearer to those of the crown than to those of the face, and
+    below the chin to those of clothes; all are connected with the crown.
     """
-    across, up = np.meshgrid(ACROSS_MM, UP_MM)
+    from scipy.ndimage import binary_erosion, gaussian_filter, label
+
+    marks, (across, up) = portrait.marks, np.meshgrid(ACROSS_MM, UP_MM)
     known = np.isfinite(portrait.srgb[..., 0])
     colours = log_colour(np.nan_to_num(portrait.srgb))
-    off = colours - skin
-    above = up - portrait.marks[FOREHEAD, 1]
-    crown = (np.abs(across) < CROWN_HALF_MM) & (above > CROWN_MM[0]) & (above < CROWN_MM[1])
-    unlike = difference_from_skin(off, np.where(crown, DARKER, SHADED).astype(np.float64))
-    seed = crown & known & (unlike > IS_HAIR)
-    background = known & _edge_cells(known) & (up > portrait.marks[CHIN, 1])
-    plain = SeenHair("", seed & False, background, np.full(3, np.nan))
-    # most of the crown lies outside the picture
-    if 2 * (crown & known).sum() < crown.sum():
-        return plain
-    if seed.sum() < MIN_HAIRY_SHARE * (crown & known).sum():
-        return SeenHair("bald", plain.region, background | (known & (unlike < IS_HAIR)), plain.colour)
-    is_inside = _oval_depth(portrait.marks, across, up) > INSIDE_MM
-    throat = (up < portrait.marks[CHIN, 1]) & (np.abs(across) < NECK_MM)
-    seed = _without_gloss(seed, off[..., 0])
-    most = max(np.quantile(off[seed, 0], LIGHT_SHARE) + LIGHTER, DARK)
-    allowed = known & (unlike > IS_HAIR) & ~is_inside & ~throat & (off[..., 0] < most)
-    space = _colour_space(colours, np.median(off[seed], axis=0))
-    region = _grow(space, seed, background, (allowed, up < portrait.marks[CHIN, 1]))
-    colour: FloatArray = np.median(colours[region], axis=0)
-    other = background | (known & (unlike < IS_HAIR))
-    length = _length(region, portrait.marks, colour - skin)
-    is_distinct = region.sum() > MIN_GROWTH * seed.sum()
-    return SeenHair(length if is_distinct or length != "cropped" else "flat", region, other, colour)
+    light = np.exp(colours[..., :1])
+    space = np.concatenate([colours[..., :1], colours[..., 1:] * light / (light + WEAK_LIGHT) / CHROMA_SCALE], axis=-1)
+    oval, chin, brow = ring_depth(marks, FACE_OVAL), marks[CHIN, 1], marks[list(BROW_TOPS), 1].max()
+    person = known & _person(portrait, space, known, oval)
+    is_skin = _skin_cells(portrait, person, oval, space)
+    unlike = difference_from_skin(colours - skin, DARKER)
+    above = up - marks[FOREHEAD, 1]
+    crown = (above > CROWN_MM) & (np.abs(across) < CROWN_HALF_MM) & (oval < -OFF_OVAL_MM)
+    seen = crown & person & binary_erosion(person | ~known, iterations=INSIDE_CELLS)
+    other, nothing = known & (~person | (unlike < IS_HAIR)), np.full(3, np.nan)
+    top = crown & (above < 2 * CLOTHES_MM / 3) & (np.abs(across) < CROWN_HALF_MM / 2)
+    if 2 * (top & known).sum() < top.sum():
+        return SeenHair(seen & False, other, nothing, np.nan)
+    seed = seen & (unlike > IS_HAIR)
+    hairy = float(seed.sum() / max(seen.sum(), 1))
+    if hairy < MIN_HAIRY:
+        # shaved hair is darker than skin, gloss is lighter
+        shaded = seen & (colours[..., 0] - skin[0] < -DARKER)
+        return SeenHair(seen & False, other, nothing, float(shaded.sum() / max(seen.sum(), 1)))
+    to_hair = _distance(space, seed)
+    apart = np.clip(np.log(_distance(space, is_skin) + SMALL) - np.log(to_hair + SMALL), -MOST_APART, MOST_APART)
+    hair = person & (gaussian_filter(apart, SMOOTH_CELLS) > 0) & ~((oval > 0) & (up < brow + BROW_MM))
+    clothes = person & (up < chin - CLOTHES_MM) & ((np.abs(across) > SHOULDER_MM) | (up < chin - CHEST_MM))
+    clothes |= person & (up < chin - COLLAR_MM) & (np.abs(across) < COLLAR_HALF_MM) & (unlike > IS_HAIR)
+    low = up < chin - NECK_MM
+    if clothes.sum() > MIN_SEEDS:
+        from_clothes = np.log(_distance(space, clothes) + SMALL) - np.log(to_hair + SMALL)
+        hair &= ~low | (gaussian_filter(from_clothes, SMOOTH_CELLS) > CLOTHES_APART)
+    hair = _falling(hair & ~(low & (np.abs(across) < THROAT_HALF_MM)), low.any(axis=1))
+    numbers, _ = label(hair | seed, np.ones((3, 3)))
+    hair = np.isin(numbers, np.unique(numbers[seed]))
+    return SeenHair(hair, other, np.median(colours[hair], axis=0), hairy)
 
 
-def _without_gloss(hair: Mask, light: FloatArray) -> Mask:
-    """Cells of a crown without those lighter than skin where others are darker: dark hair and gloss of the skin."""
-    if not hair.any():
-        return hair
-    low, high = np.quantile(light[hair], [1 - LIGHT_SHARE, LIGHT_SHARE])
-    return hair & (light < 0) if low < -BESIDE_SKIN and high > BESIDE_SKIN else hair
+def _skin_cells(portrait: Portrait, person: Mask, oval: FloatArray, space: FloatArray) -> Mask:
+    """Cells of the face that surely show skin."""
+    marks, up = portrait.marks, UP_MM[:, None]
+    eyes = np.maximum(*(ring_depth(marks, ring) for ring in LID_RINGS))
+    brow = marks[list(BROW_TOPS), 1].max()
+    inside = person & (oval > IN_FACE_MM) & (up < brow - BELOW_BROWS_MM)
+    inside &= (eyes < -OFF_EYES_MM) & (ring_depth(marks, LIP_RING) < -OFF_LIPS_MM)
+    off = np.linalg.norm(space - np.median(space[inside], axis=0), axis=-1)
+    return np.asarray(inside & (off < np.quantile(off[inside], SURE_SKIN)))
+
+
+def _falling(hair: Mask, is_low: Mask) -> Mask:
+    """Hair (R, C) without what lies in low rows and not below other hair."""
+    from scipy.ndimage import binary_dilation
+
+    found = hair.copy()
+    for row in np.flatnonzero(is_low)[1:]:
+        found[row] &= binary_dilation(found[row - 1], iterations=FALL_CELLS)
+    return found
 
 
 def difference_from_skin(off: FloatArray, darker: float | FloatArray) -> FloatArray:
@@ -125,75 +153,35 @@ def difference_from_skin(off: FloatArray, darker: float | FloatArray) -> FloatAr
     return scaled
 
 
-def _edge_cells(known: Mask) -> Mask:
-    """The first and last cells of each row that is in the pictures."""
-    edges = np.zeros_like(known)
-    for row in np.flatnonzero(known.sum(axis=1) > MIN_ROW_CELLS):
-        inside = np.flatnonzero(known[row])
-        edges[row, inside[1 : 1 + EDGE_CELLS]] = edges[row, inside[-1 - EDGE_CELLS : -1]] = True
-    return edges
-
-
-def _oval_depth(marks: FloatArray, across: FloatArray, up: FloatArray) -> FloatArray:
+def ring_depth(marks: FloatArray, ring: tuple[int, ...]) -> FloatArray:
+    """(R, C) distance of the cells from a ring of landmarks, mm, positive inside."""
+    across, up = np.meshgrid(ACROSS_MM, UP_MM)
     places = np.column_stack([across.ravel(), up.ravel()])
-    depth = np.asarray(polygon_depth(places, marks[list(FACE_OVAL), :2], 2 * INSIDE_MM), np.float64)
+    depth = np.asarray(polygon_depth(places, marks[list(ring), :2], CROWN_HALF_MM), np.float64)
     return depth.reshape(across.shape)
 
 
-def _colour_space(colours: FloatArray, off: FloatArray) -> FloatArray:
-    """(R, C, 3) colours in which distances of 1 are large, for hair that differs from skin by `off` (3,)."""
-    light = np.exp(colours[..., :1])
-    scale = max(CHROMA_SCALE, VIVID * float(np.linalg.norm(off[1:])))
-    return np.concatenate(
-        [colours[..., :1] / LUMINANCE_SCALE, colours[..., 1:] * light / (light + WEAK_LIGHT) / scale], axis=-1
-    )
-
-
-def _grow(space: FloatArray, seed: Mask, background: Mask, limits: tuple[Mask, Mask]) -> Mask:
-    """Cells of hair, connected with `seed`; `limits`: where hair may be, and where clothes are excluded strictly."""
-    from scipy.ndimage import label
+def _distance(space: FloatArray, seeds: Mask) -> FloatArray:
+    """(R, C) mean distance of colours from the nearest ones of some cells."""
     from scipy.spatial import cKDTree
 
-    allowed, is_low = limits
-    cells = space.reshape(-1, 3)
-    to_background = _distance_to_edges(space, background)
-    most = np.where(is_low, 0.5 * NEAR_HAIR, np.minimum(NEAR_HAIR, to_background))
-    region = seed
-    for _ in range(N_GROWTHS):
-        to_hair = np.asarray(cKDTree(cells[region.ravel()]).query(cells)[0]).reshape(seed.shape)
-        candidates = seed | (allowed & (to_hair < most) & (to_background > OFF_BACKGROUND))
-        numbers, _ = label(candidates, np.ones((3, 3)))
-        region = np.isin(numbers, np.unique(numbers[seed]))
-    return region
+    apart = np.asarray(cKDTree(space[seeds]).query(space.reshape(-1, 3), k=N_NEAREST)[0]).mean(axis=1)
+    return np.asarray(np.minimum(apart, 1 / SMALL).reshape(seeds.shape), np.float64)
 
 
-def _distance_to_edges(space: FloatArray, background: Mask) -> FloatArray:
-    """(R, C) distance of colours from those at the picture's edge on the same side, at about the same height."""
+def _person(portrait: Portrait, space: FloatArray, known: Mask, oval: FloatArray) -> Mask:
+    """Cells of the person: as a network has read them, or else those unlike the picture's edges on the same side."""
     from scipy.spatial import cKDTree
 
-    height = np.broadcast_to(UP_MM[:, None, None] / WALL_MM, (*background.shape, 1))
-    placed = np.concatenate([space, height], axis=-1)
-    apart = np.full(background.shape, np.inf)
+    if portrait.share is not None:
+        return np.nan_to_num(portrait.share) > PERSON
+    edges = np.zeros_like(known)
+    for row in np.flatnonzero((known.sum(axis=1) > MIN_ROW_CELLS) & (portrait.marks[CHIN, 1] < UP_MM)):
+        inside = np.flatnonzero(known[row])
+        edges[row, inside[1 : 1 + EDGE_CELLS]] = edges[row, inside[-1 - EDGE_CELLS : -1]] = True
+    height = np.broadcast_to(UP_MM[:, None, None] / WALL_MM, (*known.shape, 1))
+    placed, apart = np.concatenate([space, height], axis=-1), np.full(known.shape, np.inf)
     for side in (ACROSS_MM < 0, ACROSS_MM >= 0):
-        edge = placed[background & side]
-        if len(edge):
-            apart[:, side] = cKDTree(edge).query(placed[:, side])[0]
-    return apart
-
-
-def _length(region: Mask, marks: FloatArray, off: FloatArray) -> str:
-    """Length class: cropped, flat, short, bob or long."""
-    chin, forehead = marks[CHIN, 1], marks[FOREHEAD, 1]
-    beside = [(region & (side * ACROSS_MM > TEMPLE_MM)).sum(axis=1) * CELL_MM for side in (-1, 1)]
-    ends = [UP_MM[np.flatnonzero(width >= MIN_LOCK_MM)].min(initial=forehead) for width in beside]
-    falling = [end for end in ends if end < forehead - TEMPLE_HAIR_MM] or [forehead]
-    reach = chin - float(np.mean(falling))
-    if reach > BOB_MM:
-        return "long" if reach > LONG_MM else "bob"
-    middle = region[:, np.abs(ACROSS_MM) < TEMPLE_MM]
-    height = float(np.median(UP_MM[np.argmax(middle[:, middle.any(axis=0)], axis=0)])) - forehead
-    temples = np.abs(UP_MM - (marks[105, 1] + 10.0)) < 2 * CELL_MM
-    thickness = sum((region & (side * ACROSS_MM > 0))[temples].sum(axis=1).mean() * CELL_MM for side in (-1, 1))
-    if height > FLAT_MM[0] or thickness > FLAT_MM[1]:
-        return "short"
-    return "cropped" if difference_from_skin(off, DARKER) < SEE_THROUGH or thickness < CROPPED_MM else "flat"
+        if (edges & side).any():
+            apart[:, side] = cKDTree(placed[edges & side]).query(placed[:, side])[0]
+    return np.asarray((apart > OFF_BACKGROUND) | (oval > 0))

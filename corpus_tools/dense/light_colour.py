@@ -28,7 +28,8 @@ SKIN_ALONE = 0.5  # share of the skin's cast that is corrected where no white of
 SKIN_LANDMARKS = (50, 280, 205, 425, 151, 9, 108, 337)  # cheeks and forehead
 IRISES = ((468, (469, 470, 471, 472)), (473, (474, 475, 476, 477)))  # centre and rim, as in LID_RINGS
 MIN_IRIS_PX = 3.5  # radius; below it iris, lashes and white are mixed
-IRIS_RING, IRIS_TOP = (0.4, 0.8), 0.35  # of the radius: between pupil and limbus, below the lashes' shadow
+IRIS_RING, IRIS_TOP = (0.4, 0.9), 0.35  # of the radius: between pupil and limbus, below the lashes' shadow
+PUPIL = 0.25  # of the light of the ring's brighter cells: less is a wide pupil, as drawn people have
 OFF_IRIS, OFF_LIDS = 1.35, 0.18  # of the radius: what is white of the eye, and how far lids reach into it
 IRIS_MIX_PX = 0.5  # over the radius: share of the surroundings' light; rendered eyes have .05 to .1 at 5 px
 MIN_OWN_LIGHT = 0.5  # of what is seen
@@ -90,9 +91,17 @@ def sample_eyes(picture: NDArray[np.uint8], points: NDArray[np.floating]) -> Eye
         is_open = polygon_depth(grid, opening, radius) > OFF_LIDS * radius
         ring = (off > IRIS_RING[0]) & (off < IRIS_RING[1]) & (grid[:, 1] > middle[1] - IRIS_TOP * radius)
         whites.append(_median_between(colours[is_open & (off > OFF_IRIS)], (BRIGHT_WHITE, 1.0)))
-        irises.append(_median_between(colours[is_open & ring], PLAIN_IRIS))
+        irises.append(_median_between(_without_pupil(colours[is_open & ring]), PLAIN_IRIS))
         radii.append(radius)
     return EyeColours(skin, _mean_known(whites), _mean_known(irises), float(np.mean(radii)))
+
+
+def _without_pupil(ring: FloatArray) -> FloatArray:
+    """Colours (N, 3) of a ring of the iris that are not as dark as a pupil beside its brighter ones."""
+    if not len(ring):
+        return ring
+    bright: FloatArray = ring[ring[:, 0] > np.quantile(ring[:, 0], PLAIN_IRIS[1]) + np.log(PUPIL)]
+    return bright
 
 
 def _median_between(colours: FloatArray, quantiles: tuple[float, float]) -> FloatArray:

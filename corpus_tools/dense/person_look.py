@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.dense.hair_region import (
-    ACROSS_MM,
     OFF_BACKGROUND,
     UP_MM,
     Portrait,
@@ -15,6 +14,7 @@ from corpus_tools.dense.hair_region import (
     find_hair,
     portrait_grid,
 )
+from corpus_tools.dense.hairdo import HAIRCUTS, UNSEEN, name_hair
 from corpus_tools.dense.light_colour import (
     MIN_IRIS_PX,
     SCLERA_CHROMA,
@@ -32,14 +32,13 @@ from corpus_tools.dense.texels import find_texels
 from lexicon.values.fields import check_fields
 from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_tint import tint_parts
-from tts2face.models.landmarks import CHIN
+from tts2face.models.landmarks import CHIN, EYE_OUTER_LEFT, EYE_OUTER_RIGHT
 from tts2face.models.named_colours import EYE_COLOURS, HAIR_COLOURS, parse_eye_colour, parse_hair_colour
-from tts2face.numeric.arrays import FloatArray
+from tts2face.numeric.arrays import FloatArray, smoothstep
+from tts2face.photo.matte import Network, read_person
 
-HAIRCUTS: Mapping[str, str] = {  # by length class
-    "bald": "bald", "cropped": "cropped", "flat": "short01", "short": "short02", "bob": "bob02", "long": "long01",
-}  # fmt: skip
-UNSEEN, UNSEEN_HAIR = "flat", "dark-brown"  # class and colour where the top of the head is outside of the picture
+UNSEEN_HAIR = "dark-brown"  # where the top of the head is outside of the picture
+N_PERSONS = 12  # pictures in which a network reads the person
 HAIR_LIGHT = (0.005, 0.36)  # luminance of the darkest and lightest hair
 CROPPED_LIGHT = -1.8  # most luminance of cropped hair, of the skin's, logarithm: what is seen is hair and skin mixed
 SEEN_SKIN = 0.4  # of what differs from skin, which cropped hair lets through: rendered heads of three tones
@@ -50,7 +49,12 @@ HAIR_LINE, NATURAL = np.array([1.0, -0.9]), (0.4, 0.7)
 GREY = 0.35  # log R/G below which hair is rather grey in yellowish light than blond
 NEUTRAL_IRIS = EYE_COLOURS["brown"]
 IRIS_LIGHT, DARK_IRIS, DARK_IRIS_HUE = 0.012, 0.02, (0.55, -0.55)  # least luminance; up to which irises are brown
-BROWN_FROM, BROWN_SLOPE, BROWN_LIGHT = -0.45, -0.8, 0.035  # log B/G of brown irises, their least R/G, usual luminance
+BROWN_FROM, BROWN_BLUE = (
+    0.45,
+    -0.3,
+)  # least log R/G and most log B/G of brown irises; hazel, green and grey ones are less red
+BROWN_SLOPE, BROWN_LIGHT = -0.8, 0.035  # of B/G: their least R/G; usual luminance
+WHITE_SHARE, OFF_SKIN = 0.7, (0.05, 0.3)  # of the white's cast; log R/G by which it must be less red than the skin
 AMBER = -0.9  # log B/G up to which more yellow is redder; irises beyond are amber
 BROW_LIGHT = -1.9  # most luminance of brows, of the skin's, logarithm
 ROOT_MM, LASH_MM = 0.7, 10.0  # off the skin: roots of lashes, and lashes that are shown
@@ -114,39 +118,57 @@ AS_SEEN = LookChoices()
 
 @dataclass(slots=True, eq=False)
 class LookSampler:
-    """Collects what frames show of a person, whose head a fitter places in them."""
+    """Collects what frames show of a person, whose head a fitter places in them; a network reads the person in some."""
 
     fit: PictureFitter
+    network: Network | None = None
+    shares: list[NDArray[np.float32]] = field(default_factory=list)
+    fine: NDArray[np.float32] | None = None
     portraits: list[NDArray[np.float32]] = field(default_factory=list)
     eyes: list[EyeColours] = field(default_factory=list)
 
     def add(self, picture: NDArray[np.uint8], points: NDArray[np.floating]) -> None:
         """Sample one frame (H, W, 3) with its landmarks (478, 3) in pixels."""
+        self.portraits.append(self._cells(picture, points))
+        if self.fine is None:
+            self.fine = self._cells(picture, points, 2)
+        if self.network is not None and len(self.shares) < N_PERSONS:
+            apart = float(np.linalg.norm(points[EYE_OUTER_LEFT, :2] - points[EYE_OUTER_RIGHT, :2]))
+            share = read_person(picture, points[:, :2].astype(np.float64), apart, self.network).share
+            grey = np.repeat(np.rint(255.0 * share).astype(np.uint8)[..., None], 3, axis=2)
+            self.shares.append(self._cells(grey, points)[..., 0] / 255.0)
+        self.eyes.append(sample_eyes(picture, points))
+
+    def _cells(self, picture: NDArray[np.uint8], points: NDArray[np.floating], step: int = 1) -> NDArray[np.float32]:
+        """(R, C, 3) colours of the cells of a portrait, NaN outside of the picture."""
         linear, shift, _ = self.fit.pose(points)
-        places = portrait_grid(self.fit.marks) @ linear.T + shift
+        places = portrait_grid(self.fit.marks, step) @ linear.T + shift
         colours, inside = sample_picture(picture, places[:, :2] * (1.0, -1.0))
         colours[~inside] = np.nan
-        self.portraits.append(colours.astype(np.float32))
-        self.eyes.append(sample_eyes(picture, points))
+        return colours.astype(np.float32).reshape(step * (len(UP_MM) - 1) + 1, -1, 3)
 
     def look(self) -> PersonLook:
         """The look of the person in all frames."""
         grid = np.array(self.portraits)
-        known = np.isfinite(grid[:, :, 0]).mean(axis=0) > MIN_SHARE
+        known = np.isfinite(grid[..., 0]).mean(axis=0) > MIN_SHARE
         middle = np.full(grid.shape[1:], np.nan)
         middle[known] = np.nanmedian(grid[:, known], axis=0)
-        portrait = Portrait(middle.reshape(len(UP_MM), len(ACROSS_MM), 3), self.fit.marks)
+        share = np.nan_to_num(self.shares).mean(axis=0).astype(np.float64) if self.shares else None
+        fine = None if self.fine is None else self.fine.astype(np.float64)
+        portrait = Portrait(middle, self.fit.marks, share, fine)
         eyes = median_eyes(self.eyes)
         cast = estimate_cast(eyes)
         hair = find_hair(portrait, eyes.skin)
+        length = name_hair(portrait, hair, eyes.skin)
         colour, code = log_colour(255.0 * parse_hair_colour(UNSEEN_HAIR)), UNSEEN_HAIR
         if np.isfinite(hair.colour).all():
             seen, most = hair.colour, 0.0
-            if hair.length == "cropped":
+            if length == "cropped":
                 seen, most = seen + SEEN_SKIN * (seen - eyes.skin), eyes.skin[0] + CROPPED_LIGHT
             colour = hair_colour(neutral(seen, cast), most)
             code = "#{:02x}{:02x}{:02x}".format(*srgb_colour(colour).tolist())
-        length, notes = hair.length or UNSEEN, [] if hair.length else ["top of the head not seen"]
+        notes = [] if length else ["top of the head not seen"]
+        length = length or UNSEEN
         is_visible = eyes.radius_px >= MIN_IRIS_PX and np.isfinite(eyes.iris).all()
         iris = srgb_colour(iris_colour(eyes, cast)) if is_visible else parse_hex(NEUTRAL_IRIS)
         notes += [] if is_visible else ["eyes too small to tell their colour"]
@@ -177,15 +199,20 @@ def hair_colour(seen: FloatArray, most: float = 0.0) -> FloatArray:
 
 
 def iris_colour(eyes: EyeColours, cast: FloatArray) -> FloatArray:
-    """Colour of the iris (3,), `log_colour`, in neutral light: the mean by the cast and by the white of the eye."""
+    """Colour of the iris (3,), `log_colour`, in neutral light: by the cast, and by the white of the eye.
+
+    A white whose hue is that of the skin is the lid's, and does not count.
+    """
     clear = clear_iris(eyes)
     by_cast = neutral(clear, cast)
-    by_white = clear[1:] - eyes.sclera[1:] + SCLERA_CHROMA
-    red, blue = (by_cast[1:] + by_white) / 2 if np.isfinite(by_white).all() else by_cast[1:]
-    light = max(by_cast[0], np.log(IRIS_LIGHT))
+    light, hue = max(by_cast[0], np.log(IRIS_LIGHT)), by_cast[1:]
+    if np.isfinite(eyes.sclera).all():
+        trust = WHITE_SHARE * smoothstep(eyes.skin[1] - eyes.sclera[1], *OFF_SKIN)
+        hue = hue + trust * (clear[1:] - eyes.sclera[1:] + SCLERA_CHROMA - hue)
+    red, blue = hue
     if light < np.log(DARK_IRIS):
         return np.array([light, *DARK_IRIS_HUE])
-    if blue < BROWN_FROM:
+    if red > BROWN_FROM and blue < BROWN_BLUE:
         usual = np.log(BROWN_LIGHT)
         return np.array([min(light, (light + usual) / 2), max(red, BROWN_SLOPE * max(blue, AMBER)), blue])
     return np.array([light, red, blue])

@@ -11,6 +11,7 @@ from PIL import Image
 
 from cli.main import run
 from corpus_tools.dense.hair_region import ACROSS_MM, UP_MM, Portrait, find_hair
+from corpus_tools.dense.hairdo import name_hair
 from corpus_tools.dense.light_colour import (
     GLOSSY,
     EyeColours,
@@ -51,6 +52,7 @@ from tts2face.storage.shipped import find_file
 CAMERA, SIDE_PX = "0,0,900", 448
 FOREHEAD_MM = 8.0  # by which the tracker sees the top of the forehead above the drawn people's own landmark
 SKINS = ((232, 190, 172), (198, 134, 102), (141, 85, 60), (84, 52, 39))  # light to dark, in neutral light
+SKIN = np.array(SKINS[1], np.float64)
 WHITE = (188, 182, 176)
 NO_COLOUR = np.full(3, np.nan)
 SHORT, LONG = ("bald", "cropped", "flat", "short"), ("bob", "long")
@@ -149,6 +151,10 @@ def painted_portrait(
     return Portrait(picture + np.random.default_rng(0).normal(0, 2, picture.shape), marks)
 
 
+def name_of(portrait: Portrait) -> str:
+    return name_hair(portrait, find_hair(portrait, log_colour(SKIN)), log_colour(SKIN))
+
+
 @pytest.mark.parametrize(
     ("lowest_mm", "top_mm", "lengths"),
     [(-95.0, 0.0, ("bald",)), (-95.0, 75.0, ("short",)), (-20.0, 75.0, ("bob",)), (45.0, 75.0, ("long",))],
@@ -156,34 +162,30 @@ def painted_portrait(
 def test_hair_is_measured_to_where_it_ends(
     head: Face, lowest_mm: float, top_mm: float, lengths: tuple[str, ...]
 ) -> None:
-    found = find_hair(
-        painted_portrait(head, (70, 120, 170), (60, 42, 30), lowest_mm, top_mm), log_colour(np.array(SKINS[1], float))
-    )
-    assert found.length in lengths
+    portrait, skin = painted_portrait(head, (70, 120, 170), (60, 42, 30), lowest_mm, top_mm), log_colour(SKIN)
+    found = find_hair(portrait, skin)
+    assert name_hair(portrait, found, skin) in lengths
     if top_mm:
         np.testing.assert_allclose(srgb_colour(found.colour), (60, 42, 30), atol=3)
 
 
 def test_hair_that_is_like_the_wall_on_one_side_is_measured_on_the_other(head: Face) -> None:
-    portrait, skin = (
-        painted_portrait(head, (70, 120, 170), (60, 42, 30), 45.0, 75.0),
-        log_colour(np.array(SKINS[1], float)),
-    )
+    portrait = painted_portrait(head, (70, 120, 170), (60, 42, 30), 45.0, 75.0)
     one_sided = portrait.srgb.copy()
     one_sided[:, ACROSS_MM < -34] = (70, 120, 170)
-    assert find_hair(replace(portrait, srgb=one_sided), skin).length == "long"
+    assert name_of(replace(portrait, srgb=one_sided)) == "long"
 
 
 def test_a_wall_in_the_colour_of_the_hair_is_no_long_hair(head: Face) -> None:
     portrait = painted_portrait(head, (58, 43, 33), (60, 42, 30), -95.0, 75.0)
-    assert find_hair(portrait, log_colour(np.array(SKINS[1], float))).length in SHORT
+    assert name_of(portrait) in SHORT
 
 
 def test_a_head_cut_by_the_pictures_edge_has_no_length(head: Face) -> None:
     portrait = painted_portrait(head, (70, 120, 170), (60, 42, 30), -95.0, 75.0)
     cut = portrait.srgb.copy()
     cut[portrait.marks[10, 1] + 8 < UP_MM] = np.nan
-    assert find_hair(replace(portrait, srgb=cut), log_colour(np.array(SKINS[1], float))).length == ""
+    assert name_of(replace(portrait, srgb=cut)) == ""
 
 
 @pytest.mark.parametrize("name", HAIR_COLOURS)
@@ -266,11 +268,11 @@ def test_small_eyes_are_brown_and_said_to_be_unseen() -> None:
 def test_a_head_is_drawn_as_the_person_looks(head: Face) -> None:
     look = replace(seen_look("ravi", "short01", "black"), iris=parse_hex("58402f"), shirt=parse_hex("6a6b6d"))
     dressed = dress_head(head, look)
-    assert dressed.hairdo == look.hairdo == Hairdo("short02", look.hairdo.colour)
+    assert dressed.hairdo == look.hairdo == Hairdo("short01", look.hairdo.colour)
     np.testing.assert_allclose(part_colour(dressed, "iris"), look.iris, atol=3)
     np.testing.assert_allclose(part_colour(dressed, "shirt"), look.shirt, atol=2)
     np.testing.assert_array_equal(dressed.textures[0].pixels, head.textures[0].pixels)
-    assert "hair: short, black; eyes: brown; light: " in look.summary()
+    assert "hair: flat, black; eyes: brown; light: " in look.summary()
 
 
 def test_lashes_become_shorter_and_still_follow_the_lids(head: Face) -> None:

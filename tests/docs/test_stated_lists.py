@@ -9,6 +9,7 @@ from tts2face.session import catalogue
 
 NUMBERS = (
     "no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve", "thirteen",
+    "fourteen", "fifteen", "sixteen", "seventeen", "eighteen",
 )  # fmt: skip
 
 

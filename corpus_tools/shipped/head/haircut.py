@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 from scipy import sparse
 from scipy.spatial import cKDTree
 
 from corpus_tools.dense.texels import find_texels
 from corpus_tools.shipped.head.assets import ASSETS_PACKAGE, Asset, read_asset
 from corpus_tools.shipped.head.cage import Cage
+from corpus_tools.shipped.head.locks import LockStyle, grow_locks, lock_tangents, paint_ribbons
 from corpus_tools.shipped.head.noise import value_noise
 from corpus_tools.shipped.head.scalp import (
     MIDDLE,
@@ -36,6 +38,7 @@ from tts2face.models.hair import Hair
 from tts2face.numeric.arrays import FloatArray, IntArray, smoothstep, unit_vectors
 
 Edit = Callable[[Cards], Cards]
+Shown = tuple[Cards, FloatArray, tuple[NDArray[np.uint8], NDArray[np.uint8]]]  # with tangents, relief and coverage
 Finish = Callable[
     [Cards, NDArray[np.uint8], FloatArray], tuple[NDArray[np.uint8], FloatArray]
 ]  # of coverage and tangents
@@ -50,7 +53,8 @@ PARTING_MM, PARTING_Y, ROOT_TURN = 9.0, (50.0, 75.0), 1.0
 CURL_TOP, CURL_ROOT, CURL_SIDE, CURL_SPREAD = 0.68, (0.86, 0.98), 0.08, 0.03  # shares of the texture
 CURL_HAZE, CURL_SOLID, CURL_TURN = 70.0, 190.0, 0.42  # coverage of haze and of curls, of 255; spread of directions
 CROWN_Y, N_CROWN_MEANS = (40.0, 80.0), 12  # heights between which the crown begins
-CROPPED = "cropped"
+CROPPED, STUBBLE, STUBBLE_COVER = "cropped", "stubble", 0.5  # share of the coverage of cropped hair
+PACKAGED = {"data": ASSETS_PACKAGE}
 N_ANCHORS = 180
 N_SAMPLES = 60_000  # points on the cards
 SOLID = 0.4  # coverage of a card from which it hides the scalp
@@ -212,17 +216,46 @@ HAIRCUTS: Mapping[str, Haircut] = {
 }
 
 
+GROWN: Mapping[str, tuple[str, LockStyle]] = {
+    "curly01": ("short curls", LockStyle(560, 48.0, 13.0, 14, lift=0.7, weight=0.1, curl=(5.0, 25.0), above=3.0)),
+    "curly02": (
+        "curls to the shoulders",
+        LockStyle(420, 0.0, 15.0, 30, -140.0, 0.35, 0.2, 4.0, (7.0, 34.0), order=0.15, above=8.0, cling=0.1),
+    ),
+    "wavy01": (
+        "long and wavy, parted",
+        LockStyle(380, 0.0, 25.0, 26, -205.0, 0.2, 0.25, 10.0, (5.0, 62.0), order=0.75, above=10.0, cling=0.2),
+    ),
+    "wavy02": (
+        "chin-length waves, parted at the side",
+        LockStyle(330, 0.0, 21.0, 18, -85.0, 0.25, 0.26, 22.0, (5.0, 50.0), order=0.6, above=9.0, cling=0.2),
+    ),
+}
+FRINGE = LockStyle(80, 0.0, 18.0, 14, lift=0.2, weight=0.2, above=7.0, fringe_y=24.0, cling=0.25)
+FRINGED = "long01"  # the haircut that `fringe01` is with a fringe; beside this share its picture has room
+FREE_SHARE = 0.64
+
+
 def build_haircuts(folder: Path, cage: Cage, skin: HeadSkin, head: FloatArray) -> Iterator[tuple[str, Hair]]:
     """Each haircut by name, on the reference head with vertices (V, 3), whose first ones are the skin's."""
     for name in HAIRCUTS:
-        asset = read_asset(folder, f"hair/{name}", cage.source.vertices)
-        yield name, build_hair(name, asset, cage, skin, head)
+        metadata = _metadata(name, HAIRCUTS[name].summary) | PACKAGED
+        yield name, _on_head(dressed_cards(folder, name, cage), skin, head, metadata)
+    for name, (summary, style) in GROWN.items():
+        generator = np.random.default_rng(SEED)
+        cards = grow_locks(skin, head, style, generator)
+        shown = cards, lock_tangents(cards, style.n_steps), paint_ribbons(generator)
+        yield name, _on_head(shown, skin, head, _metadata(name, summary))
+    shown = with_fringe(dressed_cards(folder, FRINGED, cage), skin, head)
+    summary = "long, straight, with a fringe"
+    yield "fringe01", _on_head(shown, skin, head, _metadata("fringe01", summary) | PACKAGED)
     yield CROPPED, build_cropped(skin, head)
+    yield STUBBLE, build_cropped(skin, head, STUBBLE, STUBBLE_COVER)
 
 
-def build_hair(name: str, asset: Asset, cage: Cage, skin: HeadSkin, head: FloatArray) -> Hair:
-    """A haircut of the package."""
-    cut = HAIRCUTS[name]
+def dressed_cards(folder: Path, name: str, cage: Cage) -> Shown:
+    """A haircut of the package: its cards on the head of a cage, their tangents, and relief and coverage."""
+    cut, asset = HAIRCUTS[name], read_asset(folder, f"hair/{name}", cage.source.vertices)
     cards = split_seams(asset, asset.fit(cage.vertices, cage.source.vertices))
     for edit in cut.edits:
         cards = edit(cards)
@@ -230,7 +263,37 @@ def build_hair(name: str, asset: Asset, cage: Cage, skin: HeadSkin, head: FloatA
     tangents = strand_tangents(cards, angles)
     if cut.finish is not None:
         alpha, tangents = cut.finish(cards, alpha, tangents)
-    share = covered_share(skin, solid_points(cards, alpha, np.random.default_rng(SEED)))
+    return cards, tangents, (relief, alpha)
+
+
+def with_fringe(shown: Shown, skin: HeadSkin, head: FloatArray) -> Shown:
+    """Cards with a fringe, whose ribbons lie in the free part of their picture."""
+    cards, tangents, pictures = shown
+    generator = np.random.default_rng(SEED)
+    fringe = grow_locks(skin, head, FRINGE, generator)
+    left, joined = round(FREE_SHARE * pictures[0].shape[1]), []
+    for picture, ribbons in zip(pictures, paint_ribbons(generator), strict=True):
+        size = picture.shape[1] - left, picture.shape[0]
+        wide = picture.copy()
+        wide[:, left:] = np.asarray(Image.fromarray(ribbons).resize(size, Image.Resampling.BILINEAR))
+        joined.append(wide)
+    start = left / pictures[0].shape[1]
+    n, n_places = len(cards.vertices), int(cards.weld.max()) + 1
+    both = Cards(
+        np.concatenate([cards.vertices, fringe.vertices]),
+        np.concatenate([cards.triangles, fringe.triangles + n]),
+        np.concatenate([cards.uv, [start, 0.0] + fringe.uv * [1 - start, 1.0]]),
+        np.concatenate([cards.weld, fringe.weld + n_places]),
+    )
+    return both, np.concatenate([tangents, lock_tangents(fringe, FRINGE.n_steps)]), (joined[0], joined[1])
+
+
+def _on_head(shown: Shown, skin: HeadSkin, head: FloatArray, metadata: Mapping[str, str]) -> Hair:
+    """Cards as a haircut of a head with vertices (V, 3), whose scalp is painted under them, wholly under grown ones."""
+    cards, tangents, (relief, alpha) = shown
+    share = np.ones(len(skin.vertices))
+    if metadata["name"] not in GROWN:
+        share = covered_share(skin, solid_points(cards, alpha, np.random.default_rng(SEED)))
     anchors = choose_anchors(head)
     return Hair(
         vertices=cards.vertices.astype(np.float32),
@@ -241,12 +304,12 @@ def build_hair(name: str, asset: Asset, cage: Cage, skin: HeadSkin, head: FloatA
         anchors=anchors.astype(np.int32),
         anchor_places=head[anchors].astype(np.float32),
         n_face_vertices=len(head),
-        metadata=_metadata(name, cut.summary) | {"data": ASSETS_PACKAGE},
+        metadata=metadata,
     )
 
 
-def build_cropped(skin: HeadSkin, head: FloatArray) -> Hair:
-    """Hair of a few millimetres: painted, with a layer of fuzz above the scalp."""
+def build_cropped(skin: HeadSkin, head: FloatArray, name: str = CROPPED, cover: float = 1.0) -> Hair:
+    """Hair of a few millimetres: painted, with a layer of fuzz above the scalp; shaved with a share of its coverage."""
     generator = np.random.default_rng(SEED)
     normals = vertex_normals(skin.vertices, skin.quads, skin.base)
     grown = hair_share(skin.vertices)[skin.quads].max(axis=1) > 0.0
@@ -254,20 +317,22 @@ def build_cropped(skin: HeadSkin, head: FloatArray) -> Hair:
     vertices = skin.vertices[used] + FUZZ_MM * normals[used]
     triangles, uv = triangulate(quads.reshape(-1, 4)), flatten_skull(vertices)
     anchors = choose_anchors(head)
+    fuzz, scalp = (
+        paint_fuzz(skin.vertices[used], triangles, uv, generator),
+        paint_stubble(skin, STUBBLE_SIDE, generator),
+    )
+    if cover < 1:
+        fuzz, scalp = np.zeros_like(fuzz), share_levels(cover * scalp.astype(np.float64) / 255.0)
     return Hair(
         vertices=vertices.astype(np.float32),
         triangles=triangles.astype(np.int32),
         uv=uv.astype(np.float32),
         tangents=normals[used].astype(np.float32),
-        pictures=(
-            np.full((FUZZ_SIDE, FUZZ_SIDE), 128, np.uint8),
-            paint_fuzz(skin.vertices[used], triangles, uv, generator),
-            paint_stubble(skin, STUBBLE_SIDE, generator),
-        ),
+        pictures=(np.full((FUZZ_SIDE, FUZZ_SIDE), 128, np.uint8), fuzz, scalp),
         anchors=anchors.astype(np.int32),
         anchor_places=head[anchors].astype(np.float32),
         n_face_vertices=len(head),
-        metadata=_metadata(CROPPED, "cropped to a few millimetres"),
+        metadata=_metadata(name, "cropped to a few millimetres" if name == CROPPED else "shaved, with stubble"),
     )
 
 

@@ -1,0 +1,151 @@
+"""Which of the shipped haircuts hair in a picture is: its length, volume, fringe and texture."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from corpus_tools.dense.hair_region import (
+    ACROSS_MM,
+    BROW_TOPS,
+    CELL_MM,
+    DARKER,
+    FOREHEAD,
+    UP_MM,
+    Portrait,
+    SeenHair,
+    difference_from_skin,
+    ring_depth,
+)
+from tts2face.models.landmarks import CHIN, FACE_OVAL
+from tts2face.numeric.arrays import LUMINANCE, FloatArray, Mask
+
+HAIRCUTS: Mapping[str, str] = {
+    "bald": "bald", "stubble": "stubble", "cropped": "cropped", "flat": "short01", "short": "short02",
+    "curly": "curly01", "afro": "afro01", "bob": "bob02", "bob with a fringe": "bob01", "wavy bob": "wavy02",
+    "long": "long01", "long with a fringe": "fringe01", "long and wavy": "wavy01", "long and curly": "curly02",
+    "short with a fringe": "short03", "tied back": "ponytail01",
+}  # fmt: skip  # by what hair is called
+UNSEEN = "flat"  # where the top of the head is outside of the picture
+TEMPLE_MM, MIN_LOCK_MM = 36.0, 9.0  # hair beside the face, from the middle of it; thinner locks do not count
+# Lowest hair beside the face above the chin, mean of both sides: haircuts with free ears 94 and higher, bobs 3 to 49,
+# long hair below -25. A side that shows none beside the temple does not count.
+BOB_MM, LONG_MM, TEMPLE_HAIR_MM = 75.0, -12.0, 10.0
+FLAT_MM = (62.0, 78.0)  # hair above `FOREHEAD`, and its half width: less of both lies on the skull
+# Flat hair is cropped where the skin shows through, up to this difference from it, or where the temples show so little.
+SEE_THROUGH, CROPPED_MM = 2.0, 6.0
+SHADED_CROWN = 0.24  # share of a bald crown that is unlike skin: shaved hair; bald people have less
+# Median coherence of the directions of strands (Bigun and Granlund 1987) over 4.5 and 9 mm: afros and short curls .36
+# to .46 and .32 to .37, long curls .52 and .43, straight hair from .55 and .46, long and straight from .7 and .65.
+CURLY, CURLY_WIDE, WAVY_WIDE = 0.5, 0.47, 0.55
+NEAR_MM, WIDE_MM, FINE_MM, SHADE_MM = 4.5, 9.0, 1.5, 6.0
+FINEST, INSIDE_CELLS = 100, 3  # cells that tell a texture, and their distance from the outline in fine cells
+AFRO_MM = (72.0, 97.0)  # above `FOREHEAD`, and from the middle of the face: curls beyond either are an afro
+TIED_MM = 105.0  # above `FOREHEAD`: what stands so high is tied
+FRINGED_MM = 88.0  # half width of short hair with a fringe that falls
+FRINGE, FRINGE_HALF_MM, FRINGE_FROM_MM, FRINGE_TO = 0.45, 48.0, 6.0, 0.55  # share of the lower forehead under hair
+
+
+@dataclass(frozen=True, slots=True)
+class HairMeasures:
+    """Measures of hair, mm: heights of its lowest ends above the chin, and of its top above the forehead.
+
+    ``temples`` is its width on both sides beside the brows, ``half_width`` that from the middle of the face above the
+    chin. ``fringe`` is the share of the lower forehead under it, and ``coherence`` that of the directions of its
+    strands over 4 and 9 mm above the brows, then below; NaN where too little is seen.
+    """
+
+    end: float
+    top: float
+    temples: float
+    half_width: float
+    fringe: float
+    coherence: tuple[float, float, float, float]
+
+
+def measure_hair(portrait: Portrait, hair: Mask) -> HairMeasures:
+    """Measures of hair cells (R, C) in a portrait."""
+    marks, (across, up) = portrait.marks, np.meshgrid(ACROSS_MM, UP_MM)
+    chin, forehead, brow = marks[CHIN, 1], marks[FOREHEAD, 1], marks[list(BROW_TOPS), 1].max()
+    beside = [(hair & (side * ACROSS_MM > TEMPLE_MM)).sum(axis=1) * CELL_MM for side in (-1, 1)]
+    ends = [UP_MM[np.flatnonzero(width >= MIN_LOCK_MM)].min(initial=forehead) for width in beside]
+    falling = [end for end in ends if end < forehead - TEMPLE_HAIR_MM] or [forehead]
+    middle = hair[:, np.abs(ACROSS_MM) < TEMPLE_MM]
+    tops = UP_MM[np.argmax(middle[:, middle.any(axis=0)], axis=0)]
+    temples = np.abs(UP_MM - (brow + 10.0)) < CELL_MM
+    band = (ring_depth(marks, FACE_OVAL) > INSIDE_CELLS) & (np.abs(across) < FRINGE_HALF_MM)
+    band &= (up > brow + FRINGE_FROM_MM) & (up < brow + FRINGE_FROM_MM + FRINGE_TO * (forehead - brow))
+    return HairMeasures(
+        float(np.mean(falling)) - chin,
+        float(np.median(tops)) - forehead if tops.size else 0.0,
+        sum(float(width[temples].mean()) for width in beside),
+        float(np.abs(across[hair & (up > chin)]).max(initial=0.0)),
+        float((hair & band).sum() / max(band.sum(), 1)),
+        (*_coherence(portrait, hair, up > brow), *_coherence(portrait, hair, up <= brow)),
+    )
+
+
+def _coherence(portrait: Portrait, hair: Mask, where: Mask) -> tuple[float, float]:
+    """Coherence of the directions of strands over `NEAR_MM` and `WIDE_MM` in a part (R, C) of the hair."""
+    from scipy.ndimage import binary_erosion, gaussian_filter
+
+    if portrait.fine is None:
+        return np.nan, np.nan
+    rows, columns = (np.minimum(np.arange(length) // 2, length // 2) for length in portrait.fine.shape[:2])
+    is_hair, is_part = (cells[np.ix_(rows, columns)] for cells in (hair, where))
+    inner = binary_erosion(is_hair, iterations=INSIDE_CELLS)
+    is_part = is_part & inner
+    if is_part.sum() < FINEST:
+        return np.nan, np.nan
+    per_cell = 2.0 / CELL_MM
+    light = np.where(is_hair, np.log(np.nan_to_num(portrait.fine) @ LUMINANCE + 8.0), 0.0)
+    near = gaussian_filter(is_hair.astype(np.float64), SHADE_MM * per_cell) + 1e-6
+    relief = np.where(is_hair, light - gaussian_filter(light, SHADE_MM * per_cell) / near, 0.0)
+    down, along = np.gradient(gaussian_filter(relief, FINE_MM * per_cell))
+    found = []
+    for reach in (NEAR_MM, WIDE_MM):
+        xx, xy, yy = (
+            gaussian_filter(inner * part, reach * per_cell) for part in (along * along, along * down, down * down)
+        )
+        share = np.sqrt((xx - yy) ** 2 + 4 * xy**2) / (xx + yy + 1e-12)
+        found.append(float(np.median(share[is_part])))
+    return found[0], found[1]
+
+
+def name_hair(portrait: Portrait, hair: SeenHair, skin: FloatArray) -> str:
+    """What hair is called, a key of `HAIRCUTS`, on skin of a colour (3,), `log_colour`; empty if it is not seen."""
+    if np.isnan(hair.hairy):
+        return ""
+    if not hair.region.any():
+        return "stubble" if hair.hairy > SHADED_CROWN else "bald"
+    seen = measure_hair(portrait, hair.region)
+    if seen.end < LONG_MM:
+        return _long_name(seen)
+    if seen.end < BOB_MM:
+        plain = "bob with a fringe" if seen.fringe > FRINGE else "bob"
+        return "wavy bob" if _strands(seen) < CURLY_WIDE else plain
+    return _short_name(seen, float(difference_from_skin(hair.colour - skin, DARKER)))
+
+
+def _strands(seen: HairMeasures) -> float:
+    """Coherence of the directions of strands of hair that falls, over 9 mm."""
+    below = seen.coherence[3]
+    return (seen.coherence[1] + below) / 2 if np.isfinite(below) else seen.coherence[1]
+
+
+def _long_name(seen: HairMeasures) -> str:
+    strands = _strands(seen)
+    if strands < WAVY_WIDE:
+        return "long and curly" if strands < CURLY_WIDE else "long and wavy"
+    return "long with a fringe" if seen.fringe > FRINGE else "long"
+
+
+def _short_name(seen: HairMeasures, unlike: float) -> str:
+    """Name of hair with free ears that differs from the skin by `unlike`."""
+    if seen.top > TIED_MM:
+        return "tied back"
+    if seen.top < FLAT_MM[0] and seen.half_width < FLAT_MM[1]:
+        return "cropped" if unlike < SEE_THROUGH or seen.temples < CROPPED_MM else "flat"
+    if seen.coherence[0] < CURLY:
+        return "afro" if seen.top > AFRO_MM[0] or seen.half_width > AFRO_MM[1] else "curly"
+    return "short with a fringe" if seen.fringe > FRINGE and seen.half_width > FRINGED_MM else "short"
