@@ -66,6 +66,10 @@ class FaceRig:
         self.clearance.enforce(centres, eyes, vertices)
         return vertices
 
+    def sink_eyes(self, weights: NDArray[np.floating], vertices: NDArray[np.float32]) -> None:
+        """Move the eyeballs of vertices (V, 3) of `deform` back behind their lids in place, for who draws them."""
+        self.clearance.openings.sink(self.clearance.centres(self.eye_centres, weights), vertices)
+
     def move_head(self, head: NDArray[np.floating], vertices: NDArray[np.float32]) -> None:
         """Move vertices (V, 3) of `deform` in place by a head pose (6,)."""
         if np.asarray(head).any():

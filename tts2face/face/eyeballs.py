@@ -1,7 +1,8 @@
 """Clearance of the skin around the eyes: what a sum of shapes moves into an eyeball lies on its surface instead.
 
 Each shape of a face keeps its lids outside the eyeballs, but sums of shapes do not: shapes move vertices on straight
-lines, and those of the default person move the lids of all other people.
+lines, and those of the default person move the lids of all other people. Between its vertices skin cuts through a large
+eyeball, which therefore sinks behind the lids beside their opening.
 """
 
 from collections.abc import Callable
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.models.face import Eye, Face, FacePart
+from tts2face.models.landmarks import LEFT_LIDS, RIGHT_LIDS
 from tts2face.numeric.arrays import Float32Array
 from tts2face.numeric.kernels import kernel
 
@@ -25,6 +27,7 @@ FOLLOWER_REACH_MM = 15.0  # length of lashes; those of other people, hidden in t
 # edges of lids that a lash follows
 N_ROOTS = 3
 N_ANGLES = 64  # of an eyeball's profile
+SINK_SLOPE, SINK_SHARE = 2.0, 0.12  # of the way beyond the edge of a lid, and of the eyeball's radius at most
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +45,8 @@ class EyeballClearance:
         Displacement of each eyeball per weight of each shape, mm.
     followers, roots, shares : (M,), (M, N_ROOTS), (M, N_ROOTS)
         Vertices of lashes and tear fluid, and the rows of `lids` that displace them, with their shares.
+    openings
+        Edges of the lids.
     """
 
     lids: NDArray[np.int64]
@@ -52,6 +57,7 @@ class EyeballClearance:
     followers: NDArray[np.int64]
     roots: NDArray[np.int64]
     shares: Float32Array
+    openings: "EyeOpenings"
 
     def centres(self, rest: Float32Array, weights: Float32Array) -> Float32Array:
         """Centres (E, 3) of the eyeballs for their places at rest (E, 3) and shape weights (K,)."""
@@ -65,6 +71,63 @@ class EyeballClearance:
             largest = self.profiles.max() + self.margins.max()
             _push_out((self.lids, self.eyes, self.margins, largest), (self.profiles, centres, gazes), vertices, moved)
             _follow(self.followers, self.roots, self.shares, moved, vertices)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EyeOpenings:
+    """Edges of the lids of eyes that have their landmarks.
+
+    Parameters
+    ----------
+    spans, radius : (E, 2), (E,)
+        First vertex and one past the last of each eyeball, and its radius, mm.
+    lids : (E, 2, 9)
+        Rows of the landmarks of the upper and the lower lid, towards the person's left; -1 without.
+    corners, weights : (L, 3), (L, 3)
+        Vertices of the landmarks, and their shares.
+    """
+
+    spans: NDArray[np.int64]
+    radius: Float32Array
+    lids: NDArray[np.int64]
+    corners: NDArray[np.int32]
+    weights: Float32Array
+
+    @property
+    def found(self) -> NDArray[np.bool_]:
+        """(E,) eyes with landmarks."""
+        return self.lids[:, 0, 0] >= 0
+
+    def edges(self, points: NDArray[np.floating]) -> NDArray[np.floating]:
+        """(E', 2, 9, 3) edges of the lids of eyes with landmarks, for vertices (V, 3)."""
+        rows = self.lids[self.found]
+        edges: NDArray[np.floating] = np.einsum("elkcx,elkc->elkx", points[self.corners[rows]], self.weights[rows])
+        return edges
+
+    def sink(self, centres: NDArray[np.floating], points: Float32Array) -> None:
+        """Move vertices (V, 3) of eyeballs with centres (E, 3) back behind lids, in place, before the head moves."""
+        for number, edges in zip(np.flatnonzero(self.found), self.edges(points), strict=True):
+            off = (edges - centres[number]).astype(np.float32)
+            off = np.take_along_axis(off, off[:, :, :1].argsort(axis=1), axis=1)
+            most = np.float32(SINK_SHARE * self.radius[number])
+            first, end = self.spans[number]
+            _sink(first, end, centres[number].astype(np.float32), off, most, points)
+
+
+def eye_openings(face: Face) -> EyeOpenings:
+    """Edges of the lids of a face; a photograph's eyes are pictures, which lie behind its skin."""
+    rows = {int(number): row for row, number in enumerate(face.landmarks)}
+    lids = np.full((len(face.eyes), 2, len(RIGHT_LIDS[0])), -1, np.int64)
+    radius = np.zeros(len(face.eyes), np.float32)
+    for number, eye in enumerate(face.eyes):
+        ball = face.vertices[eye.first : eye.first + eye.count] - eye.centre
+        radius[number] = max(float(np.median(np.linalg.norm(ball, axis=1))), 1e-3)
+        names = RIGHT_LIDS if eye.centre[0] < 0 else [lid[::-1] for lid in LEFT_LIDS]
+        if all(name in rows for lid in names for name in lid) and not face.light.is_flat:
+            lids[number] = [[rows[name] for name in lid] for lid in names]
+    spans = np.array([(eye.first, eye.first + eye.count) for eye in face.eyes], np.int64).reshape(-1, 2)
+    corners, weights = np.array(face.landmark_vertices), np.array(face.landmark_weights, np.float32)
+    return EyeOpenings(spans, radius, lids, corners, weights)
 
 
 def build_clearance(face: Face) -> EyeballClearance:
@@ -91,6 +154,7 @@ def build_clearance(face: Face) -> EyeballClearance:
         followers=followers,
         roots=roots,
         shares=shares,
+        openings=eye_openings(face),
     )
 
 
@@ -185,3 +249,27 @@ def _follow(followers, roots, shares, moved, vertices):  # type: ignore[no-untyp
             share, root = shares[i, k], roots[i, k]
             for c in range(3):
                 vertices[followers[i], c] += share * moved[root, c]
+
+
+@kernel
+def _height(lid, across):  # type: ignore[no-untyped-def]
+    """Height of a lid's edge (L, 3) at a place across."""
+    for k in range(len(lid) - 1):
+        x0, x1 = lid[k, 0], lid[k + 1, 0]
+        if across <= x1:
+            share = min(max((across - x0) / (x1 - x0), np.float32(0)), np.float32(1)) if x1 > x0 else np.float32(0)
+            return lid[k, 1] + share * (lid[k + 1, 1] - lid[k, 1])
+    return lid[len(lid) - 1, 1]
+
+
+@kernel
+def _sink(first, end, centre, lids, most, vertices):  # type: ignore[no-untyped-def]
+    """Move an eyeball's vertices in [first, end) back by up to `most` mm beyond the edges of lids (2, L, 3)."""
+    upper, lower = lids[0], lids[1]
+    last = len(upper) - 1
+    for v in range(first, end):
+        x, y = vertices[v, 0] - centre[0], vertices[v, 1] - centre[1]
+        if vertices[v, 2] > centre[2]:
+            beyond = max(y - _height(upper, x), _height(lower, x) - y)
+            beyond = max(beyond, min(upper[0, 0], lower[0, 0]) - x, x - max(upper[last, 0], lower[last, 0]))
+            vertices[v, 2] -= min(max(np.float32(SINK_SLOPE) * beyond, np.float32(0)), most)

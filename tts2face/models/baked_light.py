@@ -171,9 +171,10 @@ class BakedLight(HairLight):
     ball_responses : (3, 3, B)
         Its change by the last three terms, over ``ball_sizes`` (3,).
     lamps : (L, 17)
-        Rectangles that eyes mirror, mm: centre, two axes, normal, half width, half height, radiance.
+        Rectangles that shine, mm: centre, two axes, normal, half width, half height, radiance. On the side of the first
+        lie the catchlights of eyes, in its colour; without lamps there are none.
     head_lamps
-        How many of the lamps, the last ones, turn twice as far as the head: their mirror images keep their places.
+        How many of the lamps, the last ones, shine on eyes alone; they are not drawn.
     sky : (3,)
         Radiance that eyes mirror elsewhere.
     eye_gain

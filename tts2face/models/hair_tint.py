@@ -1,4 +1,8 @@
-"""Hair of faces with baked light in any colour, between those in which its light was baked."""
+"""Hair of faces with baked light in any colour, between those in which its light was baked.
+
+A colour is that of the middle of the hair as it is seen from in front, which gloss and light that passes from strand to
+strand make brighter than the strands.
+"""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -9,11 +13,13 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from tts2face.models.baked_light import BakedLight, HairTint
 from tts2face.models.face import Face, Hairdo
+from tts2face.models.hair import HAIR_PART
 from tts2face.models.light import Lamps
 from tts2face.models.named_colours import parse_hair_colour
 from tts2face.models.view_transform import grey_curves
-from tts2face.numeric.arrays import decode_srgb
 
+CELL_MM = 3.0  # cells of that grid
+WITHIN = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 2]]) / 6  # places in triangles at which hair is read
 DARKEST, LEAST_GLOSS = 1e-3, 0.15  # linear light, and share of the change of gloss on light hair
 OTHER_COLOUR, GLOSS_TINT = 0.15, 0.3  # distance from the hair's own colour at which that change has so little of it
 
@@ -34,8 +40,23 @@ def tint_hair(face: Face, colour: str) -> Face:
         face,
         colours=colours,
         hairdo=Hairdo("" if face.hairdo is None else face.hairdo.haircut, colour),
-        light=light.changed(lambda baked: _tinted(baked, tint, srgb)),
+        light=light.changed(lambda baked: _tinted(baked, tint, srgb, _seen_texels(face, baked))),
     )
+
+
+def _seen_texels(face: Face, light: BakedLight) -> NDArray[np.float64]:
+    """(N, 2) places in the page of the hair, one in each cell of a grid in which hair is nearest to who looks at it."""
+    hair = next(part for part in face.parts if part.name == HAIR_PART)
+    numbers = np.unique(light.triangle_numbers)
+    corners, is_hair = face.triangles[numbers], (numbers >= hair.first) & (numbers < hair.first + hair.count)
+    points = (WITHIN @ face.vertices[corners]).reshape(-1, 3)
+    cells = np.floor(points[:, :2] / CELL_MM).astype(np.int64)
+    _, cell = np.unique(cells, axis=0, return_inverse=True)
+    order = np.lexsort((points[:, 2], cell.ravel()))
+    last = np.append(np.diff(cell.ravel()[order]) > 0, True)
+    nearest = order[last & np.repeat(is_hair, len(WITHIN))[order]]
+    places: NDArray[np.float64] = (WITHIN @ np.asarray(face.uv, np.float64)[corners]).reshape(-1, 2)[nearest]
+    return places
 
 
 def _brackets(known: NDArray[np.float64], wanted: NDArray[np.float64]) -> Iterator[tuple[tuple[int, int], float]]:
@@ -47,9 +68,10 @@ def _brackets(known: NDArray[np.float64], wanted: NDArray[np.float64]) -> Iterat
         yield (low, high), float((level - levels[low]) / (levels[high] - levels[low]))
 
 
-def _tinted(light: BakedLight, tint: HairTint, srgb: NDArray[np.float64]) -> BakedLight:
+def _tinted(light: BakedLight, tint: HairTint, srgb: NDArray[np.float64], seen: NDArray[np.float64]) -> BakedLight:
     """Light with hair in a colour: linear light is interpolated between those of the hair's known colours.
 
+    The middle of what is `seen` (N, 2) of the hair shows the colour; beyond the known ones their light is scaled.
     The view transform is undone and done along its greys, by one curve a channel; what it mixes of the channels cancels
     at the known colours. What changes with the camera is gloss, which adds to the hair and shows the less the lighter
     it is.
@@ -66,10 +88,19 @@ def _tinted(light: BakedLight, tint: HairTint, srgb: NDArray[np.float64]) -> Bak
     small = (light.turn_side, high * light.turn_side // wide)
     before = resized(own, small)
     curves = [*zip(*grey_curves(light.view), strict=True)]
-    brackets = _brackets(decode_srgb(tint.colours.astype(np.float64)), decode_srgb(srgb))
-    for channel, ((to_light, bounds), (pair, share)) in enumerate(zip(curves, brackets, strict=True)):
-        first, second = (to_light[known[at][..., channel]] for at in pair)
-        own[..., channel] = np.searchsorted(bounds, first + np.float32(share) * (second - first))
+    at = np.minimum((seen * [len(own[0]), side]).astype(np.int64), [len(own[0]) - 1, len(own) - 1])
+    for channel, (to_light, bounds) in enumerate(curves):
+        pages_light = [to_light[page[..., channel]] for page in known]
+        middles = np.array([np.median(page[at[:, 1], at[:, 0]]) for page in pages_light])
+        wanted = float(np.interp(255 * srgb[channel], np.arange(256), to_light))
+        order = np.argsort(middles)
+        above = int(np.clip(np.searchsorted(middles[order], wanted), 1, len(order) - 1))
+        low, high = order[above - 1], order[above]
+        inside = float(np.clip(wanted, middles[low], middles[high]))
+        mixed = pages_light[low] + np.float32((inside - middles[low]) / (middles[high] - middles[low])) * (
+            pages_light[high] - pages_light[low]
+        )
+        own[..., channel] = np.searchsorted(bounds, np.float32(wanted / max(inside, 1e-6)) * mixed)
     grey = curves[1][0]
     # black hair has next to no light to compare with
     ratio = grey[before.max(axis=2)] / np.maximum(grey[resized(own, small).max(axis=2)], DARKEST)

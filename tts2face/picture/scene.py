@@ -61,7 +61,9 @@ class Scene:
     def pose(self, weights: NDArray[np.float32], head: NDArray[np.float32]) -> Pose:
         """The face with shape weights (K,) and a head pose (6,), lit."""
         surface, view = self.surface, self.optics.view
-        points = surface.rig.pose(weights, head)
+        points = surface.rig.deform(weights)
+        surface.rig.sink_eyes(weights, points)
+        surface.rig.move_head(head, points)
         lamps = self.lights[FIRST_LIGHT_ROW:, :3]
         turn = (view[:, :3] @ head_transform(head, surface.rig.pivot)[:, :3]).astype(np.float32)
         eyes = surface.eyes.table((points, weights, head), view, lamps)

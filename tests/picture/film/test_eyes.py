@@ -1,47 +1,44 @@
-"""Eyes: the mirror image of the lamps, and the view transform."""
+"""Eyes: what they mirror, their catchlight, and the view transform."""
 
 import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 
 from tts2face.models.view_transform import table_levels
-from tts2face.picture.baked.eyes import LAMP_LIGHT, N_ROWS, REFRACTION, look_up, mirror_lamps
+from tts2face.picture.baked.eyes import CATCHLIGHT, KEY, N_EYE_COLUMNS, N_ROWS, REFRACTION, look_up, shine
+from tts2face.picture.catchlights import RIGHT, SCALE, STRENGTH, UP
 
 CAMERA = np.zeros(15, np.float32)
 SKY = np.array([0.1, 0.2, 0.3], np.float32)
+KEY_LIGHT = 2.0
 
 
-def lamp_at(z: float, facing: float) -> np.ndarray:
-    row = np.zeros(17, np.float32)
-    row[2], row[3], row[7], row[11], row[12:14] = z, 1.0, 1.0, facing, 50.0
-    row[LAMP_LIGHT:] = 7.0
-    return row
-
-
-def mirrored(lamps, normal=(0.0, 0.0, 1.0), point=(0.0, 0.0, -500.0)):
-    rows = np.zeros((N_ROWS, 3), np.float32)
-    rows[:6] = np.array([*point, *normal], np.float32)[:, None]
-    mirror_lamps(CAMERA, np.array(lamps, np.float32).reshape(-1, 17), SKY, rows)
+def shown(normal=(0.0, 0.0, 1.0), strength=0.0):
+    """Light of a black eyeball, which has a catchlight in the direction of z."""
+    rows, eye = np.zeros((N_ROWS, 3), np.float32), np.zeros((1, N_EYE_COLUMNS), np.float32)
+    rows[:6] = np.array([0, 0, -500, *normal], np.float32)[:, None]
+    eye[0, KEY:CATCHLIGHT], row = KEY_LIGHT, eye[0, CATCHLIGHT:]
+    row[RIGHT], row[UP + 1], row[SCALE], row[STRENGTH] = 1, 1, 10, strength
+    shine(CAMERA, eye, SKY, rows)
     assert (rows[6:9] == rows[6:9, :1]).all()
     return rows[6:9, 0]
 
 
-def test_an_eye_mirrors_the_lamp_behind_the_camera_by_fresnels_share() -> None:
+def test_an_eye_mirrors_the_sky_by_fresnels_share_and_the_rim_mirrors_more() -> None:
     share = ((REFRACTION - 1) / (REFRACTION + 1)) ** 2
-    assert mirrored([lamp_at(300, -1)]) == pytest.approx(share * (SKY + 7), rel=1e-4)
-    assert mirrored([lamp_at(300, 1)]) == pytest.approx(share * SKY, rel=1e-4)  # it shines the other way
-    assert mirrored([lamp_at(-900, -1)]) == pytest.approx(share * SKY, rel=1e-4)  # it stands behind the eye
-    assert mirrored([lamp_at(300, -1)], normal=(0, 0, -1)) == pytest.approx(0)
+    assert shown() == pytest.approx(share * SKY, rel=1e-4)
+    assert shown(normal=(0, 0, -1)) == pytest.approx(0)
+    assert (shown(normal=(np.sin(1.4), 0, np.cos(1.4))) > 5 * shown()).all()
 
 
-def test_a_mirrored_lamp_has_soft_edges_and_the_rim_mirrors_more() -> None:
-    tilts = np.radians(np.linspace(0, 4, 60))
-    seen = [mirrored([lamp_at(0, -1)], normal=(np.sin(a), 0, np.cos(a)))[0] for a in tilts]
-    assert (np.diff(seen) < 1e-4).all()
-    between = [value for value in seen if 1.2 * seen[-1] < value < 0.8 * seen[0]]
-    assert len(between) >= 3
-    flat = mirrored([], normal=(np.sin(1.4), 0, np.cos(1.4)))
-    assert (flat > 5 * mirrored([])).all()
+def test_a_catchlight_is_round_with_a_soft_edge() -> None:
+    assert shown(strength=1) == pytest.approx(KEY_LIGHT, rel=1e-3)
+    off = np.linspace(0, 0.2, 60)
+    for way in ((1, 0), (0, 1), (0.6, -0.8)):
+        seen = np.array([shown((way[0] * a, way[1] * a, np.sqrt(1 - a * a)), 1)[0] for a in off])
+        assert (np.diff(seen) < 1e-4).all()
+        assert ((seen > 0.2) & (seen < 1.8)).sum() > 10
+        assert seen[-1] < 0.01
 
 
 def test_the_view_transform_is_read_between_its_entries() -> None:

@@ -22,6 +22,7 @@ from tts2face.interchange.gltf.container import INDICES, VERTICES, GltfBuffer
 from tts2face.models.face import Face, Texture
 from tts2face.models.light import Lamps, Photographed
 from tts2face.models.photo_view import HEAD_LIMIT_RAD, SHIFT_GAIN
+from tts2face.picture import catchlights
 from tts2face.picture.camera import FIELD_OF_VIEW_RAD, framing_box
 from tts2face.picture.camera_view import NAMED_VIEWS
 from tts2face.picture.cards import SKULL_CENTRE_MM
@@ -227,7 +228,8 @@ def _stage(face: Face, surface: Surface, skeleton: Skeleton, channels: tuple[str
                 if turn.any()
             },
             "iris": float(surface.eyes.iris[number]),
-            "radius": float(surface.eyes.radius[number]) / MM_PER_M,
+            "radius": float(surface.eyes.openings.radius[number]) / MM_PER_M,
+            "catchlight": float(surface.eyes.sizes[number]),
             "lids": _lids(surface, number),
         }
         for number in range(len(face.eyes))
@@ -237,6 +239,15 @@ def _stage(face: Face, surface: Surface, skeleton: Skeleton, channels: tuple[str
         "pivot": (skeleton.places[HEAD] / MM_PER_M).tolist(),
         "head": list(HEAD_CHANNELS),
         "eyes": eyes,
+        "catchlight": {
+            "height": catchlights.HEIGHT_SHARE,
+            "aside": float(np.sign(lamps.LAMPS[0][0])) * catchlights.ASIDE_SHARE,
+            "most": catchlights.MOST_OF_SEEN,
+            "grows": [catchlights.SMALL, catchlights.WHOLE],
+            "appears": [catchlights.HIDDEN, catchlights.CLEAR],
+            "turns": [catchlights.AWAY, catchlights.TOWARDS],
+            "soft": catchlights.SOFT,
+        },
         "opening": {name: float(value) for name, value in zip(channels, opening, strict=True) if value},
         **_cameras(face),
         "field_of_view": FIELD_OF_VIEW_RAD,
@@ -291,9 +302,8 @@ def _wall(face: Face) -> list[list[float]]:
 
 def _lids(surface: Surface, eye: int) -> list[list[list[float]]]:
     """Places of the lid landmarks at rest in metres, upper and lower; empty for a face without them."""
-    rows = surface.eyes.lids[eye]
-    if (rows < 0).any():
+    openings = surface.eyes.openings
+    if not openings.found[eye]:
         return []
-    corners = surface.rig.rest[surface.eyes.corners[rows]] / MM_PER_M
-    places: list[list[list[float]]] = np.einsum("slcx,slc->slx", corners, surface.eyes.weights[rows]).tolist()
+    places: list[list[list[float]]] = (openings.edges(surface.rig.rest)[openings.found[:eye].sum()] / MM_PER_M).tolist()
     return places

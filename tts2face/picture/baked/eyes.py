@@ -1,7 +1,7 @@
-"""Eyes: their texture in the baked light of the socket, and the lamps that they mirror, through the view transform.
+"""Eyes: their texture in the baked light of the socket, the sky that they mirror and the catchlight of the key lamp.
 
 What eyes mirror moves with the gaze and the camera; nothing that is baked can do this. The few fragments of eyeballs
-are gathered into rows of long arrays, over which the lamps are added up.
+are gathered into rows of long arrays.
 """
 
 from typing import Any
@@ -10,21 +10,22 @@ import numpy as np
 
 from tts2face.models.view_transform import OFFSET, SPAN
 from tts2face.numeric.arrays import Array
-from tts2face.numeric.kernels import HALF, UNIT, ZERO, inlined_kernel, kernel, vectorized_kernel
+from tts2face.numeric.kernels import HALF, UNIT, ZERO, inlined_kernel, kernel
 from tts2face.picture.baked.visibility import NEAR, X, Y
+from tts2face.picture.catchlights import N_CATCHLIGHT_COLUMNS, catchlight
 
 EDGE_RAD = 1.1  # angle from the gaze at the edge of the texture
 REFRACTION = 1.45  # index of the cornea
-SOFT_EDGE = 0.035  # of a mirrored lamp, a share of its distance
-# Columns of a row for an eye: its centre, the rotation from its own axes, by rows, the edges of pupil and iris, and the
-# scale of the texture in the pupil and beside it.
-CENTRE, TURN, PUPIL, IRIS, INNER, OUTER = 0, 3, 12, 13, 14, 15
-N_EYE_COLUMNS = 16
+CATCHLIGHT_LEVEL = np.float32(1.6)  # linear light of a catchlight's strongest channel: just white
+# Columns of a row for an eye: its centre, the rotation from its own axes, by rows, the edges of pupil and iris, the
+# scale of the texture in the pupil and beside it, the light of its catchlight and its row.
+CENTRE, TURN, PUPIL, IRIS, INNER, OUTER, KEY, CATCHLIGHT = 0, 3, 12, 13, 14, 15, 16, 19
+N_EYE_COLUMNS = CATCHLIGHT + N_CATCHLIGHT_COLUMNS
 POSITION, AXES, FOCAL, MIDDLE_X, MIDDLE_Y = 0, 3, 12, 13, 14  # of a camera: place, right, down, ahead, lens
-LAMP_CENTRE, LAMP_ACROSS, LAMP_UP, LAMP_NORMAL, LAMP_WIDE, LAMP_HIGH, LAMP_LIGHT = 0, 3, 6, 9, 12, 13, 14
-# Rows of the fragments of eyes: place, normal, and linear light.
-PLACE, FACES, LIGHT, MIRROR = 0, 3, 6, 9  # the last four: mirror direction and Fresnel's share
-N_ROWS = 13
+LAMP_LIGHT = 14  # column of the radiance of a lamp
+# Rows of the fragments of eyes: place, normal, linear light, and number of the eye.
+PLACE, FACES, LIGHT, EYE = 0, 3, 6, 9
+N_ROWS = 10
 TAN_TERMS = (0.9999955, -0.3329886, 0.1955891, -0.1211095, 0.0573306, -0.0134222)  # of the angle over its tangent
 _LEVEL_SCALE = np.float32(32 / SPAN / np.log(2.0))
 _OFFSET = np.float32(OFFSET)
@@ -65,7 +66,7 @@ def place_eyes(
     colour: Array,
     rows: Array,
 ) -> None:
-    """Write places, normals and the light of the texture (13, M) of the fragments of eyeballs.
+    """Write places, normals, the light of the texture and the eyes (10, M) of the fragments of eyeballs.
 
     Parameters
     ----------
@@ -94,7 +95,7 @@ def place_eyes(
         ahead = UNIT / ((UNIT - s - r) * table[a, NEAR] + s * table[b, NEAR] + r * table[c, NEAR])
         right = (across[i] + HALF - camera[MIDDLE_X]) * ahead / camera[FOCAL]
         below = (down[i] + HALF - camera[MIDDLE_Y]) * ahead / camera[FOCAL]
-        e = eye_of[t]
+        rows[EYE, n] = e = eye_of[t]
         px = camera[0] + camera[AXES] * right + camera[AXES + 3] * below + camera[AXES + 6] * ahead
         py = camera[1] + camera[AXES + 1] * right + camera[AXES + 4] * below + camera[AXES + 7] * ahead
         pz = camera[2] + camera[AXES + 2] * right + camera[AXES + 5] * below + camera[AXES + 8] * ahead
@@ -123,47 +124,22 @@ def place_eyes(
             rows[LIGHT + k, n] = (upper * (UNIT - fy) + lower * fy) * colour[k, i]
 
 
-@vectorized_kernel
-def mirror_lamps(camera: Array, lamps: Array, sky: Array, rows: Array) -> None:
-    """Add the radiance of lamps (L, 17) and sky (3,) in the mirror direction, by Fresnel's share, to rows (13, M)."""
-    n = rows.shape[1]
-    least = np.float32(-0.0001)
-    x, y, z, share = rows[MIRROR], rows[MIRROR + 1], rows[MIRROR + 2], rows[MIRROR + 3]
-    for i in range(n):
+@kernel
+def shine(camera: Array, eyes: Array, sky: Array, rows: Array) -> None:
+    """Add the radiance of the sky (3,) by Fresnel's share to rows (10, M), and lay catchlights over them."""
+    for i in range(rows.shape[1]):
         a, b, c = rows[0, i] - camera[0], rows[1, i] - camera[1], rows[2, i] - camera[2]
-        scale = UNIT / np.sqrt(a * a + b * b + c * c)
-        a, b, c = a * scale, b * scale, c * scale
-        facing = -(a * rows[3, i] + b * rows[4, i] + c * rows[5, i])
+        x, y, z = rows[FACES, i], rows[FACES + 1, i], rows[FACES + 2, i]
+        facing = -(a * x + b * y + c * z) / np.sqrt(a * a + b * b + c * c)
         seen = max(facing, np.float32(1e-3))
-        twice = np.float32(2) * facing
-        x[i], y[i], z[i] = a + twice * rows[3, i], b + twice * rows[4, i], c + twice * rows[5, i]
         g = np.sqrt(np.float32(REFRACTION * REFRACTION - 1) + seen * seen)
         p, q = (g - seen) / (g + seen), (seen * (g + seen) - UNIT) / (seen * (g - seen) + UNIT)
-        share[i] = np.float32(0.5) * p * p * (UNIT + q * q) if facing > ZERO else ZERO
-        rows[6, i] += share[i] * sky[0]
-        rows[7, i] += share[i] * sky[1]
-        rows[8, i] += share[i] * sky[2]
-    for k in range(len(lamps)):
-        lamp = lamps[k]
-        nx, ny, nz = lamp[LAMP_NORMAL], lamp[LAMP_NORMAL + 1], lamp[LAMP_NORMAL + 2]
-        ax, ay, az = lamp[LAMP_ACROSS], lamp[LAMP_ACROSS + 1], lamp[LAMP_ACROSS + 2]
-        ux, uy, uz = lamp[LAMP_UP], lamp[LAMP_UP + 1], lamp[LAMP_UP + 2]
-        lx, ly, lz, wide, high = lamp[0], lamp[1], lamp[2], lamp[LAMP_WIDE], lamp[LAMP_HIGH]
-        red, green, blue = lamp[LAMP_LIGHT], lamp[LAMP_LIGHT + 1], lamp[LAMP_LIGHT + 2]
-        for i in range(n):
-            towards = x[i] * nx + y[i] * ny + z[i] * nz
-            dx, dy, dz = lx - rows[0, i], ly - rows[1, i], lz - rows[2, i]
-            far = (dx * nx + dy * ny + dz * nz) / min(towards, least)
-            hx, hy, hz = far * x[i] - dx, far * y[i] - dy, far * z[i] - dz
-            soft = max(np.float32(SOFT_EDGE) * far, np.float32(1e-6))
-            p = (wide + soft - abs(hx * ax + hy * ay + hz * az)) / (np.float32(2) * soft)
-            q = (high + soft - abs(hx * ux + hy * uy + hz * uz)) / (np.float32(2) * soft)
-            p, q = min(max(p, ZERO), UNIT), min(max(q, ZERO), UNIT)
-            part = p * p * (np.float32(3) - np.float32(2) * p) * q * q * (np.float32(3) - np.float32(2) * q) * share[i]
-            part = part if (far > ZERO) & (towards < least) else ZERO  # it shines to the front
-            rows[6, i] += part * red
-            rows[7, i] += part * green
-            rows[8, i] += part * blue
+        share = np.float32(0.5) * p * p * (UNIT + q * q) if facing > ZERO else ZERO
+        eye = eyes[int(rows[EYE, i])]
+        lit = catchlight(eye, CATCHLIGHT, x, y, z)
+        for k in range(3):
+            light = rows[LIGHT + k, i] + share * sky[k]
+            rows[LIGHT + k, i] = light + lit * max(eye[KEY + k] - light, ZERO)
 
 
 @inlined_kernel
@@ -193,7 +169,7 @@ def colour_eyes(
     count: int,
     surface: tuple[Array, Array, Array],
     eyes: tuple[Array, Array, Array],
-    light: tuple[Array, Array, Array],
+    light: tuple[Array, Array],
     colour: Array,
 ) -> None:
     """Replace the colour (3, N) of fragments of eyeballs, which is the light on them, by how they look.
@@ -203,13 +179,13 @@ def colour_eyes(
     found, surface, eyes
         As `place_eyes`; `found` without the numbers.
     light
-        Lamps, sky, and the table of the view transform.
+        Sky, and the table of the view transform.
     """
-    lamps, sky, view = light
+    sky, view = light
     numbers = np.zeros(count + 1, np.int32)
     numbers = numbers[: find_eyes(found[0], count, surface[2], numbers)]
     if len(numbers):
         rows = np.zeros((N_ROWS, len(numbers)), np.float32)
         place_eyes((numbers, *found), surface, eyes, colour, rows)
-        mirror_lamps(eyes[2], lamps, sky, rows)
-        look_up(view, rows[LIGHT:], numbers, colour)
+        shine(eyes[2], eyes[0], sky, rows)
+        look_up(view, rows[LIGHT:EYE], numbers, colour)

@@ -15,7 +15,17 @@ from tts2face.models.light import Lit
 from tts2face.numeric.arrays import Float32Array
 from tts2face.numeric.kernels import BLOCK
 from tts2face.picture.baked.cut_out import compose_over, find_covers
-from tts2face.picture.baked.eyes import CENTRE, N_EYE_COLUMNS, PUPIL, TURN, colour_eyes
+from tts2face.picture.baked.eyes import (
+    CATCHLIGHT,
+    CATCHLIGHT_LEVEL,
+    CENTRE,
+    KEY,
+    LAMP_LIGHT,
+    N_EYE_COLUMNS,
+    PUPIL,
+    TURN,
+    colour_eyes,
+)
 from tts2face.picture.baked.interpolation import Cardinal, camera_weights, turn_weights, yaw_and_pitch_deg
 from tts2face.picture.baked.modes import add_modes, pack_change, still_change
 from tts2face.picture.baked.response import TermBuffers, add_responses, still_eyes
@@ -35,12 +45,14 @@ from tts2face.picture.baked.shading import (
 from tts2face.picture.baked.surface import TEXELS_A_PIXEL, LitSurface, build_surface, stack_pages
 from tts2face.picture.baked.visibility import N_SPAN_VALUES, NEAR, RED, X, fill_bands, find_bands, find_nearest, project
 from tts2face.picture.camera import CameraMatrices
+from tts2face.picture.catchlights import PLACE_RIGHT, UP
 from tts2face.picture.options import Picture
 
 BLINK_SHRINK = 0.075  # of the ball behind a shut lid, times its weight to the fourth power
 BLINKS = ("eyeBlinkLeft", "eyeBlinkRight")  # of the face's eyes
 BEHIND_SHARE = np.float32(0.8)  # of the nearness of what lies in openings
 BAND_PIXELS = 32_768
+KEY_ASIDE = 0.3  # sine of the key lamp's angle from the line of sight, from which catchlights are all to its side
 
 
 @dataclass(slots=True, eq=False)
@@ -154,8 +166,8 @@ class LitScene:
         buffers.table[surface.behind, NEAR] *= BEHIND_SHARE
         rows = buffers.band_rows
         order, ends = self._sort(len(pixels) * side, buffers)
-        eyes = (self._eye_rows(weights, head), surface.eye_texture, self.camera)
-        light = (self._lamps(head), surface.light.sky, self.view)
+        eyes = (self._eye_rows((points, weights, head)), surface.eye_texture, self.camera)
+        light = (surface.light.sky, self.view)
         eye_bands = self._eye_bands(buffers)
         for number, first in enumerate(range(0, len(pixels), rows)):
             band = pixels[first : first + rows]
@@ -228,6 +240,7 @@ class LitScene:
             share = 1 - BLINK_SHRINK * _weight(self.face, weights, BLINKS[number]) ** 4
             span = slice(eye.first, eye.first + eye.count)
             points[span] = eye.centre + share * (points[span] - eye.centre)
+        self.surface.rig.sink_eyes(weights, points)
         self.surface.rig.move_head(head, points)
 
     def light_pose(self, points: Float32Array, head: Float32Array, buffers: LitBuffers) -> None:
@@ -250,7 +263,9 @@ class LitScene:
         add_modes(self.from_camera.reshape(-1), modes, turn @ light.turn_weights, buffers.change.reshape(-1))
         pack_change(buffers.change, buffers.changed)
 
-    def _eye_rows(self, weights: Float32Array, head: Float32Array) -> Float32Array:
+    def _eye_rows(self, pose: tuple[Float32Array, Float32Array, Float32Array]) -> Float32Array:
+        """Rows of the eyes for (vertices, shape weights, head pose)."""
+        _, weights, head = pose
         moved = head_transform(head, self.face.pivot)
         rows = np.zeros((len(self.face.eyes), N_EYE_COLUMNS), np.float32)
         for row, eye, turn in zip(
@@ -260,20 +275,22 @@ class LitScene:
             row[TURN : TURN + 9] = (moved[:, :3] @ turn).ravel()
         painted, iris = self.surface.light.eye_edges
         pupil = min(painted * (1 + DILATION * _weight(self.face, weights, PUPIL_SHAPE)), 0.95 * iris)
-        rows[:, PUPIL:] = pupil, iris, painted / pupil, (iris - painted) / (iris - pupil)
+        rows[:, PUPIL:KEY] = pupil, iris, painted / pupil, (iris - painted) / (iris - pupil)
+        # a picture keeps the light that it has
+        if len(lamps := self.surface.light.lamps):
+            view = self.optics.view
+            seen = self.surface.eyes.seen(pose, view)
+            lamp = view[:, :3] @ lamps[0, :3] + view[:, 3] - seen[0].mean(axis=0)
+            spots = self.surface.eyes.catchlights(
+                seen, float(np.clip(lamp[0] / np.linalg.norm(lamp) / KEY_ASIDE, -1, 1))
+            )
+            spots[:, :UP], spots[:, UP:PLACE_RIGHT] = (
+                spots[:, :UP] @ view[:, :3],
+                spots[:, UP:PLACE_RIGHT] @ view[:, :3],
+            )
+            colour = lamps[0, LAMP_LIGHT:]
+            rows[:, KEY:CATCHLIGHT], rows[:, CATCHLIGHT:] = CATCHLIGHT_LEVEL * colour / max(colour.max(), 1e-6), spots
         return rows
-
-    def _lamps(self, head: Float32Array) -> Float32Array:
-        light = self.surface.light
-        if not light.head_lamps:
-            return light.lamps
-        lamps, moved = light.lamps.copy(), head_transform(head, self.face.pivot)
-        own = lamps[-light.head_lamps :]
-        for _ in range(2):
-            own[:, :3] = own[:, :3] @ moved[:, :3].T + moved[:, 3]
-            for first in (3, 6, 9):
-                own[:, first : first + 3] = own[:, first : first + 3] @ moved[:, :3].T
-        return lamps
 
 
 def _weight(face: Face, weights: Float32Array, name: str) -> float:

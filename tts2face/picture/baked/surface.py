@@ -14,6 +14,7 @@ from tts2face.numeric.arrays import connected_pieces, decode_srgb
 from tts2face.picture.baked.closed_mouth import close_mouth, wall_colours
 from tts2face.picture.baked.response import LightTerms, light_terms
 from tts2face.picture.baked.visibility import MAX_TRIANGLES, N_COLUMNS, RED, U, V
+from tts2face.picture.kernels.eyes import EyeGeometry, eye_geometry
 from tts2face.processes.shared import shared
 
 OPAQUE, COVER_SHIFT = 255, 24  # cover of pages without any, and its bits in a texel
@@ -45,6 +46,8 @@ class LitSurface:
         Linear light.
     terms
         Of the vertices that are lit.
+    eyes
+        For their catchlights.
     """
 
     face: Face
@@ -59,6 +62,7 @@ class LitSurface:
     eye_of: NDArray[np.int32]
     of_eyes: NDArray[np.intp]
     eye_texture: NDArray[np.float32]
+    eyes: EyeGeometry
 
 
 @shared
@@ -117,6 +121,7 @@ def build_surface(face: Face, own: Lit) -> LitSurface:
         eye_of=eye_of,
         of_eyes=np.flatnonzero(eye_of >= 0),
         eye_texture=(decode_srgb(picture / 255.0) * light.eye_gain).astype(np.float32),
+        eyes=eye_geometry(face, rig),
     )
 
 

@@ -23,6 +23,10 @@ export function sharedUniforms(stage) {
     eyeAcross: { value: new THREE.Vector3(1, 0, 0) },
     eyeUp: { value: new THREE.Vector3(0, 1, 0) },
     lids: { value: vectors(36, THREE.Vector2) },
+    eyeSpot: { value: vectors(2, THREE.Vector4) },
+    spotRight: { value: vectors(2) },
+    spotUp: { value: vectors(2) },
+    spotSoft: { value: stage.catchlight.soft },
     iris: { value: stage.eyes[0]?.iris ?? 0.868 },
     eyeScale: { value: stage.eyes.length ? 12 / stage.eyes[0].radius : 1 }, // to mm of an eyeball of 12 mm
     hasLids: { value: stage.eyes.length === 2 && stage.eyes.every((eye) => eye.lids.length) ? 1 : 0 },

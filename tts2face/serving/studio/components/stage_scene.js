@@ -1,6 +1,7 @@
 // The scene of the stage: camera and lamps as in the renderer, and the face at an instant.
 
 import { OrbitControls, THREE } from "nicegui-scene";
+import { placeCatchlight } from "./stage_catchlights.js";
 import { StageFace } from "./stage_face.js";
 import { partMaterial, sharedUniforms, wallMaterial } from "./stage_materials.js";
 
@@ -153,11 +154,12 @@ export class StageScene {
       joints[2 + number].copy(head).multiply(about(rolled, centre));
       shared.eyeCentres.value[number].copy(centre).applyMatrix4(head);
       shared.eyeGaze.value[number].set(0, 0, 1).transformDirection(rolled).transformDirection(turn);
-      eye.lids.forEach((lid, side) =>
-        lid.forEach((vertex, i) => {
+      eye.edges = eye.lids.map((lid, side) =>
+        lid.map((vertex, i) => {
           const place = face.place(vertex);
           const across = (place[0] - centre.x) * scale, height = (place[1] - centre.y) * scale;
           shared.lids.value[number * 18 + side * 9 + i].set(across, height);
+          return new THREE.Vector3(...place).applyMatrix4(head);
         }),
       );
     });
@@ -170,7 +172,19 @@ export class StageScene {
     const towards = this.camera.position.clone().sub(this.controls.target);
     const yaw = Math.atan2(towards.x, towards.z);
     if (!(Math.abs(yaw - this.litYaw) < LIGHT_STEP)) this.turnLamps((this.litYaw = yaw));
+    this.placeCatchlights();
     this.renderer.render(this.scene, this.camera);
+  }
+
+  placeCatchlights() {
+    const { face: { eyes, stage }, shared } = this;
+    this.camera.updateMatrixWorld();
+    eyes.slice(0, 2).forEach((eye, number) => {
+      const centre = shared.eyeCentres.value[number], gaze = shared.eyeGaze.value[number];
+      const lids = (eye.edges ?? []).map((lid) => lid.map((place) => place.clone().sub(centre).divideScalar(eye.radius)));
+      const [right, up, spot] = [shared.spotRight, shared.spotUp, shared.eyeSpot].map(({ value }) => value[number]);
+      placeCatchlight(this.camera, centre, gaze, lids, eye.iris, eye.catchlight, stage.catchlight, { right, up, spot });
+    });
   }
 
   /** The lamps turn with the camera, as in the renderer. */

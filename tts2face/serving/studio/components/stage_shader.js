@@ -169,10 +169,9 @@ export const VERTEX = `
 const EYES = `
   uniform vec3 eyeCentres[2], eyeGaze[2], eyeAcross, eyeUp;
   uniform vec2 lids[36];
-  uniform float iris, eyeScale, hasLids;
-  float softEdge(float distance, float halfWidth, float slope) {
-    return 1. / (1. + exp((abs(distance) - halfWidth) * slope));
-  }
+  uniform float iris, eyeScale, hasLids, spotSoft;
+  uniform vec4 eyeSpot[2];
+  uniform vec3 spotRight[2], spotUp[2];
   float lidHeight(int begin, float across) {
     for (int k = 0; k < 8; k++) {
       vec2 a = lids[begin + k], b = lids[begin + k + 1];
@@ -185,14 +184,11 @@ const EYES = `
     vec3 offset = place - eyeCentres[best], gaze = eyeGaze[best];
     vec3 out_ = normalize(offset);
     float ahead = dot(out_, gaze);
-    float bump = clamp((ahead - iris + .008) * 20., 0., 1.) * .85;
-    vec3 cornea = normalize(out_ + bump * (out_ - gaze * ahead));
     mat3 level = mat3(viewMatrix);
-    vec3 mirrored = level * (2. * max(dot(cornea, towards), 0.) * cornea - towards);
-    float glow = 0.;
-    vec3 key = level * lamps[0], fill = level * lamps[1], from = level * out_;
-    if (dot(mirrored, key) > 0.) glow += 1.2 * softEdge(mirrored.x - key.x, .17, 40.) * softEdge(mirrored.y - key.y, .22, 40.);
-    if (dot(mirrored, fill) > 0.) glow += .16 * softEdge(mirrored.x - fill.x, .17, 30.) * softEdge(mirrored.y - fill.y, .22, 30.);
+    vec3 key = level * lamps[0], from = level * out_;
+    vec4 spot = eyeSpot[best];
+    float off = length(vec2(dot(out_, spotRight[best]), dot(out_, spotUp[best])) - spot.xy) * spot.z;
+    float glow = 1.2 * spot.w * (1. - smoothstep(1. - spotSoft, 1. + spotSoft, off));
     float edge = (ahead - iris - .006) * 80., ring = 1. - .6 * exp(-edge * edge);
     bool inside = ahead > iris;
     float lateral = dot(level * (out_ - gaze * ahead), vec3(key.xy, 0.));
