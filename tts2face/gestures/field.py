@@ -30,6 +30,7 @@ AXES_STRIDE = 8  # the axes are computed from every eighth window; all windows g
 CACHE_KIND, CACHE_VERSION = "field", 2  # raised when the index of the same recordings changes
 MIN_CACHED_MOMENTS = 5000  # fewer are indexed as fast as a file is read
 TREE_ARRAYS = tuple(field.name for field in fields(KdTree))
+LEAST_SPREAD = 1e-6  # of a feature of sound that is compared
 N_DISTANCE_SAMPLES = 200  # moments from which the median nearest distance is estimated
 
 
@@ -44,7 +45,9 @@ class FieldOptions:
     candidates
         Number of moments from which one is sampled.
     alpha
-        Weight of each sound feature relative to the motion, both in units of their variance.
+        Weight of loudness and pitch relative to the motion, all in units of their variance.
+    speech_alpha
+        Weights of the `speech_features`, where they are compared.
     sigma
         Distance that lowers the probability of a moment by the factor e, in units of the median distance between a
         recorded moment and its nearest neighbour.
@@ -67,7 +70,8 @@ class FieldOptions:
 
     history: int = 10
     candidates: int = 3
-    alpha: tuple[float, ...] = (10.0, 1.0)
+    alpha: tuple[float, ...] = (10.0, 10.0)
+    speech_alpha: tuple[float, ...] = (10.0, 10.0, 10.0, 3.0)
     sigma: float = 0.1
     stride: int = 6
     continuity: float = 0.05
@@ -86,7 +90,7 @@ class FieldOptions:
             raise InputError(f"the memory of a field must be 0 to 1000 jumps, not {self.memory}")
         if not 1 <= self.candidates <= 16:
             raise InputError(f"the candidates of a field must be 1 to 16, not {self.candidates}")
-        if min(self.alpha, default=0.0) < 0 or not self.sigma > 0 or not self.settle_s >= 0:
+        if min((*self.alpha, *self.speech_alpha), default=0.0) < 0 or not self.sigma > 0 or not self.settle_s >= 0:
             raise InputError("a field's alpha and settling time must not be negative, its sigma must be above 0")
         if not 0 <= self.continuity <= 1:
             raise InputError(f"a field's continuity must lie from 0 to 1, not {self.continuity}")
@@ -191,8 +195,10 @@ def build_field(
 
     def indexed() -> Field:
         scale = float(np.sqrt(np.square(values - values.mean(axis=0)).sum(axis=1).mean())) or 1.0
-        spread = np.maximum(prosody.std(axis=0), 1e-6)
-        weights = (np.sqrt(np.array(options.alpha[: prosody.shape[1]])) / spread).astype(np.float32)
+        spread = prosody.std(axis=0)
+        # recordings without sound have nothing to compare
+        alpha = np.where(spread > LEAST_SPREAD, np.array(options.alpha[: prosody.shape[1]]), 0.0)
+        weights = (np.sqrt(alpha) / np.maximum(spread, LEAST_SPREAD)).astype(np.float32)
         return _index_field(unindexed(scale, weights), usable)
 
     if len(usable) < MIN_CACHED_MOMENTS:

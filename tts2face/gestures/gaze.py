@@ -73,10 +73,15 @@ class _Rest:
 
 
 class _Place(NamedTuple):
-    """Whether a phrase begins or ends about a frame, and seconds to the end of the sentence; infinite in silence."""
+    """Place of a frame in speech.
+
+    Whether a phrase begins or ends about it, whether the sentence is for the partner (a question, a list, a contrast),
+    and seconds to its end; infinite in silence.
+    """
 
     is_start: bool
     is_end: bool
+    is_addressed: bool
     left_s: float
 
 
@@ -132,8 +137,10 @@ class GazeProcess:
         if place.left_s == math.inf or self._state == LISTENING:
             return left <= 0.0
         if self._fixations[-1].is_on_face:
-            return place.is_start and left <= EARLY_S and place.left_s > LAST_S
-        return place.left_s < BACK_S or left <= -PATIENCE_S or (place.is_end and left <= EARLY_S / 2)
+            return place.is_start and left <= EARLY_S and place.left_s > LAST_S and not place.is_addressed
+        return (
+            place.is_addressed or place.left_s < BACK_S or left <= -PATIENCE_S or (place.is_end and left <= EARLY_S / 2)
+        )
 
     def at(self, times: FloatArray) -> Float32Array:
         """Gaze (T, 2) in radians down and left at increasing times (T,); earlier fixations are forgotten."""
@@ -275,11 +282,12 @@ def microsaccades(times: FloatArray, seed: int) -> FloatArray:
 def _places(frames: FrameContext) -> Iterator[_Place]:
     """The place in speech of each frame."""
     times, left = frames.times, np.full(len(frames.times), np.inf)
-    at_start, at_end = np.zeros(len(times), bool), np.zeros(len(times), bool)
+    at_start, at_end, addressed = np.zeros((3, len(times)), bool)
     for sentence in frames.plan.sentences:
         inside = (times >= sentence.span.start - NEAR_S) & (times < sentence.span.end)
         left[inside] = sentence.span.end - times[inside]
+        addressed |= inside & bool(sentence.question is not None or sentence.items or sentence.sides)
         for phrase in sentence.phrases:
             at_start |= np.abs(times - phrase.start) < NEAR_S
             at_end |= np.abs(times - phrase.end) < NEAR_S
-    return map(_Place, at_start.tolist(), at_end.tolist(), left.tolist())
+    return map(_Place, at_start.tolist(), at_end.tolist(), addressed.tolist(), left.tolist())

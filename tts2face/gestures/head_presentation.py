@@ -18,7 +18,7 @@ SLOW_HZ = 0.7  # cut-off of the part that is scaled: turns and tilts that last a
 RETURN_HZ = 0.12  # cut-off of what is subtracted, so that the head drifts back to the viewer within some 10 s
 # Standard deviation in radians to which the slow part is scaled, and the largest angle of it. Speakers who look at a
 # listener move by 2 to 5 degrees (yaw) about the direction to the listener.
-TARGET_SPREAD = {"pitch": np.radians(1.2), "yaw": np.radians(4.0), "roll": np.radians(1.2)}
+TARGET_SPREAD = {"pitch": np.radians(1.2), "yaw": np.radians(3.4), "roll": np.radians(1.2)}
 LARGEST_RATIO = 2.6  # of the slow part, in units of its target spread; approached smoothly
 # of a style that hardly moves: more would scale the noise of its tracking
 MAX_SCALE = 20.0

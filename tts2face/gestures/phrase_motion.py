@@ -42,7 +42,7 @@ BROW_TAIL_S, BROW_TAIL_WIDTH_S = 0.25, 0.16
 SIDE_SPREAD = 0.16  # of left against right, which people's brows have
 EMPHASIS_DEG, EMPHASIS_MM = 2.6, 1.3  # chin down and brows up on an emphasised word
 # A question: brows up and the head a little aside from its stressed word on, and the chin falls less at its end.
-QUESTION_MM, QUESTION_TILT_DEG = 1.7, 2.6
+QUESTION_MM, QUESTION_TILT_DEG = 2.2, 3.0
 QUESTION_FALL = 0.25
 OPEN_QUESTION = 0.6  # share where the tune falls: who, when, why
 ASK_S, ASKED_S = 0.3, 0.6  # in which that begins and ends

@@ -36,8 +36,8 @@ PEAK_DB, PEAK_RANGE_DB = -8.0, 6.0
 MEAN_PROMINENCE, PROMINENCE_SPREAD = 0.5, 0.6  # of the vowels of a sentence
 MOST_PROMINENT = 1.6
 LEAST_PROMINENCE, LEAST_GAP_S = 0.15, 0.25  # of an accent, and between two
-ASKED_S = 0.9  # before the end, in which a question whose tune does not rise is shown
-LEAD_S = 0.25  # before its stressed word, in which it is shown
+ASKED_S = 1.6  # at the end of a sentence, in which a question is shown at least
+LEAD_S = 0.25  # before its stressed word, from which on it is shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,12 +145,21 @@ class SoundFeatures:
         times = np.arange(0.0, max(sound.duration, STEP_S), STEP_S)
         intensity = speech_intensity(sound)
         level = prosody_features(sound, times, intensity, with_pitch=False)[:, 0].astype(np.float64)
-        pitch = semitones(sound, times)
+        return replace(cls.smoothed(times, level, semitones(sound, times)), intensity=intensity)
+
+    @classmethod
+    def smoothed(cls, times: FloatArray, level: FloatArray, pitch: FloatArray) -> "SoundFeatures":
+        """Features of equal steps of time, smoothed; `pitch` is NaN where there is no voice."""
         voiced = np.isfinite(pitch)
         pitch = np.interp(times, times[voiced], pitch[voiced]) if voiced.any() else np.zeros(len(times))
-        spread = SMOOTHING_S / STEP_S
+        spread = SMOOTHING_S / STEP_S if len(times) < 2 else SMOOTHING_S / float(times[1] - times[0])
         level, pitch = (smooth_gaussian(values, spread, round(3 * spread)) for values in (level, pitch))
-        return cls(times, level, pitch, intensity)
+        return cls(times, level, pitch)
+
+    @property
+    def step_s(self) -> float:
+        """Seconds between two times."""
+        return float(self.times[1] - self.times[0]) if len(self.times) > 1 else STEP_S
 
     def highest(self, start: float, end: float) -> tuple[float, float]:
         """Greatest level and pitch within a span."""
@@ -173,7 +182,7 @@ def plan_speech(speech: Speech, script: Sequence[TextWord], language: str, *, is
         return SpeechPlan(is_last=is_last)
     sound = SoundFeatures.of(speech.waveform)
     if not speech.words or not script:
-        return SpeechPlan(tuple(_heard_sentences(sound)), is_last, sound)
+        return SpeechPlan(tuple(heard_sentences(sound)), is_last, sound)
     return SpeechPlan(tuple(_written_sentences(_words(speech, script, sound, language), language)), is_last, sound)
 
 
@@ -264,8 +273,8 @@ def _sentence(words: Sequence[_Word], places: range, tunes: Sequence[Movement]) 
     rises = [tune for tune in tunes if tune.tune == "rise"]
     question = None
     if inside[-1].mark == "?":
-        start = words[rises[-1].at].vowel - LEAD_S if rises else span.end - ASKED_S
-        question = Span(max(start, span.start), span.end)
+        stressed = words[rises[-1].at].vowel - LEAD_S if rises else span.end
+        question = Span(max(min(stressed, span.end - ASKED_S), span.start), span.end)
     items = [words[tune.at].vowel for tune in tunes if tune.tune == "item"]
     if items:
         items.append(accents[-1].time if accents else span.end)
@@ -319,13 +328,14 @@ def _contrasts(words: Sequence[_Word]) -> Iterator[tuple[Span, Span]]:
 
 
 def _turns(words: Sequence[_Word], at: int) -> bool:
-    """Whether a word begins what is said instead: but; behind a comma or semicolon also it's, she, they."""
-    return words[at].text == "but" or (
-        words[at - 1].mark in {",", ";", "—"} and words[at].text.partition("'")[0] in WORDS["pronoun"]
-    )
+    """Whether a word begins what is said instead: but; behind a comma or semicolon also "it is", "she's"."""
+    texts = [word.text for word in words[at : at + 2]]
+    pronoun, _, verb = texts[0].partition("'")
+    is_said = pronoun in WORDS["pronoun"] and (verb in {"s", "re"} or texts[-1] in {"is", "are", "was", "were"})
+    return texts[0] == "but" or (words[at - 1].mark in {",", ";", "—"} and is_said)
 
 
-def _heard_sentences(sound: SoundFeatures) -> Iterator[SpokenSentence]:
+def heard_sentences(sound: SoundFeatures) -> Iterator[SpokenSentence]:
     """Sentences of sound whose words are not known: between long pauses; phrases between shorter ones."""
     phrases = _runs(sound, PHRASE_PAUSE_S)
     peaks = _peaks(sound)
@@ -342,7 +352,7 @@ def _runs(sound: SoundFeatures, pause_s: float) -> list[Span]:
         return []
     cuts = np.flatnonzero(np.diff(loud) > pause_s)
     starts, ends = loud[np.concatenate([[0], cuts + 1])], loud[np.concatenate([cuts, [len(loud) - 1]])]
-    spans = [Span(float(start), float(end) + STEP_S) for start, end in zip(starts, ends, strict=True)]
+    spans = [Span(float(start), float(end) + sound.step_s) for start, end in zip(starts, ends, strict=True)]
     return [span for span in spans if span.end - span.start >= LEAST_PHRASE_S]
 
 
@@ -356,7 +366,7 @@ def _peaks(sound: SoundFeatures) -> list[Accent]:
     peaks = 1 + np.flatnonzero((inner > score[:-2]) & (inner >= score[2:]) & (sound.level[1:-1] > PEAK_DB))
     chosen: list[int] = []
     for peak in peaks[np.argsort(-score[peaks], kind="stable")].tolist():
-        if all(abs(peak - other) * STEP_S >= PEAK_GAP_S for other in chosen):
+        if all(abs(peak - other) * sound.step_s >= PEAK_GAP_S for other in chosen):
             chosen.append(peak)
     middle = float(np.median(score[chosen])) if chosen else 0.0
     found = [(at, MEAN_PROMINENCE + PROMINENCE_SPREAD * (score[at] - middle) / PEAK_RANGE_DB) for at in sorted(chosen)]

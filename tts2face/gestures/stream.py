@@ -6,8 +6,7 @@ The fields of Ju and Lee 2008 as published (section 5.1), to compare with the de
 from bisect import bisect_right
 from collections.abc import Mapping
 from copy import copy, deepcopy
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from types import MappingProxyType
 from zlib import crc32
@@ -36,7 +35,7 @@ from tts2face.gestures.presentation import (
     Presentation,
     brow_lifts,
 )
-from tts2face.gestures.prosody import SpeechIntensity, prosody_features, speech_intensity
+from tts2face.gestures.speech_features import FollowedSound, recorded_features
 from tts2face.gestures.speech_plan import NO_PLAN, SpeechPlan
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.gaze import load_gaze
@@ -45,14 +44,27 @@ from tts2face.numeric.arrays import Float32Array, interpolate_cubic
 from tts2face.types import Waveform
 
 N_LOOKAHEAD_FRAMES = 2  # frames after a time that cubic interpolation needs
+# Features whose fields compare the place in speech; the expression follows it as well without (decision 243).
+FOLLOWING = frozenset({"brows", "cheeks", "head"})
 NO_CHANGE = FeatureChange()
+NEAR_ENOUGH = 1.6  # search error: with many features, motion is that of 1.1 in two thirds of the time
 NO_SEEDS: Mapping[str, int] = MappingProxyType({})
-# Tuned on three quarters of the recordings of GRID s1 (decision 175); all other features use the defaults.
+# Tuned on three quarters of the recordings of GRID s1 (decisions 175, 243); all other features use the defaults.
 OPTIONS: Mapping[str, FieldOptions] = MappingProxyType(
     {
-        "expression": FieldOptions(alpha=(3.0, 1.0), sigma=0.05, stride=4),
+        "expression": FieldOptions(alpha=(3.0, 1.0), sigma=0.05, stride=4, search_error=NEAR_ENOUGH),
+        "brows": FieldOptions(search_error=NEAR_ENOUGH),
+        "cheeks": FieldOptions(search_error=NEAR_ENOUGH),
         # decision 175 compares these with exponential decay
-        "head": FieldOptions(alpha=(16.0, 1.0), stride=2, continuity=0.07, settle_s=0.09, candidates=4),
+        "head": FieldOptions(
+            alpha=(16.0, 16.0),
+            speech_alpha=(20.0, 20.0, 20.0, 3.0),
+            stride=3,
+            continuity=0.07,
+            settle_s=0.09,
+            candidates=4,
+            search_error=NEAR_ENOUGH,
+        ),
         "blink": FieldOptions(
             alpha=(1.0, 0.1),
             sigma=0.3,
@@ -103,6 +115,7 @@ class GestureFields:
     _profiles: dict[str, tuple[NDArray[np.float64], ...]] = field(default_factory=dict)
     _scales: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     _middles: dict[tuple[str, str], Float32Array] = field(default_factory=dict)
+    _speech: dict[str, Float32Array] = field(default_factory=dict)
 
     def of(self, source: str, feature: str, *, has_blinks: bool = True) -> Field:
         """Field of a feature of a recorded style; without ``has_blinks``, of its lids between blinks."""
@@ -111,9 +124,24 @@ class GestureFields:
             style = self.palette.styles[source]
             prosody = np.stack([style.intensity, style.pitch], axis=1)[:, : 2 if self.with_pitch else 1]
             options = self.options.get(feature, FieldOptions())
+            if self.follows_speech(feature):
+                alpha = options.alpha[: prosody.shape[1]] + options.speech_alpha
+                prosody, options = (
+                    np.concatenate([prosody, self._speech_of(source)], axis=1),
+                    replace(options, alpha=alpha),
+                )
             motion = style.motion[feature] if has_blinks else lids_without_blinks(style)
             self._made[key] = build_field(motion, prosody, style.lengths, options)
         return self._made[key]
+
+    def follows_speech(self, feature: str) -> bool:
+        """Whether `recorded_features` are compared, too: not those of lids and eyes, and not as published."""
+        return self.has_presentation and feature in FOLLOWING
+
+    def _speech_of(self, source: str) -> Float32Array:
+        if source not in self._speech:
+            self._speech[source] = recorded_features(self.palette.styles[source])
+        return self._speech[source]
 
     def middle(self, source: str, feature: str) -> Float32Array:
         """`style_median` of a feature of a recorded style."""
@@ -236,7 +264,7 @@ class GestureStream:
         start = self._n_frames / self._fps
         times = (self._n_frames + np.arange(n_frames)) / self._fps
         self._n_frames += n_frames
-        values, prosody = {}, _SoundFeatures(sound, start, plan, with_pitch=self._fields.with_pitch)
+        values, prosody = {}, FollowedSound(sound, start, plan, with_pitch=self._fields.with_pitch)
         said = plan.shift(start)
         for name, track in self._tracks.items():
             track.extend(prosody, float(times[-1]), timeline, said)
@@ -249,29 +277,6 @@ class GestureStream:
             presented = sum(share for style, share in shares.items() if self._fields.presents(style))
             values["head"][:, :2] += (np.reshape(presented, (-1, 1)) * turned).astype(np.float32)
         return values
-
-
-class _SoundFeatures:
-    """Prosodic features of a sound that starts at `begin` seconds, cached by the times of the request."""
-
-    def __init__(self, sound: Waveform, start: float, plan: SpeechPlan, *, with_pitch: bool) -> None:
-        self._sound, self._plan = sound, plan
-        self._start = start
-        self._with_pitch = with_pitch
-        self._found: dict[bytes, Float32Array] = {}
-
-    @cached_property
-    def _intensity(self) -> SpeechIntensity | None:
-        return speech_intensity(self._sound) if self._plan.sound is None else self._plan.sound.intensity
-
-    def at(self, times: NDArray[np.float64]) -> Float32Array:
-        """(T, 1 or 2) as `prosody_features`."""
-        key = times.tobytes()
-        if key not in self._found:
-            self._found[key] = prosody_features(
-                self._sound, times - self._start, self._intensity, with_pitch=self._with_pitch
-            )
-        return self._found[key]
 
 
 class _FeatureTrack:
@@ -300,7 +305,7 @@ class _FeatureTrack:
         new._gaze = None if self._gaze is None else self._gaze.copy()
         return new
 
-    def extend(self, sound: "_SoundFeatures", end: float, timeline: Timeline, plan: SpeechPlan) -> None:
+    def extend(self, sound: FollowedSound, end: float, timeline: Timeline, plan: SpeechPlan) -> None:
         """Generate frames up to `N_LOOKAHEAD_FRAMES` after `end` seconds."""
         first, style_of = len(self._times), timeline.style_finder(self._feature, default=self._style)
         while len(self._times) <= N_LOOKAHEAD_FRAMES or self._times[-1 - N_LOOKAHEAD_FRAMES] <= end:
@@ -311,7 +316,7 @@ class _FeatureTrack:
             return
         styles = [style_of(second) for second in self._times[first:]]
         sources = [self._source_of(style) for style in styles]
-        prosody = sound.at(new)
+        prosody = sound.at(new, with_speech=self._fields.follows_speech(self._feature))
         chances = self._generator.random(len(new))
         borders = [0, *(i for i in range(1, len(new)) if sources[i] != sources[i - 1]), len(new)]
         parts = [self._sample(sources[low], prosody[low:high], chances[low:high]) for low, high in pairwise(borders)]

@@ -17,6 +17,7 @@ from corpus_tools.studies.gestures.clips import (
     noise_clip,
     published_clip,
     replace_style,
+    sound_of,
 )
 from corpus_tools.studies.gestures.gaze import GazeStudy, study_gaze
 from corpus_tools.studies.gestures.measures import (
@@ -220,7 +221,7 @@ def _study_style(palette: Palette, name: str, prepared: _PreparedStyle, options:
     training, held_out, fields = prepared.training, prepared.held_out, prepared.fields
     clips = [_field_motion(fields, name, held_out, options.seed + k) for k in range(options.clips)]
     noises = [noise_clip(fields, name, len(held_out.intensity), options.seed + k) for k in range(options.clips)]
-    published = [published_clip(fields.palette, name, held_out.intensity, options.seed)] if derived is None else []
+    published = [published_clip(fields.palette, name, sound_of(held_out), options.seed)] if derived is None else []
     real = held_out.motion if derived is None else prepared.reference_clip
     kinds = [[real], clips, noises, published]
     return StyleStudy(
@@ -241,7 +242,8 @@ def _study_style(palette: Palette, name: str, prepared: _PreparedStyle, options:
 
 
 def _field_motion(fields: GestureFields, name: str, held_out: Style, seed: int) -> Motion:
-    return {feature: field_clip(fields, name, feature, held_out.intensity, seed).values for feature in held_out.motion}
+    sound = sound_of(held_out)
+    return {feature: field_clip(fields, name, feature, sound, seed).values for feature in held_out.motion}
 
 
 def _blink_rate(motion: Motion, held_out: Style) -> float:

@@ -17,10 +17,11 @@ from tts2face.gestures.field import initial_state, sample_field_moments
 from tts2face.gestures.field_kernels import MIN_MOMENT_GAP
 from tts2face.gestures.noise import NoiseStream
 from tts2face.gestures.prosody import SILENT_PROSODY
+from tts2face.gestures.speech_features import recorded_features
 from tts2face.gestures.stream import FIELD_OPTIONS, GestureFields
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
-from tts2face.numeric.arrays import Float32Array, FloatArray, interpolate_cubic
+from tts2face.numeric.arrays import Float32Array, FloatArray, interpolate_cubic, interpolate_linear
 from tts2face.types import Waveform
 
 NO_SOUND = Waveform(np.zeros(2, np.float32), 16000)
@@ -77,27 +78,32 @@ def replace_style(palette: Palette, name: str, style: Style) -> Palette:
     return replace(palette, styles={**palette.styles, name: style})
 
 
-def field_clip(fields: GestureFields, style: str, feature: str, intensity: Float32Array, seed: int) -> FieldClip:
-    """A feature of a style, measured or derived, for an intensity (T,) at `GESTURE_FPS`."""
+def sound_of(style: Style) -> Float32Array:
+    """(T, 5) loudness and `recorded_features` of a style's recordings."""
+    return np.concatenate([style.intensity[:, None], recorded_features(style)], axis=1)
+
+
+def field_clip(fields: GestureFields, style: str, feature: str, sound: Float32Array, seed: int) -> FieldClip:
+    """A feature of a style, measured or derived, for a sound (T, 5) as `sound_of` at `GESTURE_FPS`."""
     source, tempo = fields.source(style, feature), fields.change(style, feature).tempo
-    field = fields.of(source, feature)
-    times = np.arange(0.0, len(intensity) * tempo + 2)  # in frames of the field; two more for the cubic
-    intensities = np.interp(times / tempo, np.arange(len(intensity)), intensity).astype(np.float32)[:, None]
+    field, prosody = fields.of(source, feature), sound if fields.follows_speech(feature) else sound[:, :1]
+    times = np.arange(0.0, len(sound) * tempo + 2)  # in frames of the field; two more for the cubic
+    prosody = interpolate_linear(prosody, np.arange(len(sound), dtype=np.float64), times / tempo)
     generator = np.random.default_rng([seed, crc32(feature.encode())])  # as `tts2face.gestures.stream` draws
     start = initial_state(field, generator.random())
-    sample = sample_field_moments(field, start, intensities, generator.random(len(intensities)))
-    values = sample.values[: len(intensity)]
+    sample = sample_field_moments(field, start, prosody, generator.random(len(prosody)))
+    values = sample.values[: len(sound)]
     if tempo != 1.0:
-        values = interpolate_cubic(sample.values, tempo * np.arange(len(intensity), dtype=np.float64))
-    return FieldClip(fields.apply_change(style, feature, values), sample.moments[: round(len(intensity) * tempo)])
+        values = interpolate_cubic(sample.values, tempo * np.arange(len(sound), dtype=np.float64))
+    return FieldClip(fields.apply_change(style, feature, values), sample.moments[: round(len(sound) * tempo)])
 
 
-def published_clip(palette: Palette, style: str, intensity: Float32Array, seed: int) -> Mapping[str, Float32Array]:
+def published_clip(palette: Palette, style: str, sound: Float32Array, seed: int) -> Mapping[str, Float32Array]:
     """All features of a measured style by the published fields (`tts2face.gestures.stream`), each as `field_clip`."""
-    fields = GestureFields(palette, FIELD_OPTIONS["ju2008"])
+    fields = GestureFields(palette, FIELD_OPTIONS["ju2008"], has_presentation=False)
     features = tuple(palette.styles[style].motion)
     with ThreadPoolExecutor() as threads:  # an exact search at each frame takes ten times as long as the default
-        clips = threads.map(lambda feature: field_clip(fields, style, feature, intensity, seed).values, features)
+        clips = threads.map(lambda feature: field_clip(fields, style, feature, sound, seed).values, features)
         return dict(zip(features, clips, strict=True))
 
 
@@ -137,11 +143,12 @@ def long_run(fields: GestureFields, name: str, training: Style, held_out: Style,
     """Measure clips of `MINUTES` of a style, with the recordings' sound in random order and with silence."""
     n_frames = round(MINUTES * 60 * GESTURE_FPS)
     order = np.random.default_rng([seed, 3]).permutation(len(training.lengths))
-    intensity = _shuffle_recordings(training.intensity, training.lengths, order, n_frames)
-    silence = np.full(n_frames, SILENT_PROSODY[0], np.float32)
+    sound = _shuffle_recordings(sound_of(training), training.lengths, order, n_frames)
+    silence = np.zeros((n_frames, sound.shape[1]), np.float32)
+    silence[:, 0] = SILENT_PROSODY[0]
     coverages, repetitions = {}, {}
     for feature in held_out.motion:
-        speech = field_clip(fields, name, feature, intensity, seed)
+        speech = field_clip(fields, name, feature, sound, seed)
         quiet = field_clip(fields, name, feature, silence, seed)
         coverages[feature] = tuple(
             coverage(speech.moments[: round(minutes * 60 * GESTURE_FPS)], training.lengths, MIN_MOMENT_GAP)

@@ -11,6 +11,7 @@ from corpus_tools.studies.gestures.clips import (
     published_clip,
     replace_style,
     select_recordings,
+    sound_of,
 )
 from corpus_tools.studies.gestures.measures import split_recordings, wasserstein
 from corpus_tools.studies.gestures.traits import style_traits
@@ -52,7 +53,7 @@ def test_too_few_to_hold_out():
 
 def test_a_field_in_silence_does_what_a_stream_does():
     fields = GestureFields(made_palette())
-    quiet = np.full(200, -35.0, np.float32)
+    quiet = np.tile(np.array([-35.0, 0.0, 0.0, 0.0, 0.0], np.float32), (200, 1))
     stream = GestureStream(fields, style="calm", seed=3, fps=GESTURE_FPS)  # a recorded style is not presented
     streamed = stream.next(Waveform(np.zeros(2, np.float32), 16000), 200, Timeline())
     for feature in fields.features:
@@ -63,8 +64,8 @@ def test_a_field_in_silence_does_what_a_stream_does():
 def test_a_derived_style_is_the_changed_clip_of_its_source():
     palette = made_palette()
     fields = GestureFields(palette)
-    intensity = palette.styles["calm"].intensity[:300]
-    plain, larger = (field_clip(fields, style, "head", intensity, 1).values for style in ("calm", "quick"))
+    sound = sound_of(palette.styles["calm"])[:300]
+    plain, larger = (field_clip(fields, style, "head", sound, 1).values for style in ("calm", "quick"))
     middle = style_median(palette.styles["calm"], "head")
     np.testing.assert_allclose(larger - middle, 2 * (plain - middle), atol=1e-5)
 
@@ -131,9 +132,9 @@ def test_published_fields_stand_beside_those_of_measured_styles(found):
 
 def test_a_published_clip_consists_of_recorded_frames():
     palette = made_palette()
-    intensity = palette.styles["calm"].intensity[:200]
-    made = published_clip(palette, "calm", intensity, 3)
-    again = published_clip(palette, "calm", intensity, 3)
+    sound = sound_of(palette.styles["calm"])[:200]
+    made = published_clip(palette, "calm", sound, 3)
+    again = published_clip(palette, "calm", sound, 3)
     for feature, values in made.items():
         np.testing.assert_array_equal(values, again[feature])
         recorded = palette.styles["calm"].motion[feature]
