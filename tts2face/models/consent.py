@@ -11,7 +11,9 @@ from typing import Any
 
 from lexicon.errors import InputError
 
-SELF, AGREED, NOBODY = "me", "agreed", "nobody"
+SELF = "me"
+AGREED = "agreed"
+NOBODY = "nobody"
 EARLIER = "earlier"  # of a statement in free words, as files hold that were made before there were answers
 EARLIER_DRAWN, EARLIER_WORDS = "drawn", 3  # a face that is nobody's; the least number of words for all others
 GRACE = timedelta(days=1)  # a date that is tomorrow in Greenwich is today elsewhere

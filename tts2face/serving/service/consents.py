@@ -6,13 +6,7 @@ from tts2face.serving.service.errors import RefusedError
 
 
 def check_consent(consent: str | None) -> str | None:
-    """A consent that a client sent, or None where it is blank.
-
-    Raises
-    ------
-    RefusedError
-        It is none of the three answers of `tts2face.models.consent`.
-    """
+    """A consent that a client sent, in one of the three answers, or None where it is blank."""
     if consent is None or not consent.strip():
         return None
     try:
