@@ -2,10 +2,14 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
-from tests.photo.pictures import ONE_PROCESS, found_in, speaking, still
+from tests.photo.pictures import ONE_PROCESS, drawn, found_in, speaking, still
+from tts2face.models.baked_light import LIP_RING
 from tts2face.models.face import Face
 from tts2face.photo.photograph import Photograph
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import mesh_renderer
 
 pytestmark = ONE_PROCESS
 
@@ -56,3 +60,18 @@ def test_the_dark_of_a_mouth_is_warm_and_lower_teeth_lie_in_the_shade(faces: dic
         np.percentile(inside(faces["coloured"], f"teeth_{row}").mean(axis=1), 90) for row in ("upper", "lower")
     )
     assert 0.6 < lower / upper < 0.95
+
+
+def test_teeth_are_as_sharp_as_the_picture() -> None:
+    found = found_in(NAME, SIDE)
+    steepest = []
+    for blur in (0.0, 2.5):
+        pixels = gaussian_filter(still(NAME, SIDE), (blur, blur, 0)) if blur else still(NAME, SIDE)
+        shown = drawn(mesh_renderer(speaking(Photograph(pixels, None, 1.0), found), Picture()), jawOpen=0.6)
+        grey = shown.astype(float).mean(axis=2)
+        slope = np.hypot(*np.gradient(grey))
+        places = found.landmarks[list(LIP_RING), :2]
+        (left, top), (right, bottom) = (places.min(axis=0).astype(int), places.max(axis=0).astype(int))
+        steepest.append(np.percentile(slope[top : bottom + round(0.15 * SIDE), left:right], 98))
+    sharp, soft = steepest
+    assert soft < 0.6 * sharp

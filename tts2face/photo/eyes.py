@@ -25,6 +25,7 @@ SCLERA_SCALE = 8.0  # of the places of its polynomial, of the eye distance
 SCLERA_RIDGE = np.array([0.0005, 0.05, 0.05, 0.05])  # that keeps its terms small
 SCLERA_LIMITS = (10, 97)  # per cent of its colours, between which it stays
 DARK_SHARE, DARK_WEIGHT = 35, 0.15  # per cent of its pixels that lids shade, and how much they count
+WHITE_SHARES = (82, 97)  # per cent of an eye's pixels are less light than those of its white
 SHADE_FADE = 0.03  # of the eye distance, over which the shadow of the lids goes on beyond them
 GAZE_FADE = (1.2, 3.2)  # radii around the iris that turn with it, and beyond which nothing does
 WHOLE, MOSTLY, SHOWN = 0.99, 0.5, 0.4  # shares of a pixel within the opening: for colours, for the white, and as seen
@@ -139,9 +140,7 @@ def _without_lids(
     ring_iris = _rings(colours, inside & (away < SCLERA_FROM), away)
     share = (1 - smoothstep(away, *IRIS_EDGE))[..., None]
     base = sclera * (1 - share) + ring_iris * share
-    white = (
-        np.median(np.asarray(sclera)[opening > MOSTLY], axis=0) if (opening > MOSTLY).any() else colours.mean((0, 1))
-    )
+    white = _white(colours, opening > MOSTLY)
     if not inside.any():
         return _Shown(base, white, [])
     catchlights = _catchlights(colours, base, inside, away, radius) if stay else []
@@ -197,6 +196,16 @@ def _sclera(colours: FloatArray, seen: Mask, off: tuple[FloatArray, FloatArray],
     factors = np.linalg.solve((rows * weights).T @ rows + ridge, (rows * weights).T @ values)
     limits = np.percentile(values, SCLERA_LIMITS, axis=0)
     return np.clip(terms @ factors, limits[0], limits[1])
+
+
+def _white(colours: FloatArray, seen: Mask) -> FloatArray:
+    """Colour (3,) of the white of an eye: of what is light in all channels, as no iris is, and no catchlight."""
+    if not seen.any():
+        return np.asarray(colours.mean(axis=(0, 1)))
+    every = colours[seen]
+    least = every.min(axis=1)
+    low, high = np.percentile(least, WHITE_SHARES)
+    return np.asarray(np.median(every[(least >= low) & (least <= high)], axis=0))
 
 
 def _rings(colours: FloatArray, seen: Mask, away: FloatArray) -> FloatArray:

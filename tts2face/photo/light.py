@@ -79,23 +79,20 @@ BESIDE_LINE = (-0.06, -0.045, 0.045, 0.06)
 class MouthRows:
     """Parts behind lips, each its vertices (N,) and their colours (N, 3) in open light.
 
-    Those that a picture shows and those that are lit come from the dark, a share (3,) of the colours, as the lips open;
-    the walls do not.
+    They come from the dark, a share (3,) of the colours, as the lips open.
     """
 
     pictured: Sequence[tuple[IntArray, FloatArray]]
     lit: Sequence[tuple[IntArray, FloatArray]]
-    walls: Sequence[tuple[IntArray, FloatArray]]
     dark: FloatArray
 
     def light(self) -> tuple[IntArray, FloatArray, FloatArray]:
         """Vertices (M,), their base (M, 3), which is added to that of a picture, and responses (6, 3, M)."""
         rows, bases, responses = [], [], []
-        none, full = np.zeros(3), np.ones(3)
+        none = np.zeros(3)
         for parts, base, dark, opened in (
             (self.pictured, none, self.dark - 1, MOUTH_OPEN - self.dark),
             (self.lit, self.dark, none, MOUTH_OPEN - self.dark),
-            (self.walls, full, none, none),
         ):
             for numbers, colours in parts:
                 answer = np.zeros((N_MOUTH_TERMS, 3, len(numbers)))

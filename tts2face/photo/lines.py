@@ -50,7 +50,8 @@ GROWN_UP, GROWN_THICK = 0.02, 2  # way above the upper margin, and half of the l
 GROWN_SKIN, DARK_LASHES = 0.4, 0.45  # likeness to skin, and lightness over that of skin, at which they end
 CORNER_STEPS, CORNER_SKIN = np.arange(0.006, 0.05, 0.006), 0.25  # of corners, up to where there is skin
 MIDDLE = slice(4, -4)
-FOLD_STEPS = np.arange(0.04, 0.13, 0.006)  # of the fold above an upper lid: where skin begins
+FOLD_STEPS = np.arange(0.025, 0.13, 0.006)  # of the ends of upper lashes: where skin begins
+MOST_LASHES = 0.065  # of eyes that are not drawn
 FOLD_ROOM = 0.75  # of the way to the skin below the brow, at most
 FOLD_COLUMNS = slice(6, -6)
 FOLD_SKIN = 0.5
@@ -379,6 +380,8 @@ class _Eye:
 
 
 def _fold(eyes: "list[_Eye]") -> float:
-    """Height of the folds above the upper margins, of the eye distance: a little, or above the liner of drawn eyes."""
-    is_skin = np.flatnonzero(np.mean([eye.skin_above() for eye in eyes], axis=0) > FOLD_SKIN)
-    return float(FOLD_STEPS[is_skin[0]]) if len(is_skin) else float(FOLD_STEPS[0])
+    """Height of the lashes above the upper margins, of the eye distance: more with the liner of drawn eyes."""
+    is_drawn = min(eye.opening for eye in eyes) > LARGE_EYES
+    steps = FOLD_STEPS if is_drawn else FOLD_STEPS[FOLD_STEPS < MOST_LASHES]
+    is_skin = np.flatnonzero(np.mean([eye.skin_above() for eye in eyes], axis=0)[: len(steps)] > FOLD_SKIN)
+    return float(steps[is_skin[0]]) if len(is_skin) else float(steps[0] if is_drawn else steps[-1])

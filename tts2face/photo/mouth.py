@@ -17,7 +17,7 @@ PARTED_WIDTH = 0.85  # of a mouth that is open in the picture, and wider for it
 BEHIND_MM = 1.0  # further back than in the head: lips are thinner than the head's
 OPEN_TOOTH = 70  # percentile of the head's colours of teeth
 GUM_SHARE = np.array([0.8, 0.66, 0.66])  # of the light of teeth that falls on gums and tongue
-GAP_SHARE = 0.45  # of the darkness of gaps between teeth
+GAP_SHARE = 0.25  # of the darkness of gaps between teeth
 DEPTH_MM, TONGUE_DEPTH_MM = 13.0, 17.0  # over which light falls to 1/e
 LOWER_SHARE, ROOT_SHARE = 0.7, 0.4  # of the light of upper teeth on the edges of lower ones, and at the height below:
 LOWER_MM = 7.0  # light comes from above, and the lower lip stands before them
@@ -29,7 +29,7 @@ CHEEKS = (50, 280, 205, 425, 101, 330)
 LIP_RED = (15, 16, 86, 316, 12)
 CHEEK_PX, LIP_PX = 3, 1  # around these, whose colours are taken
 EDGE_MM = 4.0  # around the middle of the upper teeth, and behind their front, within which their edge is searched
-TEETH_OVER_SKIN = 1.05  # least luminance of teeth, of the cheeks'
+TEETH_OVER_SKIN, TEETH_OVER_WHITE = 0.8, 0.62  # luminance of teeth, at least of the cheeks', and of the eyes' white
 TINT_POWERS, SKIN_SHARE = (0.6, 0.35), 0.25  # of the hues of the eyes' white and the skin in teeth; the skin's share
 TEETH_LIMITS = (0.06, 0.75)  # of the luminance of teeth
 LEAST_HUE = 0.2  # range of the colours of lips, of the largest; .4 to .8 in colour pictures, 0 in grey ones
@@ -37,9 +37,9 @@ LEAST_LIGHT = 1e-3  # of any colour that is measured, so that black has a hue
 WALL_MM = (0.0, 2.5, 8.0, 22.0)  # depth of the rings of the wall behind the lips
 WALL_OUT_MM = (0.0, 0.8, 5.0, 7.0)  # and how much wider than the opening they are
 WALL_FOLLOW = (1.0, 1.0, 0.8, 0.5)  # share of the motion of the lips that they follow
-WALL_LIGHT = (0.42, 0.20, 0.08, 0.02)  # of the light of the lips
+WALL_LIGHT = (0.60, 0.42, 0.24, 0.10)  # of the light of the lips
 WALL_TINT = np.array([1.0, 0.55, 0.5])
-BACK_MM, BACK_LIGHT = 40.0, 0.006
+BACK_MM, BACK_LIGHT = 40.0, 0.03
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,7 +142,9 @@ def mouth_light(pixels: Pixels, landmarks: FloatArray, sclera: FloatArray) -> Mo
     """Light in a mouth from the colours of cheeks, lips and the white of the eyes (3,), 0..255."""
     skin, lips = cheek_light(pixels, landmarks), _median(pixels, landmarks[list(LIP_RED), :2], LIP_PX)
     white = np.maximum(decode_srgb(sclera / 255), LEAST_LIGHT)
-    bright = float(np.clip(max(TEETH_OVER_SKIN * (skin @ LUMINANCE), white @ LUMINANCE), *TEETH_LIMITS))
+    bright = float(
+        np.clip(max(TEETH_OVER_SKIN * (skin @ LUMINANCE), TEETH_OVER_WHITE * (white @ LUMINANCE)), *TEETH_LIMITS)
+    )
     tints = [(light / (light @ LUMINANCE)) ** power for light, power in zip((white, skin), TINT_POWERS, strict=True)]
     tint = (1 - SKIN_SHARE) * tints[0] + SKIN_SHARE * tints[1]
     return MouthLight(bright * tint / float(tint @ LUMINANCE), lips)

@@ -321,8 +321,7 @@ def _fill_mouth(face: Laid) -> Filled:
     walls = mouth_walls(face.mesh, face.skin.places, face.skin.shapes, light)
     mouth = MouthRows(
         pictured=[_add_inside(surface, part, pages) for part in inside if part.texels is not None],
-        lit=[_add_inside(surface, part, pages) for part in inside if part.texels is None],
-        walls=[_add_inside(surface, walls, pages)],
+        lit=[_add_inside(surface, part, pages) for part in (*inside, walls) if part.texels is None],
         dark=light.dark,
     )
     return _and(Filled, face, mouth=mouth, teeth_edge=edge)

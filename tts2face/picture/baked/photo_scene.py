@@ -11,6 +11,7 @@ from tts2face.models.light import Photographed
 from tts2face.models.photo_view import PhotoView
 from tts2face.picture.baked.cut_out import moving_pixels, page_covers, without_background
 from tts2face.picture.baked.scene import LitScene, build_lit_scene
+from tts2face.picture.baked.softening import missing_blur, photograph_blur
 from tts2face.picture.camera import photo_crop, photo_matrices
 from tts2face.picture.options import AUTO_SIZE, BLUR, SIDE_LIMITS_PX, STUDIO, Picture
 from tts2face.picture.scene import draw_background
@@ -28,8 +29,9 @@ def build_photo_scene(face: Face, light: Photographed, picture: Picture) -> LitS
     crop = photo_crop(picture.view, face, view, size)
     optics = photo_matrices(view, crop, picture.samples)
     shown = _resized(baked.backdrop, size, crop)
+    softness = missing_blur(photograph_blur(face, view, baked.backdrop) * size[0] / (crop[2] - crop[0]))
     if view.alpha is None:
-        return build_lit_scene(face, light, picture, optics, shown)
+        return replace(build_lit_scene(face, light, picture, optics, shown), softness=softness)
     # the wall behind a person was filled in when the face was made
     if view.behind is not None and picture.background in (STUDIO, BLUR):
         wall = _own_background(view, view.behind, picture, crop)
@@ -43,7 +45,7 @@ def build_photo_scene(face: Face, light: Photographed, picture: Picture) -> LitS
     else:
         still = np.rint((cover * shown.astype(np.float32) + (255 - cover) * wall.astype(np.float32)) / 255)
     surface = without_background(scene.surface, scene.texels, scene.texture_size[0])
-    return replace(scene, surface=surface, background=still.astype(np.uint8))
+    return replace(scene, surface=surface, background=still.astype(np.uint8), softness=softness)
 
 
 def _check(light: Photographed, picture: Picture) -> None:

@@ -42,6 +42,7 @@ from tts2face.picture.baked.shading import (
     lay_planes,
     list_fragments,
 )
+from tts2face.picture.baked.softening import blur_within
 from tts2face.picture.baked.surface import TEXELS_A_PIXEL, LitSurface, build_surface, stack_pages
 from tts2face.picture.baked.visibility import N_SPAN_VALUES, NEAR, RED, X, fill_bands, find_bands, find_nearest, project
 from tts2face.picture.camera import CameraMatrices
@@ -51,6 +52,7 @@ from tts2face.picture.options import Picture
 BLINK_SHRINK = 0.075  # of the ball behind a shut lid, times its weight to the fourth power
 BLINKS = ("eyeBlinkLeft", "eyeBlinkRight")  # of the face's eyes
 BEHIND_SHARE = np.float32(0.8)  # of the nearness of what lies in openings
+LEAST_OPENING_PX = 0.5  # of lips between which something is seen
 BAND_PIXELS = 32_768
 KEY_ASIDE = 0.3  # sine of the key lamp's angle from the line of sight, from which catchlights are all to its side
 
@@ -89,7 +91,8 @@ class LitBuffers:
 class LitScene:
     """A face with baked light, its camera and its background (H, W, 3 or 4); built by `build_lit_scene`.
 
-    ``wall`` (H, W, 3) lies behind a photographed person whose pages have a cover.
+    ``wall`` (H, W, 3) lies behind a photographed person whose pages have a cover; what is seen between the lips of
+    one is blurred by ``softness`` pixels.
     """
 
     face: Face
@@ -107,6 +110,7 @@ class LitScene:
     answers: tuple[Any, ...]
     turns: Cardinal
     wall: NDArray[np.uint8] | None = None
+    softness: float = 0.0
 
     def with_picture(self, picture: Picture) -> "LitScene":
         """The same scene with another number of samples a pixel."""
@@ -188,6 +192,12 @@ class LitScene:
                     compose(*fragments, colours, band)
                 else:
                     compose_over(fragments, colours, buffers.covers, self.wall[first : first + len(band)], band)
+        if self.softness:
+            ring = np.einsum("lc,lcx->lx", surface.terms.ring_weights, points[surface.terms.ring])
+            outline = self.optics.pixels(ring) / side
+            half = len(outline) // 2  # the upper lip, and the lower one from its other corner
+            if np.abs(outline[1:half] - outline[:half:-1])[:, 1].max() > LEAST_OPENING_PX:
+                blur_within(outline, self.softness, pixels)
 
     def _sort(self, height: int, buffers: LitBuffers) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
         """Numbers of the triangles that are drawn, by bands of rows of samples, and the end of each band."""
