@@ -105,6 +105,13 @@ def make_heads(making: Making) -> None:
     build_all(fetch_all(making.kept), making.out, making.report)
 
 
+def refresh_people(making: Making) -> None:
+    """Tints, haircuts and brows of the identities of the head that is there, after a change of their table alone."""
+    from corpus_tools.shipped.head.presets import refresh_presets
+
+    refresh_presets(making.out / "head.face")
+
+
 def make_palette(making: Making) -> None:
     """One measured style, a seated man who reads, and what the table derives from it."""
     from corpus_tools.build_palette import StyleSource, build_style
@@ -154,6 +161,14 @@ def make_light(making: Making) -> None:
         light_character(source, CAST[name], making.out, making.kept / "bakes", making.report)
 
 
+def retouch(making: Making) -> None:
+    """Highlights and brows that are retouched by hand, once after their light."""
+    from corpus_tools.shipped.film.retouch import RETOUCHINGS, retouch_face
+
+    for name in making.names or RETOUCHINGS:
+        retouch_face(making.out / f"{name}.face")
+
+
 def make_mouths(making: Making) -> None:
     """Light of mouths that is fitted to traced pictures of the baked poses, where it is the better one."""
     from corpus_tools.shipped.film.refine_film import refine_mouth
@@ -174,10 +189,15 @@ STEPS: Mapping[str, Callable[[Making], None]] = {
     "gaze": make_gaze,
     "cast": make_cast,
     "light": make_light,
+    "retouching": retouch,
     "mouths": make_mouths,
 }
 # Parts of steps that are repeated.
-ALONE: Mapping[str, Callable[[Making], None]] = {"styles": derive_styles, "voices": add_voices_map}
+ALONE: Mapping[str, Callable[[Making], None]] = {
+    "styles": derive_styles,
+    "voices": add_voices_map,
+    "people": refresh_people,
+}
 
 
 def main() -> None:
@@ -185,12 +205,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     choices = [*STEPS, *ALONE]
     parser.add_argument(
-        "steps", nargs="*", metavar="STEP", help=f"{', '.join(choices)}; without any: all but {' and '.join(ALONE)}"
+        "steps", nargs="*", metavar="STEP", help=f"{', '.join(choices)}; without any: all but {', '.join(ALONE)}"
     )
     parser.add_argument("--out", type=Path, default=Path("tts2face/data"), help="folder of the models")
     parser.add_argument("--recordings", type=Path, default=Path("../shared/recordings"), help="folder of recordings")
     parser.add_argument("--keep", type=Path, default=Path.home() / ".cache/tts2face/models", help="downloads and bakes")
-    parser.add_argument("--names", nargs="*", default=(), help="characters of cast, light and mouths; all without")
+    parser.add_argument(
+        "--names", nargs="*", default=(), help="characters of cast, light, retouching and mouths; all without"
+    )
     arguments = parser.parse_args()
     unknown = [step for step in arguments.steps if step not in choices]
     if unknown:

@@ -39,5 +39,5 @@ def test_an_unknown_step_is_refused(capsys: pytest.CaptureFixture[str], monkeypa
     monkeypatch.setattr(sys, "argv", ["make_models", "lips"])
     with pytest.raises(SystemExit, match="2"):
         make_models.main()
-    steps = "phones, talker, heads, palette, gaze, cast, light, mouths, styles"
+    steps = "phones, talker, heads, palette, gaze, cast, light, retouching, mouths, styles"
     assert f"there is no step 'lips'; give {steps}" in capsys.readouterr().err

@@ -15,7 +15,7 @@ from corpus_tools.shipped.head.haircut import build_haircuts
 from corpus_tools.shipped.head.head import REFERENCE_PERSON, HeadStyle, ReferenceHead, assemble_head, build_reference
 from corpus_tools.shipped.head.mouth_light import scatter_in_mouth
 from corpus_tools.shipped.head.parts import HeadPieces, assemble_face, stack_vertices
-from corpus_tools.shipped.head.presets import build_identities
+from corpus_tools.shipped.head.presets import build_identities, refresh_presets
 from corpus_tools.shipped.head.proportions import add_targets, modelling_targets
 from corpus_tools.shipped.head.source import PACKAGE, SourceMesh, fetch_data, read_source
 from corpus_tools.shipped.head.texture import paint_texture
@@ -96,6 +96,7 @@ def build_all(data: Data, out: Path, report: Callable[[str], None]) -> None:
     report("occlusion of the head")
     head = bake_occlusion(bare, threads)  # haircuts need it without the light scattered in the mouth
     write_face(out / "head.face", scatter_in_mouth(head, ground.skin), identities)
+    refresh_presets(out / "head.face")
     reference = stack_vertices(assemble_head(ground.cage, ground, HeadStyle()))
     for name, hair in build_haircuts(data.assets, ground.cage, ground.skin, reference):
         report(f"haircut {name}")

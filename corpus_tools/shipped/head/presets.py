@@ -1,7 +1,8 @@
 """Presets of age, sex and ancestry: MakeHuman's macro targets, with hair and tints of skin, brows and eyes."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -12,7 +13,9 @@ from corpus_tools.shipped.head.parts import HeadPieces, stack_vertices
 from corpus_tools.shipped.head.proportions import add_targets, modelling_targets
 from corpus_tools.shipped.head.source import SourceMesh
 from tts2face.models.face import Hairdo
-from tts2face.models.face_file import Identity
+from tts2face.models.face_file import FORMAT_VERSION, KIND, Identity, read_face
+from tts2face.models.shape_coding import quantise
+from tts2face.storage.tensors import read_tensors, write_tensors
 
 Tint = tuple[float, float, float]
 PLAIN: Tint = (1.0, 1.0, 1.0)
@@ -22,7 +25,9 @@ SKIN_SHARES = {
     "wet": 1.0, "sclera": 0.15,
 }  # fmt: skip
 BROWN, DARK = (0.85, 0.66, 0.50), (0.62, 0.44, 0.34)  # eyes; the iris in the texture is light
-BLACK, BLOND, GREY = (0.42, 0.43, 0.47), (1.9, 2.0, 1.75), (2.1, 2.8, 3.4)  # brows
+BLACK, BLOND = (0.42, 0.43, 0.47), (1.9, 2.0, 1.75)  # brows
+FINE_BLACK, DARK_GREY = (0.3, 0.3, 0.33), (0.95, 1.25, 1.5)
+RESTS = "preset_rests"  # key of the metadata of a face: weights of shapes that lie in its identities
 YOUNG, OLD, CHILD = {"young": 1.0}, {"old": 1.0}, {"child": 0.85, "young": 0.15}
 
 
@@ -30,7 +35,8 @@ YOUNG, OLD, CHILD = {"young": 1.0}, {"old": 1.0}, {"child": 0.85, "young": 0.15}
 class Preset:
     """A preset: sex and age in MakeHuman's terms, shares of ancestry, haircut with colour, tints, and a summary.
 
-    ``brows`` is the set of brows. Proportions are in `corpus_tools.shipped.head.head`.
+    ``brows`` is the set of brows, ``rest`` the weights of shapes at rest: of brows that would look sad above a smile.
+    Proportions are in `corpus_tools.shipped.head.head`.
     """
 
     summary: str
@@ -43,6 +49,7 @@ class Preset:
     iris: Tint = PLAIN
     shirt: Tint = PLAIN
     brows: str = ""
+    rest: Mapping[str, float] = field(default_factory=dict)
 
     def targets(self) -> dict[str, float]:
         """Weight of each MakeHuman target of age, sex and ancestry."""
@@ -70,6 +77,12 @@ class Preset:
         return taken | {"brows": self.brow, "iris": self.iris, "shirt": self.shirt}
 
 
+def _brows(down: float, outer_up: float) -> dict[str, float]:
+    """Weights of brows whose inner ends lie lower, and their outer ends higher."""
+    weights = {"browDown": down, "browOuterUp": outer_up}
+    return {f"{name}{side}": weight for name, weight in weights.items() for side in ("Left", "Right")}
+
+
 PRESETS: dict[str, Preset] = {
     "erik": Preset(
         "man, about 30, European", "male", YOUNG, {"caucasian": 1}, Hairdo("short01", "light-brown"),
@@ -81,11 +94,11 @@ PRESETS: dict[str, Preset] = {
     ),
     "kofi": Preset(
         "man, about 35, West African", "male", {"young": 0.85, "old": 0.15}, {"african": 1},
-        Hairdo("cropped", "black"), (0.53, 0.49, 0.44), BLACK, DARK, brows="eyebrow008",
+        Hairdo("cropped", "black"), (0.53, 0.49, 0.44), BLACK, DARK, brows="eyebrow008", rest=_brows(0.16, 0.06),
     ),
     "mei": Preset(
-        "woman, about 28, East Asian", "female", YOUNG, {"asian": 1}, Hairdo("bob01", "#1a1412"),
-        (1.0, 0.995, 0.965), BLACK, DARK, (2.8, 1.2, 1.1),
+        "woman, about 28, East Asian", "female", YOUNG, {"asian": 1}, Hairdo("bob02", "#1a1412"),
+        (1.0, 0.995, 0.965), FINE_BLACK, DARK, (2.8, 1.2, 1.1), rest=_brows(0.12, 0.12),
     ),
     "leila": Preset(
         "woman, about 35, mixed ancestry", "female", {"young": 0.85, "old": 0.15},
@@ -97,8 +110,8 @@ PRESETS: dict[str, Preset] = {
         Hairdo("short01", "#17110e"), (0.71, 0.68, 0.615), BLACK, DARK, (1.7, 1.7, 1.6),
     ),
     "ingrid": Preset(
-        "woman, about 70, European", "female", OLD, {"caucasian": 1}, Hairdo("short03", "grey"),
-        (1.0, 0.965, 0.955), GREY, (0.84, 0.96, 1.1), (2.0, 0.8, 1.1),
+        "woman, about 70, European", "female", OLD, {"caucasian": 1}, Hairdo("bob02", "grey"),
+        (1.0, 0.965, 0.955), DARK_GREY, (0.8, 0.9, 0.98), (2.0, 0.8, 1.1), rest=_brows(0.2, 0.06),
     ),
     "nia": Preset(
         "child, about 9, mixed ancestry", "female", CHILD, {"caucasian": 0.4, "african": 0.4, "asian": 0.2},
@@ -118,3 +131,26 @@ def build_identities(
         own = stack_vertices(assemble_head(cage, reference, replace(style, cards=person.cards())))
         found[name] = Identity((own - rest).astype(np.float32), person.tints(), person.summary, person.hairdo)
     return found
+
+
+def refresh_presets(path: Path) -> None:
+    """Write summaries, tints, haircuts and shapes at rest of `PRESETS` into the head's file; the rest of it stays."""
+    face = read_face(path)
+    arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
+    applied = dict(header["metadata"].get(RESTS, {}))
+    for number, (name, _, _) in enumerate(header["identities"]):
+        person = PRESETS[name]
+        header["identities"][number] = [name, person.tints(), person.summary]
+        header["hairdos"][name] = [person.hairdo.haircut, person.hairdo.colour]
+        moved = {
+            shape: person.rest.get(shape, 0.0) - applied.get(name, {}).get(shape, 0.0) for shape in face.shape_names
+        }
+        weights = np.array(list(moved.values()), np.float32)
+        if weights.any():
+            step = float(arrays[f"identity{number}_step"][0])
+            displacement = arrays[f"identity{number}"] * np.float32(step) + np.einsum("k,kvc->vc", weights, face.shapes)
+            steps, step = quantise(displacement, step)
+            arrays |= {f"identity{number}": steps, f"identity{number}_step": np.array([step], np.float32)}
+        applied[name] = dict(person.rest)
+    header["metadata"] = header["metadata"] | {RESTS: {name: rest for name, rest in applied.items() if rest}}
+    write_tensors(path, KIND, FORMAT_VERSION, arrays, header, is_packed=True)
