@@ -35,8 +35,9 @@ SHOWN_SHARE = 0.03  # of the mouth's width: least distance of the upper lip, whi
 COVER_SHARE, AHEAD_SHARE = 0.03, 0.012  # of the mouth's width, by which the lip covers the edge and lies before it
 TONGUE_OUT, TONGUE_UP = "tongueOut", "tongueUp"
 TIP_SHARE = 0.9  # of the largest displacement by a shape: vertices that move more are the tip
-# Relative to the mouth's width: the tip ends before the edge of the upper incisors, or is seen below it.
-OUT_BEFORE_EDGE, UP_BELOW_EDGE = 0.005, 0.065
+# Relative to the mouth's width: the tip ends before the edge of the upper incisors, and is seen below it.
+OUT_BEFORE_EDGE, OUT_BELOW_EDGE = 0.04, 0.02
+UP_BELOW_EDGE = 0.065
 LARGEST_OUT, LARGEST_UP = 0.5, 0.9
 OUT_GAPS = (
     0.01,
@@ -200,9 +201,13 @@ class TongueTip:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tongue:
-    """Shapes of the tongue that a face has, None for the others; `rest_width` is that of the mouth, mm."""
+    """Shapes of the tongue that a face has, None for the others; `rest_width` is that of the mouth, mm.
+
+    ``between`` lifts the tip that is put out between the teeth, over the lower lip.
+    """
 
     out: TongueTip | None
+    between: TongueTip | None
     up: TongueTip | None
     rest_width: float
 
@@ -211,9 +216,13 @@ class Tongue:
         values = speech.copy()
         if self.out is not None:
             parted = smoothstep(gap / self.rest_width, *OUT_GAPS)
-            values[:, self.out.shape] = tracks["tongue_out"] * parted * self.out.weights(speech)
+            out = tracks["tongue_out"] * parted
+            values[:, self.out.shape] = out * self.out.weights(speech)
+            if self.between is not None:
+                values[:, self.between.shape] = out * self.between.weights(values)
         if self.up is not None:
-            values[:, self.up.shape] = tracks["tongue_up"] * self.up.weights(speech)
+            up = tracks["tongue_up"] * self.up.weights(speech)
+            values[:, self.up.shape] = np.maximum(values[:, self.up.shape], up)
         return values
 
 
@@ -222,6 +231,7 @@ def build_tongue(face: Face, edge: tuple[float, float], rest_width: float) -> To
     height, depth = edge
     return Tongue(
         _tip(face, TONGUE_OUT, 2, depth + OUT_BEFORE_EDGE * rest_width, LARGEST_OUT),
+        _tip(face, TONGUE_UP, 1, height - OUT_BELOW_EDGE * rest_width, LARGEST_UP),
         _tip(face, TONGUE_UP, 1, height - UP_BELOW_EDGE * rest_width, LARGEST_UP),
         rest_width,
     )

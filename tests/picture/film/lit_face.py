@@ -27,6 +27,8 @@ def lit_tiny_face():
     nearest = [front[np.linalg.norm(face.vertices[front, :2] - place, axis=1).argmin()] for place in mouth]
     rows, balls = np.unique(skin), np.unique(np.concatenate(spans[1:3]))
     tongue_rows = np.unique(tongue)
+    colours = face.colours.copy()
+    colours[tongue_rows] = TONGUE_LIGHT
     n_texels = 2 * TURN_SIDE**2 + TURN_SIDE * (TURN_SIDE // BLACK_SHARE)
     responses = np.zeros((N_TERMS, 3, len(rows)), np.int8)
     responses[5, 0] = 100
@@ -70,6 +72,7 @@ def lit_tiny_face():
     )
     return replace(
         face,
+        colours=colours,
         light=Baked(light),
         landmarks=np.array(LIP_RING, np.int32),
         landmark_vertices=np.repeat(np.array(nearest, np.int32)[:, None], 3, axis=1),

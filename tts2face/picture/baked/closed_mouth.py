@@ -13,6 +13,7 @@ from tts2face.numeric.arrays import Float32Array, connected_pieces, smoothstep
 # behind. Skin that is seen from behind is that of the cheeks, through the corners of lips that fold.
 INSIDE = (0.0, 0.7, 0.6, 0.1, 2.6)
 CHEEKS = (0.4, 1.25, 0.4, 0.1, 1.2)
+LEAST_AHEAD = -0.3  # of what is seen of teeth, gums and tongue at rest, of the length of its normal
 WALL, DARK = (62.0, 24.0, 21.0), (17.0, 6.0, 5.5)  # colours of the walls at the lips, and where no light comes
 LIT_DEPTH = 0.55  # widths of the opening behind the lips over which the walls darken
 
@@ -35,7 +36,11 @@ def close_mouth(face: Face, light: BakedLight, part_of: NDArray[np.int32]) -> Ba
     skin = unseen[is_skin[unseen]]
     piece_of = connected_pieces(face.triangles[skin], len(face.vertices))[face.triangles[skin, 0]]
     skin = skin[np.isin(piece_of, piece_of[_lies_in(INSIDE, centres[skin])])]
-    fronts = np.union1d(skin, unseen[np.isin(face.triangles[unseen], light.mouth_rows).all(axis=1)])
+    inner = unseen[np.isin(face.triangles[unseen], light.mouth_rows).all(axis=1)]
+    a, b, c = face.vertices[face.triangles[inner]].transpose(1, 0, 2)
+    outward = np.cross(b - a, c - a)
+    inner = inner[outward[:, 2] > LEAST_AHEAD * np.linalg.norm(outward, axis=1)]
+    fronts = np.union1d(skin, inner)
     backs = np.setdiff1d(~numbers[is_skin & _lies_in(CHEEKS, centres)], light.triangles)
     return replace(
         light,

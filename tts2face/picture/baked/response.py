@@ -92,6 +92,11 @@ class LightTerms:
         made.rest[1:] = buffers.terms[1:]
         return made
 
+    def ring_of(self, points: Float32Array) -> Float32Array:
+        """(L, 3) landmarks of the opening of the lips of vertices (V, 3)."""
+        places: Float32Array = np.einsum("lc,lcx->lx", self.ring_weights, points[self.ring])
+        return places
+
     def allocate_buffers(self) -> "TermBuffers":
         """Buffers for the terms of one pose at a time."""
         n, m = len(self.source), len(self.mouth)
@@ -101,6 +106,7 @@ class LightTerms:
             terms=np.ones((N_TERMS, n), np.float32),
             mouth=np.ones((N_MOUTH_TERMS, m), np.float32),
             ways=np.zeros((6, m), np.float32),
+            ring=np.zeros((len(self.ring), 3), np.float32),
         )
 
     def update(self, points: Float32Array, buffers: "TermBuffers") -> None:
@@ -109,19 +115,20 @@ class LightTerms:
         vertex_normals(buffers.flat, self.starts, self.members, buffers.table)
         n = len(self.source)
         write_terms(points, self.source, self.partners, buffers.table[:n], self.rest, buffers.terms)
-        ring = np.einsum("lc,lcx->lx", self.ring_weights, points[self.ring])
-        write_mouth_terms(points, self.mouth, buffers.table[n:], ring, buffers.mouth, buffers.ways)
+        buffers.ring[:] = self.ring_of(points)
+        write_mouth_terms(points, self.mouth, buffers.table[n:], buffers.ring, buffers.mouth, buffers.ways)
 
 
 @dataclass(slots=True, eq=False)
 class TermBuffers:
-    """Normals of triangles (F, 3), table of vertices, terms (T, N), and terms and ways (6, M) of the mouth."""
+    """Normals of triangles (F, 3), table of vertices, terms (T, N); of the mouth terms and ways (6, M), ring (L, 3)."""
 
     flat: Float32Array
     table: Float32Array
     terms: Float32Array
     mouth: Float32Array
     ways: Float32Array
+    ring: Float32Array
 
 
 def light_terms(face: Face, rig: FaceRig, light: BakedLight) -> LightTerms:

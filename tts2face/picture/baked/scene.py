@@ -264,6 +264,8 @@ class LitScene:
             self.bases, self.answers, places, (buffers.light, buffers.mouth, buffers.balls), strict=True
         ):
             add_responses(base, answer, terms, first, out)
+            if out is buffers.mouth and self.surface.mouth is not None:
+                self.surface.mouth.hold(points, found.ring, found.table[-out.shape[1] :], out)
             buffers.table[at : at + out.shape[1], RED:] = out.T
             at += out.shape[1]
         if not light.changes_in_texels:

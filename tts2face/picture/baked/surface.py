@@ -12,6 +12,7 @@ from tts2face.models.face import Face
 from tts2face.models.light import Lit
 from tts2face.numeric.arrays import connected_pieces, decode_srgb
 from tts2face.picture.baked.closed_mouth import close_mouth, wall_colours
+from tts2face.picture.baked.mouth_colours import MouthColours
 from tts2face.picture.baked.response import LightTerms, light_terms
 from tts2face.picture.baked.visibility import MAX_TRIANGLES, N_COLUMNS, RED, U, V
 from tts2face.picture.kernels.eyes import EyeGeometry, eye_geometry
@@ -48,12 +49,15 @@ class LitSurface:
         Of the vertices that are lit.
     eyes
         For their catchlights.
+    mouth
+        Colours of those of the mouth, of a head; None of a photograph, whose light is that of the picture.
     """
 
     face: Face
     light: BakedLight
     rig: FaceRig
     terms: LightTerms
+    mouth: MouthColours | None
     source: NDArray[np.int32]
     behind: NDArray[np.bool_]
     template: NDArray[np.float32]
@@ -80,6 +84,7 @@ def build_surface(face: Face, own: Lit) -> LitSurface:
     light, rig = whole.of_drawn(face.triangles), build_rig(face)
     if len(light.triangles) > MAX_TRIANGLES:
         raise DataError(f"a face with light may have {MAX_TRIANGLES} triangles, not {len(light.triangles)}")
+    terms = light_terms(face, rig, light)
     backs = light.triangles < 0
     numbers = light.triangle_numbers
     corners = face.triangles[numbers]
@@ -112,7 +117,8 @@ def build_surface(face: Face, own: Lit) -> LitSurface:
         face=face,
         light=light,
         rig=rig,
-        terms=light_terms(face, rig, light),
+        terms=terms,
+        mouth=None if own.is_flat else MouthColours.of(face, light.mouth_rows, terms.ring_of(rig.rest)),
         source=source,
         behind=is_behind[order],
         template=template,
