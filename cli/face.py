@@ -155,6 +155,7 @@ def photo(  # noqa: PLR0913 - one parameter a flag
         ),
     ] = None,
     age_keep: Annotated[bool, switch("Keep the wrinkles of the skin, which are softened otherwise.")] = False,
+    no_glasses: Annotated[bool, switch("Leave off glasses that are seen.")] = False,
     preview: Annotated[Path | None, Parameter(help="Write a picture of the head with its landmarks (.png).")] = None,
     person: Person = None,
     model: Model = None,
@@ -172,8 +173,8 @@ def photo(  # noqa: PLR0913 - one parameter a flag
 
     consent = agreed(photos[0], consent, name)
     result = build_avatar(
-        photos, out, consent=consent, name=name, eye_color=eye_color, age_keep=age_keep, model=model,
-        on_warning=warner(quiet=quiet),
+        photos, out, consent=consent, name=name, eye_color=eye_color, age_keep=age_keep, no_glasses=no_glasses,
+        model=model,        on_warning=warner(quiet=quiet),
     )  # fmt: skip
     _state_person(out, person)
     if preview is not None:

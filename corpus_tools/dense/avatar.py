@@ -49,6 +49,7 @@ def build_avatar(  # noqa: PLR0913 - one parameter an option
     name: str | None = None,
     eye_color: str | None = None,
     age_keep: bool = False,
+    no_glasses: bool = False,
     model: Path | None = None,
     on_warning: Callable[[str], None] = lambda _: None,
 ) -> BuiltFace:
@@ -66,6 +67,9 @@ def build_avatar(  # noqa: PLR0913 - one parameter an option
     age_keep
         Keep the wrinkles of the skin, which are softened otherwise: as colours, they stay when the face moves.
 
+    no_glasses
+        Leave off glasses that are seen; they are taken off the skin in any case.
+
     Raises
     ------
     InputError
@@ -75,7 +79,7 @@ def build_avatar(  # noqa: PLR0913 - one parameter an option
     BackendError
         The landmark models or a package are missing, or the file cannot be written.
     """
-    choices = LookChoices(eye_color, age_keep)
+    choices = LookChoices(eye_color, age_keep, not no_glasses)
     record = consent_record(name or split_number(photos[0])[0].stem, consent)
     head = read_face(find_file(SOURCE_FACE, "face"))
     seen, neutral = _read(photos, head, model, on_warning)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.dense.adapt_head import adapt_head
+from corpus_tools.dense.glasses import covered_skin, find_glasses, wear_glasses
 from corpus_tools.dense.light_colour import remove_cast, skin_texture
 from corpus_tools.dense.mesh_fit import (
     align_to_head,
@@ -21,7 +22,7 @@ from corpus_tools.dense.modes import MOST_MODES, DenseModel, add_modes, dense_mo
 from corpus_tools.dense.person_look import AS_SEEN, LookChoices, LookSampler, PersonLook, dress_head
 from corpus_tools.dense.skin_canvas import build_canvas
 from corpus_tools.dense.skin_colour import average_skin_colours, build_picture_fitter
-from corpus_tools.dense.texture import paint_skin
+from corpus_tools.dense.texture import paint_skin, without_covered
 from corpus_tools.dense.tracked_pictures import TrackedPictures, find_videos, resting_landmarks, track_videos
 from corpus_tools.recordings.provenance import PROVENANCE, read_provenance
 from corpus_tools.recordings.video import CachedTracker
@@ -167,7 +168,17 @@ def paint_person(
     skin = average_skin_colours(fitted.shaped, canvas, fit, seen, on_frame=sampler.add, on_progress=on_progress)
     look = choices.applied(sampler.look())
     shown, side = canvas.texels.at(skin.rows), len(canvas.texture)
+
+    def blurred(values: FloatArray, spread: float = AROUND_GLOSS) -> FloatArray:
+        return shown.blurred(values, side, spread)
+
+    places = shown.interpolate(fitted.shaped.vertices.astype(np.float64))[:, :2]
+    glasses = find_glasses(places, skin.colour, fit.marks)
+    if glasses is not None:
+        look = replace(look, notes=(*look.notes, "glasses"))
+        skin = replace(skin, colour=without_covered(skin.colour, covered_skin(glasses, places), blurred))
     clean = remove_cast(skin.colour, look.cast, look.skin)
-    skin = replace(skin, colour=skin_texture(clean, lambda values: shown.blurred(values, side, AROUND_GLOSS)))
+    skin = replace(skin, colour=skin_texture(clean, blurred))
     painted = paint_skin(fitted.shaped, canvas, skin, keeps_lines=choices.keeps_lines)
-    return dress_head(painted, look), look
+    dressed = dress_head(painted, look)
+    return dressed if glasses is None or not choices.wears_glasses else wear_glasses(dressed, glasses), look

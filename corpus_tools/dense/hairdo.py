@@ -37,7 +37,7 @@ SEE_THROUGH, CROPPED_MM = 2.0, 6.0
 SHADED_CROWN = 0.24  # share of a bald crown that is unlike skin: shaved hair; bald people have less
 # Median coherence of the directions of strands (Bigun and Granlund 1987) over 4.5 and 9 mm: afros and short curls .36
 # to .46 and .32 to .37, long curls .52 and .43, straight hair from .55 and .46, long and straight from .7 and .65.
-CURLY, CURLY_WIDE, WAVY_WIDE = 0.5, 0.47, 0.55
+CURLY, CURLY_WIDE, WAVY_WIDE = 0.48, 0.47, 0.55
 NEAR_MM, WIDE_MM, FINE_MM, SHADE_MM = 4.5, 9.0, 1.5, 6.0
 FINEST, INSIDE_CELLS = 100, 3  # cells that tell a texture, and their distance from the outline in fine cells
 AFRO_MM = (72.0, 97.0)  # above `FOREHEAD`, and from the middle of the face: curls beyond either are an afro

@@ -95,10 +95,11 @@ class PersonLook:
 
 @dataclass(frozen=True, slots=True)
 class LookChoices:
-    """Choices of a look: a name of `EYE_COLOURS` or #rrggbb, and whether fine lines of the skin stay."""
+    """Choices of a look: a name of `EYE_COLOURS` or #rrggbb, whether fine lines of the skin stay, and seen glasses."""
 
     eye_color: str | None = None
     keeps_lines: bool = True
+    wears_glasses: bool = True
 
     def __post_init__(self) -> None:
         """Refuse values of other types, and colours that do not exist (`InputError`)."""

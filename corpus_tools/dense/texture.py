@@ -1,5 +1,6 @@
 """Texture of the talker's skin; unseen parts take the head's texture in the talker's tint."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -32,6 +33,7 @@ FRINGE_LUMA = (0.78, 0.95)  # of the median skin: up to the first hair, from the
 EVEN_TEXELS, EVEN_SHARE = 50.0, 0.7  # about 8 mm, Gaussian; share of slow variations of log B/G that is removed
 TINT_BLOCK = 24  # texels along a side of the squares over which the tint of seen skin is averaged: about 4 mm
 SHARP_TEXELS, SHARP_GAIN = 4.0, 0.7  # unsharp masking, Gaussian of this deviation
+COVERED_TEXELS, FEW_FREE = (90.0, 40.0, 18.0), 0.02  # Gaussians around covered skin; share that counts little
 LINE_TEXELS, LINE_KEPT = 14.0, 0.35  # Gaussian of the skin around a line, about 2 mm; share of its depth that is kept
 LINE_SKIN = (0.7, 0.85)  # of the median skin's luminance: up to the first no skin, from the second skin
 LINE_DEPTHS = (0.35, 0.7)  # logarithms: up to the first lines, from the second hair, lashes and nostrils
@@ -135,6 +137,23 @@ def _skin_tint(
     factors = np.ones((len(face.vertices), 3))
     factors[used] = np.exp(mixed)
     return factors
+
+
+def without_covered(
+    colour: FloatArray, is_covered: NDArray[np.bool_], blurred: Callable[[FloatArray, float], FloatArray]
+) -> FloatArray:
+    """Colours (P, 3) whose covered ones (P,) are those of the free skin around them.
+
+    `blurred` gives means (P, D) of values (P, D) around each place, of a spread in texels.
+    """
+    found, free = colour.copy(), ~is_covered[:, None]
+    known = np.concatenate([free, free * colour], axis=1).astype(np.float64)
+    around = np.median(colour[~is_covered], axis=0)
+    for spread in COVERED_TEXELS:
+        share, *sums = blurred(known, spread).T
+        around = (np.transpose(sums) + FEW_FREE * around) / (share[:, None] + FEW_FREE)
+    found[is_covered] = around[is_covered]
+    return found
 
 
 def soften_lines(colour: FloatArray, share: FloatArray, texels: Texels, side: int) -> FloatArray:

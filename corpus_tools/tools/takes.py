@@ -75,7 +75,7 @@ def _avatar(order: Mapping[str, Any], call: Call) -> dict[str, Any]:
     stated, made, notes = read_statement(photo), photo.with_name("avatar.face"), list[str]()
     progress = call.stage("making the head")
     progress(0, 2)
-    given = {name: stated[name] for name in ("consent", "name", "eye_color", "age_keep")}
+    given = {name: stated[name] for name in ("consent", "name", "eye_color", "age_keep", "no_glasses")}
     built = build_avatar([photo], made, **given, on_warning=notes.append)
     progress(1, 2)
     try:

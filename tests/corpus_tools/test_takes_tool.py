@@ -88,7 +88,14 @@ def test_a_photo_becomes_the_head_of_its_person(tmp_path: Path) -> None:
     out.mkdir()
     Image.fromarray(still("tomas", 360)).save(photo, "PNG")
     order = {"take": str(photo), "out": str(out), "max_bytes": 2e7}
-    stated = {"name": "tom", "consent": None, "eye_color": "green", "age_keep": False, "max_pixels": 1_000_000}
+    stated = {
+        "name": "tom",
+        "consent": None,
+        "eye_color": "green",
+        "age_keep": False,
+        "no_glasses": False,
+        "max_pixels": 1_000_000,
+    }
     (tmp_path / STATEMENT).write_text(json.dumps(stated))
     with pytest.raises(InputError, match="state the consent"):
         ordered(TAKES, "avatar", order)

@@ -17,7 +17,7 @@ from tts2face.models.named_colours import parse_hair_colour
 from tts2face.numeric.arrays import decode_srgb, encode_srgb
 from tts2face.storage.schema import Tensor, millimetres
 
-HAIR_PART = "hair"
+HAIR_PART, WORN_PART = "hair", "glasses"
 MEAN_RELIEF = 128.0  # relief at which a strand has the colour of the hair
 MATERIAL = FacePart(HAIR_PART, 0, 0, specular=0.3, shininess=24.0, wrap=0.3, cutout=True, kind="strands")
 
@@ -88,7 +88,9 @@ def attach_hair(face: Face, hair: Hair, colour: str) -> Face:
     DataError
         The haircut belongs to heads of another layout.
     """
-    if len(face.vertices) != hair.n_face_vertices:
+    # what is worn, such as glasses, lies behind the vertices of the layout
+    worn = len(face.vertices) - hair.n_face_vertices
+    if worn < 0 or (worn and not any(part.name == WORN_PART for part in face.parts)):
         raise DataError(
             f"the haircut {hair.metadata.get('name', '')} fits heads of {hair.n_face_vertices} vertices, but the face "
             f"has {len(face.vertices)}; choose another face or no hair"
@@ -117,6 +119,8 @@ def attach_hair(face: Face, hair: Hair, colour: str) -> Face:
 def _join_occlusion(face: Face, hair: Hair) -> NDArray[np.uint8] | None:
     """Occlusion (P, V, D / 8) of a face with a haircut; None if either has none, or of other directions."""
     own, cards, shadow = face.occlusion, hair.occlusion, hair.skin_occlusion
+    if own is not None and shadow is not None and len(shadow) < own.shape[1]:
+        shadow = np.pad(shadow, ((0, own.shape[1] - len(shadow)), (0, 0)))
     if (
         own is None
         or cards is None

@@ -3,15 +3,13 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from corpus_tools.dense.tube import tube
 from corpus_tools.shipped.drawn.character import Colour
-from corpus_tools.shipped.drawn.fields import smooth_line, wind_outward
+from corpus_tools.shipped.drawn.fields import smooth_line
 from corpus_tools.shipped.head.parts import Eyeball, HeadPart, MaterialSpan
-from corpus_tools.shipped.head.subdivision import grid_triangles
-from tts2face.numeric.arrays import FloatArray, unit_vectors
 
-WIRE_MM, N_RIM_SECTION = 1.5, 8
+WIRE_MM = 1.5
 RIM_MM = np.array([28.5, 26.0])  # half sizes of a rim, which bends back by `WRAP_MM` at its outer side
 RIM_OFF_MM = np.array([1.0, -3.5, 9.0])  # of its centre from the front of the eyeball: outwards, up, ahead
 WRAP_MM, N_RIM = 5.0, 64
@@ -30,33 +28,16 @@ def glasses_piece(balls: Sequence[Eyeball], colour: Colour) -> HeadPart:
         across = np.cos(turn)
         back = WRAP_MM * np.clip(across, 0, 1) ** 2
         rim = centre + np.column_stack([sign * RIM_MM[0] * across, RIM_MM[1] * np.sin(turn), -back])
-        tubes.append(_tube(rim, is_closed=True))
+        tubes.append(tube(rim, WIRE_MM, is_closed=True))
         outer = rim[np.argmax(sign * rim[:, 0] + 0.4 * rim[:, 1])]
         ear = EAR_MM * [sign, 1, 1]
         bend = 0.5 * (outer + ear) + [sign * 7.0, 2.0, 6.0]
         knots = np.stack([outer, bend, ear, ear - np.array([3.0 * sign, 9.0, 9.0])])
-        tubes.append(_tube(smooth_line(knots, N_TEMPLE)))
+        tubes.append(tube(smooth_line(knots, N_TEMPLE), WIRE_MM))
         inner.append(rim[np.argmax(-sign * rim[:, 0] + 0.3 * rim[:, 1])])
     middle = 0.5 * (inner[0] + inner[1]) + [0.0, 3.5, 2.0]
-    tubes.append(_tube(smooth_line((inner[0], middle, inner[1]), N_BRIDGE)))
+    tubes.append(tube(smooth_line((inner[0], middle, inner[1]), N_BRIDGE), WIRE_MM))
     counts = np.cumsum([0, *(len(points) for points, _ in tubes)])
     points = np.concatenate([points for points, _ in tubes])
     faces = np.concatenate([faces + count for (_, faces), count in zip(tubes, counts, strict=False)])
     return HeadPart(points, (MaterialSpan("glasses", faces, GLASSES_MATERIAL),), np.tile(colour, (len(points), 1)))
-
-
-def _tube(path: FloatArray, *, is_closed: bool = False) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Points and triangles of a wire along a path (N, 3)."""
-    around = np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0) if is_closed else np.gradient(path, axis=0)
-    along = unit_vectors(around)
-    up = unit_vectors(np.cross(along, [0.31, 0.17, 0.93]) + 1e-9)
-    side = np.cross(along, up)
-    turn = np.linspace(0, 2 * np.pi, N_RIM_SECTION, endpoint=False)
-    rings = path[:, None] + WIRE_MM * (
-        np.cos(turn)[None, :, None] * up[:, None] + np.sin(turn)[None, :, None] * side[:, None]
-    )
-    rings = rings[:, np.append(np.arange(N_RIM_SECTION), 0)]
-    if is_closed:
-        rings = np.concatenate([rings, rings[:1]])
-    points, triangles = rings.reshape(-1, 3), grid_triangles(len(rings), N_RIM_SECTION + 1)
-    return points, wind_outward(points, triangles, path.mean(axis=0))

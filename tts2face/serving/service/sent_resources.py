@@ -44,9 +44,12 @@ class SentPhoto:
     fit: str | None = None
     eye_color: str | None = None
     age_keep: bool = False
+    no_glasses: bool = False
 
 
 NO_CHOICES = SentPhoto()
+# Fields of a photo that are true or false, and what they do.
+HEAD_SWITCHES = {"age_keep": "keep the wrinkles of the skin", "no_glasses": "leave off glasses that are seen"}
 
 
 @dataclass(frozen=True, slots=True)

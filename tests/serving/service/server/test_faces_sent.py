@@ -54,7 +54,8 @@ def test_parts_that_belong_to_a_photo_are_checked(ask_with_photos: Ask) -> None:
         ({"makes": "video"}, "the part makes is picture or avatar"),
         ({"makes": "avatar", "fit": "{}"}, "a fit corrects a picture that speaks; leave out fit, or makes"),
         ({"makes": "avatar", "age_keep": "1"}, "the part age_keep is true or false"),
-        ({"eye_color": "blue"}, "eye_color and age_keep are of a head; leave them out, or add makes"),
+        ({"eye_color": "blue"}, "eye_color, age_keep and no_glasses are of a head; leave them out, or add makes"),
+        ({"makes": "avatar", "no_glasses": "no"}, "the part no_glasses is true or false"),
         ({"consent": "x" * 1001}, "the part consent has up to 1000 characters of text"),
         ({"fit": " " * 100_001}, "the part fit has up to 100000 characters of text"),
     ):

@@ -31,6 +31,7 @@ from tts2face.serving.service.resource_views import (
 )
 from tts2face.serving.service.sent_resources import (
     AVATAR,
+    HEAD_SWITCHES,
     MAX_CONSENT,
     MAX_FIT,
     MAX_MAPPING,
@@ -156,10 +157,13 @@ def _form(kind: str) -> dict[str, Any]:
             "type": "string", "maxLength": MAX_NAME, "example": "green",
             "description": f"With a head: {', '.join(EYE_COLOURS)} or #rrggbb; that of the photo if left out.",
         }  # fmt: skip
-        parts["age_keep"] = {
-            "type": "boolean", "default": False, "example": False,
-            "description": "With a head: keep the wrinkles of the skin.",
-        }  # fmt: skip
+        for part, does in HEAD_SWITCHES.items():
+            parts[part] = {
+                "type": "boolean",
+                "default": False,
+                "example": False,
+                "description": f"With a head: {does}.",
+            }
     schema = {"type": "object", "properties": parts, "required": ["file", "name"]}
     return {"required": True, "content": {"multipart/form-data": {"schema": schema}}}
 
@@ -241,21 +245,24 @@ async def _content(part: UploadFile | str | None) -> object:
 
 
 def _read_choices(form: FormData) -> SentPhoto:
-    makes, age_keep = form.get("makes", SPEAKING_PICTURE), form.get("age_keep", "false")
+    makes = form.get("makes", SPEAKING_PICTURE)
+    switches = {part: form.get(part, "false") for part in HEAD_SWITCHES}
     if makes not in (SPEAKING_PICTURE, AVATAR):
         raise RefusedError(422, "invalid_request", f"the part makes is {SPEAKING_PICTURE} or {AVATAR}")
-    if age_keep not in ("true", "false"):
-        raise RefusedError(422, "invalid_request", "the part age_keep is true or false")
+    for part, value in switches.items():
+        if value not in ("true", "false"):
+            raise RefusedError(422, "invalid_request", f"the part {part} is true or false")
     consent, fit, eye_color = (
         _text(form, part, most) for part, most in (("consent", MAX_CONSENT), ("fit", MAX_FIT), ("eye_color", MAX_NAME))
     )
     if fit is not None and makes == AVATAR:
         raise RefusedError(422, "invalid_request", "a fit corrects a picture that speaks; leave out fit, or makes")
-    if makes == SPEAKING_PICTURE and (eye_color is not None or age_keep == "true"):
-        raise RefusedError(422, "invalid_request", "eye_color and age_keep are of a head; leave them out, or add makes")
+    if makes == SPEAKING_PICTURE and (eye_color is not None or "true" in switches.values()):
+        reason = f"eye_color, {' and '.join(HEAD_SWITCHES)} are of a head; leave them out, or add makes"
+        raise RefusedError(422, "invalid_request", reason)
     if eye_color is not None:
         parse_eye_colour(eye_color)
-    return SentPhoto(consent, str(makes), fit, eye_color, age_keep == "true")
+    return SentPhoto(consent, str(makes), fit, eye_color, **{part: value == "true" for part, value in switches.items()})
 
 
 def _text(form: Mapping[str, object], part: str, most: int) -> str | None:

@@ -72,6 +72,7 @@ class PhotoDialog:
                 with ui.row().classes("items-center") as self._choices:
                     self._eyes = ui.select(EYES, label="Eyes", value="").props("dense outlined").style("width: 180px")
                     self._age_keep = ui.checkbox("Keep wrinkles")
+                    self._no_glasses = ui.checkbox("Leave off glasses")
                 self._places = PhotoPlacesElement(self._change)
                 self._name = ui.input("Name of the face").props(f"dense outlined maxlength={MAX_NAME}")
                 self._consent = ConsentForm()
@@ -130,7 +131,8 @@ class PhotoDialog:
         consent = self._consent.statement or None
         made = SentPhoto(consent)
         if self._makes.value == AVATAR:
-            made = SentPhoto(consent, AVATAR, eye_color=self._eyes.value or None, age_keep=self._age_keep.value)
+            switches = {"age_keep": self._age_keep.value, "no_glasses": self._no_glasses.value}
+            made = SentPhoto(consent, AVATAR, eye_color=self._eyes.value or None, **switches)
         elif self._fit != self._found["fit"]:
             made = SentPhoto(consent, fit=json.dumps(self._fit))
         with shown_errors(), self._busy("The face is made."):
@@ -159,7 +161,7 @@ class PhotoDialog:
         self._name.value = self._status.text = ""
         self._consent.clear()
         self._makes.value = SPEAKING_PICTURE
-        self._eyes.value, self._age_keep.value = "", False
+        self._eyes.value, self._age_keep.value, self._no_glasses.value = "", False, False
         self._show_choice()
 
     def _delete_picture(self) -> None:
