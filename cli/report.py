@@ -64,13 +64,16 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
     people: Annotated[
         Path | None, Parameter(help="Folder of fixations of people in conversation, to compare the gaze with.")
     ] = None,
+    speech: Annotated[
+        bool, Parameter(negative="", help="Also speak sentences, and compare head, brows and blinks with people.")
+    ] = False,
 ) -> None:
     """Compare each style's gestures with motion from its fields, noise and published fields for the same sound."""
     refuse_overwriting({"--out": out}, {"the palette": palette, "--people": people})
     from corpus_tools.studies.gestures.analysis import StudyOptions
     from corpus_tools.studies.gestures.write import write_gestures
 
-    options = StudyOptions(held_out, halves, clips, seed, people)
+    options = StudyOptions(held_out, halves, clips, seed, people, speech)
     with progress_bar("analysing styles") as on_progress:
         study = write_gestures(palette, out, options, on_progress=on_progress)
     n_met, n_targets = study.targets

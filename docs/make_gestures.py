@@ -1,6 +1,7 @@
 """Measure the starter palette's measured style and its moods, and write the tables of gestures.md.
 
-Run: python docs/make_gestures.py [styles] [moods] [gaze]; the people are those of ../shared/recordings/gaze_dialogue.
+Run: python docs/make_gestures.py [speech] [styles] [moods] [gaze]; the people looked at are those of
+../shared/recordings/gaze_dialogue.
 """
 
 import sys
@@ -11,6 +12,7 @@ from corpus_tools.studies.gestures.analysis import StudyOptions, StyleStudy, Tra
 from corpus_tools.studies.gestures.gaze import GazeStudy, study_gaze
 from corpus_tools.studies.gestures.moods import MoodOptions, MoodStudy, study_moods
 from corpus_tools.studies.gestures.page import gaze_panels, panels_plot
+from corpus_tools.studies.gestures.speech import speech_rows, study_speech
 from corpus_tools.studies.gestures.write_moods import mood_rows
 from tts2face.models.palette import MEASURED_STYLE
 from tts2face.models.palette_file import load_palette
@@ -133,7 +135,14 @@ def gaze_tables() -> dict[str, str]:
     return {"gaze": gaze(found)}
 
 
-PARTS = {"styles": style_tables, "moods": mood_tables, "gaze": gaze_tables}
+def speech_tables() -> dict[str, str]:
+    """The table of what head, brows and blinks do in speech, beside people."""
+    lines = _headed(("what", "unit", "made", "95 %", "people"))
+    lines += [f"| {' | '.join(row)} |" for row in speech_rows(study_speech(Session()))]
+    return {"speech": "\n".join(lines)}
+
+
+PARTS = {"speech": speech_tables, "styles": style_tables, "moods": mood_tables, "gaze": gaze_tables}
 
 
 def main() -> None:

@@ -30,6 +30,7 @@ from corpus_tools.studies.gestures.measures import (
     split_recordings,
     wasserstein,
 )
+from corpus_tools.studies.gestures.speech import SpeechMeasure, study_speech
 from corpus_tools.studies.gestures.traits import Trait, in_display_units, style_traits
 from lexicon.errors import InputError
 from lexicon.values.fields import check_fields
@@ -37,6 +38,7 @@ from tts2face.gestures.stream import GestureFields
 from tts2face.lips.motion_measures import pearson
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
 from tts2face.numeric.arrays import FloatArray
+from tts2face.session.session import Session
 from tts2face.types import Progress, ignore_progress
 
 NEAR, HALF = 1.5, 0.5  # maximum distance of a field, relative to the distance between halves and to that of noise
@@ -51,7 +53,8 @@ Motion = Mapping[str, NDArray[np.floating]]
 class StudyOptions:
     """Options of a study: one in `one_in` recordings is held out; numbers of random halvings and clips; the seed.
 
-    `people` is a folder of recorded gaze, with which the made one is compared; None: it is not.
+    `people` is a folder of recorded gaze, with which the made one is compared; None: it is not. `speaks`: the default
+    style speaks sentences, in which head, brows and blinks are compared with people.
 
     Raises
     ------
@@ -64,6 +67,7 @@ class StudyOptions:
     clips: int = 3
     seed: int = 0
     people: Path | None = None
+    speaks: bool = False
 
     def __post_init__(self) -> None:
         """Check the types and the numbers."""
@@ -160,6 +164,7 @@ class GestureStudy:
     styles: tuple[StyleStudy, ...]
     body: tuple[BodyMeasure, ...]
     gaze: GazeStudy | None
+    speech: tuple[SpeechMeasure, ...] = ()
 
     @property
     def targets(self) -> tuple[int, int]:
@@ -175,6 +180,7 @@ class GestureStudy:
             if moving.feature == "head"
         ]
         kept += [comparison.is_met for comparison in self.gaze.comparisons] if self.gaze is not None else []
+        kept += [measure.is_met for measure in self.speech]
         return sum(kept), len(kept)
 
 
@@ -192,7 +198,8 @@ def study_gestures(
             prepared[source] = _prepare_style(palette, source, options)
         studies.append(_study_style(palette, style, prepared[source], options))
     on_progress(len(names), len(names))
-    return GestureStudy(name, options, tuple(studies), measure_body(options.seed), gaze)
+    speech = study_speech(Session(palette=name)) if options.speaks else ()
+    return GestureStudy(name, options, tuple(studies), measure_body(options.seed), gaze, speech)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -19,6 +19,7 @@ from corpus_tools.studies.gestures.analysis import (
 from corpus_tools.studies.gestures.clips import FROM_S, LAGS_S, MINUTES, VISITED_AFTER
 from corpus_tools.studies.gestures.gaze import GazeStudy
 from corpus_tools.studies.gestures.measures import FAST_HZ, ratio
+from corpus_tools.studies.gestures.speech import speech_rows
 from corpus_tools.studies.pages import note_paragraph, page, paragraphs, scroll_box, table
 from corpus_tools.studies.plots import SERIES, Plot, draw_svg
 
@@ -169,6 +170,9 @@ def gestures_page(study: GestureStudy) -> str:
     parts += ["<h2>Breath and eyes</h2>", _body(study)]
     if study.gaze is not None:
         parts += ["<h2>Gaze in conversation</h2>", *_gaze(study.gaze)]
+    if study.speech:
+        head = ("what", "unit", "made", "95 %", "people")
+        parts += ["<h2>Speech</h2>", table(head, [*speech_rows(study.speech)], numbers=(2,))]
     return page(f"Gestures: {study.name}", parts)
 
 

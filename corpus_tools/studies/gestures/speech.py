@@ -4,7 +4,7 @@ Beside each measure stands what people do, from tracks of readers and of a publi
 tracked pose taken out (decision 264). Chin down is positive; brows and eyes up are.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,11 @@ from tts2face.face.landmarks import landmark_motion, landmark_positions
 from tts2face.gestures.speech_plan import SoundFeatures, SpokenSentence, plan_speech, vowel_scores
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import FloatArray
+from tts2face.request import Idle, Request
+from tts2face.session.session import Session
 from tts2face.types import Clip
+
+Statistic = Callable[[FloatArray], np.floating | float]
 
 # Sentences of the Harvard list (IEEE 1969), of which one or two have what most sentences have.
 SENTENCES = (
@@ -51,6 +55,8 @@ SENTENCE_S = (2.5, 7.5)  # of those whose course is measured
 ACCENT_S = np.linspace(-0.04, 0.12, 9)  # about the middle of a vowel
 TURN_S, TURN_GAP_S = (-0.12, 0.20), 0.25  # about a content word, and least time between two turns of the head
 N_RESAMPLED = 500
+N_MONOLOGUES = 6  # with different seeds
+SILENT_S = 120.0
 EYE_MM = (0.0, 54.0, 85.0)  # the eyes from the pivot of the head
 BROW_LANDMARKS = (70, 63, 105, 66, 107, 46, 53, 52, 65, 55, 300, 293, 334, 296, 336, 276, 283, 282, 295, 285)
 EYE_CORNERS, EYES_APART_MM = (33, 263), 88.9  # outer ones, and their distance to which faces are scaled
@@ -103,17 +109,21 @@ def speaking_face(clip: Clip, text: str, face: Face) -> SpeakingFace:
     head = clip.head.values.astype(np.float64)
     down = head[:, 0]
     eyes = head[:, 4] + EYE_MM[1] * np.cos(down) - EYE_MM[2] * np.sin(down)
-    lids = [clip.motion.channels.index(f"eyeBlink{side}") for side in ("Left", "Right")]
     scores = [vowel for word in vowel_scores(clip.speech, SoundFeatures.of(clip.speech.waveform)) for vowel in word]
     return SpeakingFace(
         clip.fps,
         np.degrees(down),
         eyes,
         EYES_APART_MM / apart * (clip.motion.values.astype(np.float64) @ moves),
-        clip.motion.values[:, lids].mean(axis=1).astype(np.float64),
+        _closure(clip),
         np.array([[time, score] for score, time in scores]),
         plan_speech(clip.speech, script, "en-us").sentences,
     )
+
+
+def _closure(clip: Clip) -> FloatArray:
+    lids = [clip.motion.channels.index(f"eyeBlink{side}") for side in ("Left", "Right")]
+    return np.asarray(clip.motion.values[:, lids].mean(axis=1), np.float64)
 
 
 def band(values: FloatArray, fps: float, limits: tuple[float, float]) -> FloatArray:
@@ -142,14 +152,10 @@ class SpeechMeasure:
 
 def measure_speech(short: Sequence[SpeakingFace], long: Sequence[SpeakingFace], seed: int = 0) -> list[SpeechMeasure]:
     """Measures of clips of single sentences, and of monologues."""
-    generator = np.random.default_rng([seed, 5])
     rows = list[SpeechMeasure]()
 
-    def add(name: str, unit: str, samples: NDArray[np.floating], people: tuple[float, float]) -> None:
-        known = samples[np.isfinite(samples)]
-        draws = known[generator.integers(0, len(known), (N_RESAMPLED, len(known)))].mean(axis=1)
-        low, high = np.quantile(draws, [0.025, 0.975]).tolist()
-        rows.append(SpeechMeasure(name, unit, float(known.mean()), low, high, people))
+    def add(name: str, unit: str, samples: FloatArray, people: tuple[float, float]) -> None:
+        rows.append(SpeechMeasure(name, unit, float(samples.mean()), *_interval(samples, seed), people))
 
     pitch, brows = (np.concatenate([courses(face, signal) for face in long]) for signal in ("pitch", "brows"))
     for at, share in enumerate(COURSE_AT):
@@ -170,6 +176,18 @@ def measure_speech(short: Sequence[SpeakingFace], long: Sequence[SpeakingFace], 
     )
     add("brow height, deviation", "mm", np.array([band(f.brows, f.fps, BROW_HZ).std() for f in long]), (0.37, 1.28))
     return rows
+
+
+def _interval(samples: FloatArray, seed: int, statistic: Statistic = np.mean) -> tuple[float, float]:
+    """95 % interval of a statistic of samples (n,), by resampling."""
+    chosen = np.random.default_rng([seed, 5]).integers(0, len(samples), (N_RESAMPLED, len(samples)))
+    low, high = np.quantile([statistic(samples[draw]) for draw in chosen], [0.025, 0.975]).tolist()
+    return low, high
+
+
+def spread(samples: FloatArray) -> float:
+    """Coefficient of variation."""
+    return float(samples.std() / samples.mean())
 
 
 def courses(face: SpeakingFace, signal: str) -> FloatArray:
@@ -215,8 +233,36 @@ def turns_at_words(face: SpeakingFace) -> FloatArray:
     return np.array([float(ways[0]) for ways in near if ways])
 
 
-def blink_intervals(faces: Sequence[SpeakingFace]) -> FloatArray:
-    """Seconds between blinks."""
-    return np.concatenate(
-        [find_blinks(f.closure, np.array([len(f.closure)], np.int32), f.fps).intervals for f in faces]
-    )
+def blink_measures(speaking: Sequence[SpeakingFace], silent: Clip) -> Iterator[SpeechMeasure]:
+    """Rates of blinks in speech and in silence, and how their intervals vary."""
+    found = [find_blinks(face.closure, np.array([len(face.closure)], np.int32), face.fps) for face in speaking]
+    rates = np.array([blinks.per_minute for blinks in found])
+    intervals = np.concatenate([blinks.intervals for blinks in found])
+    quiet = find_blinks(_closure(silent), np.array([len(silent.motion)], np.int32), silent.fps)
+    minutes = 60.0 / np.maximum(quiet.intervals, 0.1)
+    yield SpeechMeasure("blinks in speech", "a minute", float(rates.mean()), *_interval(rates, 0), (16.0, 36.0))
+    yield SpeechMeasure("blinks in silence", "a minute", _rate(minutes), *_interval(minutes, 0, _rate), (10.0, 24.0))
+    name, limits = "variation of intervals of blinks", _interval(intervals, 0, spread)
+    yield SpeechMeasure(name, "", spread(intervals), *limits, (0.65, 0.95))
+
+
+def _rate(rates: FloatArray) -> float:
+    """Rate of events whose intervals have these rates."""
+    return float(1.0 / np.mean(1.0 / rates))
+
+
+def study_speech(session: Session, n_monologues: int = N_MONOLOGUES) -> tuple[SpeechMeasure, ...]:
+    """Measures of a session's default style: a clip of each sentence, monologues, and two minutes of silence."""
+    face = session.face.mesh
+    short = [speaking_face(session.clip(text, seed=at), text, face) for at, text in enumerate(SENTENCES)]
+    long = [speaking_face(session.clip(MONOLOGUE, seed=at), MONOLOGUE, face) for at in range(n_monologues)]
+    silent = session.clip(Request(source=Idle(SILENT_S), seed=1))
+    return (*measure_speech(short, long), *blink_measures(long, silent))
+
+
+def speech_rows(study: Sequence[SpeechMeasure]) -> Iterator[tuple[str, str, str, str, str]]:
+    """Name, unit, value, 95 % interval, and what people do, of each measure."""
+    for measure in study:
+        low, high = measure.people
+        interval = f"{measure.low:.2f} to {measure.high:.2f}"
+        yield measure.name, measure.unit, f"{measure.value:.2f}", interval, f"{low:g} to {high:g}"

@@ -16,6 +16,7 @@ from corpus_tools.studies.gestures.analysis import (
 )
 from corpus_tools.studies.gestures.clips import VISITED_AFTER
 from corpus_tools.studies.gestures.page import gestures_page, panels_plot, summary_panels, target_result
+from corpus_tools.studies.gestures.speech import speech_rows
 from corpus_tools.studies.plots import Plot
 from corpus_tools.studies.report import Report, Rows, as_csv, as_html, as_json, as_png
 from tts2face.models.palette_file import load_palette
@@ -75,6 +76,9 @@ def gesture_figures(study: GestureStudy) -> dict[str, Any]:
             }
             for comparison in study.gaze.comparisons
         ]
+    if study.speech:
+        heads = ("name", "unit", "value", "interval", "people")
+        content["speech"] = [dict(zip(heads, row, strict=True)) for row in speech_rows(study.speech)]
     return content
 
 
