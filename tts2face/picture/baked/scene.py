@@ -14,6 +14,7 @@ from tts2face.models.face import Face
 from tts2face.models.light import Lit
 from tts2face.numeric.arrays import Float32Array
 from tts2face.numeric.kernels import BLOCK
+from tts2face.picture.baked.coverage import refine_edges
 from tts2face.picture.baked.cut_out import compose_over, find_covers
 from tts2face.picture.baked.eyes import (
     CATCHLIGHT,
@@ -192,6 +193,8 @@ class LitScene:
                     compose(*fragments, colours, band)
                 else:
                     compose_over(fragments, colours, buffers.covers, self.wall[first : first + len(band)], band)
+        if pixels.shape[2] == 4 and self.wall is None:
+            refine_edges(buffers.table, surface.triangles, side, pixels)
         if self.softness:
             ring = np.einsum("lc,lcx->lx", surface.terms.ring_weights, points[surface.terms.ring])
             outline = self.optics.pixels(ring) / side
