@@ -11,7 +11,7 @@ from tests.face.people import DRAWN, REALISTIC
 from tests.photo.pictures import projected, still
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_MESH_LANDMARKS, UPPER_LIP_INNER_MID
 from tts2face.photo.found_face import FoundFace, find_face
-from tts2face.video.tracking import FaceTracker
+from tts2face.video.tracking import Crop, FaceTracker
 
 SIDE = 480
 CHEEKS = (50, 280, 205, 425)  # landmarks
@@ -76,6 +76,23 @@ def test_a_hand_before_the_mouth_is_told(name: str, tracker: FaceTracker) -> Non
 def test_what_cannot_be_moved_is_told(options: dict, sentence: str, tracker: FaceTracker) -> None:
     with pytest.raises(DataError, match=sentence):
         found(still("mara", **{"side": SIDE, **options}), tracker)
+
+
+@pytest.mark.parametrize(("least", "turned"), [(0.9, 1.0), (1.0, 0.3)])
+def test_what_is_not_surely_a_person_is_refused(
+    least: float, turned: float, tracker: FaceTracker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Faces of animals are found in some crops, and not in others that lie beside these or are turned."""
+    read, seen = tracker.read_crop, []
+
+    def read_crop(pixels: np.ndarray, crop: Crop) -> tuple[np.ndarray, float]:
+        points, score = read(pixels, crop)
+        seen.append(crop)
+        return points, min(score, turned if abs(crop.angle - seen[0].angle) > 0.1 else least if len(seen) == 4 else 1.0)
+
+    monkeypatch.setattr(tracker, "read_crop", read_crop)
+    with pytest.raises(DataError, match=r"in me\.png is not surely a person's face; animals are not moved"):
+        found(still("mara", SIDE), tracker)
 
 
 def test_pictures_without_a_face_are_told(tracker: FaceTracker) -> None:
