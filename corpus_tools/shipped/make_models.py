@@ -112,6 +112,15 @@ def refresh_people(making: Making) -> None:
     refresh_presets(making.out / "head.face")
 
 
+def part_tongues(making: Making) -> None:
+    """Lips that give way to the tongue, in heads and characters that are there; builders make them so."""
+    from corpus_tools.shipped.drawn.build_drawn import CAST
+    from corpus_tools.shipped.head.tongue_out import refresh_tongue
+
+    for name in making.names or ("head", *CAST):
+        refresh_tongue(making.out / f"{name}.face")
+
+
 def make_palette(making: Making) -> None:
     """One measured style, a seated man who reads, and what the table derives from it."""
     from corpus_tools.build_palette import StyleSource, build_style
@@ -197,6 +206,7 @@ ALONE: Mapping[str, Callable[[Making], None]] = {
     "styles": derive_styles,
     "voices": add_voices_map,
     "people": refresh_people,
+    "tongues": part_tongues,
 }
 
 
@@ -211,7 +221,7 @@ def main() -> None:
     parser.add_argument("--recordings", type=Path, default=Path("../shared/recordings"), help="folder of recordings")
     parser.add_argument("--keep", type=Path, default=Path.home() / ".cache/tts2face/models", help="downloads and bakes")
     parser.add_argument(
-        "--names", nargs="*", default=(), help="characters of cast, light, retouching and mouths; all without"
+        "--names", nargs="*", default=(), help="characters of cast, light, retouching, mouths and tongues; all without"
     )
     arguments = parser.parse_args()
     unknown = [step for step in arguments.steps if step not in choices]

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from corpus_tools.shipped.head.tongue_out import give_way
 from tests.face.posing import posed_vertices
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
-from tts2face.models.landmarks import INNER_LIP_UPPER
+from tts2face.models.landmarks import INNER_LIP_UPPER, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.storage.shipped import find_file
 
 FRONT_Z = 8.0  # mm; teeth further back are behind the cheeks
@@ -98,3 +99,17 @@ def test_upper_lashes_lie_over_shut_lids(head: Face) -> None:
     height = np.ptp(moved[:, 1])
     assert height > 3  # edge-on they would have none
     assert moved[:, 1].mean() < at_rest[shown, 1].mean() - 8
+
+
+@pytest.mark.parametrize("share", [0.6, 1.0])
+def test_lips_give_way_to_the_tongue(head: Face, share: float) -> None:
+    parted = give_way(head)
+    posed = posed_vertices(parted, weights(parted, {"tongueOut": share}))
+    lips = np.einsum("lk,lkd->ld", parted.landmark_weights, posed[parted.landmark_vertices])
+    upper, lower = (lips[parted.landmarks == number][0] for number in (UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID))
+    assert upper[1] - lower[1] > 4
+    tongue = posed[part_vertices(parted, "tongue")]
+    out = tongue[(tongue[:, 2] > lower[2] - 2) & (np.abs(tongue[:, 0]) < 5)]
+    assert len(out) > 10
+    assert lower[1] - 1 < out[:, 1].min() < lower[1] + 2  # on the lip, not in it
+    assert give_way(parted) is parted

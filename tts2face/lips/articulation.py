@@ -56,7 +56,7 @@ INSTEAD = {
 LOWERED_SHAPES = {"mouthLowerDownLeft": 1.0, "mouthLowerDownRight": 1.0}
 # Drop of the jaw and gap of the lips at which the tip of the tongue is seen between the teeth; largest weight for it.
 DENTAL_DROP_MM = 5.5
-DENTAL_GAP_MM = 10.0
+DENTAL_GAP_MM = 8.0
 LARGEST_LOWERED = 0.8
 OUTER_UPPER_MID, OUTER_LOWER_MID = OUTER_LIP_UPPER[5], OUTER_LIP_LOWER[5]
 

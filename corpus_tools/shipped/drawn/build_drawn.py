@@ -37,6 +37,7 @@ from corpus_tools.shipped.head.shirt import shirt_piece
 from corpus_tools.shipped.head.skin import HeadSkin, build_shoulders, build_skin
 from corpus_tools.shipped.head.source import SourceMesh
 from corpus_tools.shipped.head.tongue import tongue_piece
+from corpus_tools.shipped.head.tongue_out import give_way
 from corpus_tools.training.calibrate_file import calibrate_face_file
 from tts2face.face.breathing import BREATH_SHAPE
 from tts2face.face.hair_swing import LIMIT_RAD
@@ -71,7 +72,7 @@ def drawn_face(source: SourceMesh, character: DrawnCharacter) -> Face:
     face = assemble_face(built, [*shape_names(cage), *BODY_SHAPES], textures, about)
     limits = face.limits.copy()
     limits[-len(BODY_SHAPES) :] = BODY_LIMITS
-    return add_landmarks(_centred(replace(face, limits=limits)), skin.base)
+    return give_way(add_landmarks(_centred(replace(face, limits=limits)), skin.base))
 
 
 def own_hairdo(character: DrawnCharacter) -> Hairdo:

@@ -20,6 +20,7 @@ from corpus_tools.shipped.head.proportions import add_targets, modelling_targets
 from corpus_tools.shipped.head.source import PACKAGE, SourceMesh, fetch_data, read_source
 from corpus_tools.shipped.head.texture import paint_texture
 from corpus_tools.shipped.head.tongue import TONGUE_UP
+from corpus_tools.shipped.head.tongue_out import give_way
 from corpus_tools.training.calibrate_file import calibrate_face_file
 from tts2face.models.face import Face, Hairdo, Texture
 from tts2face.models.face_file import write_face
@@ -75,7 +76,7 @@ def _build_default(data: Data, ground: ReferenceHead) -> tuple[Face, HeadPieces]
     names = shape_names(ground.cage)
     face = assemble_face(built, names, paint_textures(data, ground, look), {"name": "head", **METADATA})
     face = replace(face, hairdo=DEFAULT_HAIRDO)
-    return add_landmarks(face, ground.skin.base) if TABLE.is_file() else face, built
+    return give_way(add_landmarks(face, ground.skin.base)) if TABLE.is_file() else face, built
 
 
 def paint_textures(data: Data, ground: ReferenceHead, look: HeadStyle) -> tuple[Texture, ...]:
