@@ -82,7 +82,7 @@ def test_the_tip_of_the_tongue_rises_to_the_ridge(head: Face) -> None:
 
 
 def test_the_tip_of_the_tongue_comes_between_the_teeth(head: Face) -> None:
-    shown = {"jawOpen": 0.25, "tongueOut": 0.45}
+    shown = {"jawOpen": 0.2, "tongueOut": 0.5}
     between = tip(head, shown)
     posed = posed_vertices(head, weights(head, shown))
     upper, lower = (posed[part_vertices(head, f"teeth_{arch}")] for arch in ("upper", "lower"))
