@@ -39,10 +39,10 @@ from tts2face.photo.matte import Network, read_person
 
 UNSEEN_HAIR = "dark-brown"  # where the top of the head is outside of the picture
 N_PERSONS = 12  # pictures in which a network reads the person
-HAIR_LIGHT = (0.005, 0.36)  # luminance of the darkest and lightest hair
-CROPPED_LIGHT = -1.8  # most luminance of cropped hair, of the skin's, logarithm: what is seen is hair and skin mixed
+HAIR_LIGHT = (0.005, 0.6)  # luminance of the darkest and lightest hair
+CROPPED_LIGHT = -1.3  # most luminance of cropped hair, of the skin's, logarithm: what is seen is hair and skin mixed
 SEEN_SKIN = 0.4  # of what differs from skin, which cropped hair lets through: rendered heads of three tones
-SHINE = 0.5  # logarithm by which hair in a picture is lighter than its colour; median of rendered haircuts
+SHINE = 0.5  # logarithm by which hair in a picture is lighter than its strands and brows; median of rendered haircuts
 # Natural hair lies on a line of log R/G and B/G, from black and grey to brown and blond: browner by so much bluer less.
 # Casts of cameras and walls lead off it; what is further off than these is dyed or red.
 HAIR_LINE, NATURAL = np.array([1.0, -0.9]), (0.4, 0.7)
@@ -173,7 +173,7 @@ class LookSampler:
         is_visible = eyes.radius_px >= MIN_IRIS_PX and np.isfinite(eyes.iris).all()
         iris = srgb_colour(iris_colour(eyes, cast)) if is_visible else parse_hex(NEUTRAL_IRIS)
         notes += [] if is_visible else ["eyes too small to tell their colour"]
-        brows = np.array([min(colour[0], eyes.skin[0] + BROW_LIGHT), *colour[1:]])
+        brows = np.array([min(colour[0] - SHINE, eyes.skin[0] + BROW_LIGHT), *colour[1:]])
         return PersonLook(
             cast, eyes.skin, Hairdo(HAIRCUTS[length], code), length, iris, srgb_colour(brows),
             shirt_colour(portrait, hair, cast), tuple(notes),
@@ -195,7 +195,7 @@ def hair_colour(seen: FloatArray, most: float = 0.0) -> FloatArray:
     away = seen[1:] - brown * HAIR_LINE
     along = brown * min(brown / GREY, 1.0) * HAIR_LINE
     kept = np.clip((np.linalg.norm(away) - NATURAL[0]) / (NATURAL[1] - NATURAL[0]), 0.0, 1.0)
-    light = np.clip(min(seen[0] - SHINE, most), *np.log(HAIR_LIGHT))
+    light = np.clip(min(seen[0], most), *np.log(HAIR_LIGHT))
     return np.array([light, *(along + kept * away)])
 
 

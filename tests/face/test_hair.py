@@ -12,7 +12,7 @@ from tests.picture.tiny_face import tiny_face
 from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import Identity, read_face, write_face
 from tts2face.models.face_loading import load_face
-from tts2face.models.hair import Hair, attach_hair, fit_hair
+from tts2face.models.hair import Hair, attach_hair, fit_hair, seen_colour, strand_colour
 from tts2face.models.hair_file import read_hair, write_hair
 from tts2face.models.named_colours import HAIR_COLOURS, parse_hair_colour
 from tts2face.picture.camera import camera_matrices
@@ -81,11 +81,11 @@ def test_a_face_is_loaded_with_its_hair_and_with_that_of_its_identity(folder: Pa
 
 def test_hair_has_its_colour_and_the_scalp_below_it_too(folder: Path) -> None:
     face = load_face(str(folder / "dressed.face"))
-    own = np.rint(255 * parse_hair_colour(GREEN))
+    own = np.rint(255 * strand_colour(parse_hair_colour(GREEN)))
     for texture in (face.textures[face.parts[-1].texture], face.textures[0]):
         assert np.abs(texture.pixels - own).max() <= 3
     red = load_face(str(folder / "dressed.face"), hair_color="#c01010")
-    assert np.abs(red.textures[0].pixels[0, 0] - np.array([0xC0, 0x10, 0x10])).max() <= 3
+    assert np.abs(red.textures[0].pixels[0, 0] - 255 * strand_colour(np.array([0xC0, 0x10, 0x10]) / 255)).max() <= 3
 
 
 def test_half_of_a_card_is_covered() -> None:
@@ -195,3 +195,9 @@ def test_a_wrong_haircut_is_refused(tmp_path: Path, change: dict[str, object], r
     write_hair(tmp_path / "wrong.hair", replace(hair, **change))
     with pytest.raises(DataError, match=reason):
         read_hair(tmp_path / "wrong.hair")
+
+
+def test_strands_are_seen_in_the_colour_that_is_asked() -> None:
+    asked = np.array([parse_hair_colour(name) for name in HAIR_COLOURS])
+    np.testing.assert_allclose(seen_colour(strand_colour(asked)), asked, atol=1e-9)
+    assert (strand_colour(asked)[asked > 0.3] < asked[asked > 0.3]).all()

@@ -19,6 +19,9 @@ from tts2face.storage.schema import Tensor, millimetres
 
 HAIR_PART, WORN_PART = "hair", "glasses"
 MEAN_RELIEF = 128.0  # relief at which a strand has the colour of the hair
+# Levels, of 255, at which hair is seen in the middle from in front, and of its strands: `head` in ten colours.
+SEEN_LEVELS = np.array([0, 9, 20, 31, 46, 64, 80, 109, 127, 146, 178, 194, 209, 255.0])
+STRAND_LEVELS = np.array([0, 14, 20, 27, 40, 51, 61, 80, 90, 103, 127, 143, 164, 220.0])
 MATERIAL = FacePart(HAIR_PART, 0, 0, specular=0.3, shininess=24.0, wrap=0.3, cutout=True, kind="strands")
 
 
@@ -95,7 +98,7 @@ def attach_hair(face: Face, hair: Hair, colour: str) -> Face:
             f"the haircut {hair.metadata.get('name', '')} fits heads of {hair.n_face_vertices} vertices, but the face "
             f"has {len(face.vertices)}; choose another face or no hair"
         )
-    srgb = parse_hair_colour(colour)
+    srgb = strand_colour(parse_hair_colour(colour))
     textures = face.textures  # the rest of the face is not kept for them
     n_old, n_new = len(face.vertices), len(hair.vertices)
     uv = np.zeros((n_old, 2), np.float32) if face.uv is None else face.uv
@@ -155,6 +158,18 @@ def fit_hair(face: Face, hair: Hair) -> NDArray[np.float32]:
     factors = np.linalg.solve(matrix, np.concatenate([moved, np.zeros((4, 3))]))
     fitted: NDArray[np.float32] = (hair.vertices + terms(hair.vertices.astype(np.float64)) @ factors).astype(np.float32)
     return fitted
+
+
+def strand_colour(srgb: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Colour (..., 3) of strands that are seen in a colour before lamps: gloss and light between them brighten hair."""
+    strands: NDArray[np.float64] = np.interp(srgb, SEEN_LEVELS / 255, STRAND_LEVELS / 255)
+    return strands
+
+
+def seen_colour(srgb: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Colour (..., 3) in which strands are seen: the inverse of `strand_colour`."""
+    seen: NDArray[np.float64] = np.interp(srgb, STRAND_LEVELS / 255, SEEN_LEVELS / 255)
+    return seen
 
 
 def colour_relief(relief: NDArray[np.uint8], srgb: NDArray[np.float64]) -> NDArray[np.uint8]:

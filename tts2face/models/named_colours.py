@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 
 HAIR_COLOURS: Mapping[str, str] = {
-    "black": "14100e", "dark-brown": "2b1d14", "brown": "463326", "light-brown": "66503d", "auburn": "5a2a1a",
-    "red": "8a3f1d", "dark-blond": "7f6950", "blond": "a69378", "grey": "8f8c89", "white": "a29e98",
-}  # fmt: skip  # sRGB
+    "black": "14100e", "dark-brown": "2e1d14", "brown": "5c402e", "light-brown": "926f50", "auburn": "74341f",
+    "red": "a84a20", "dark-blond": "b2926b", "blond": "d2bfa0", "grey": "a8a29d", "white": "d6d0ca",
+}  # fmt: skip  # sRGB, as hair is seen
 EYE_COLOURS: Mapping[str, str] = {
     "dark-brown": "3a281f", "brown": "58402f", "hazel": "6a5a3e", "green": "67705a", "grey": "6d7274", "blue": "60788c",
 }  # fmt: skip

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.models.face import Face, FacePart
-from tts2face.models.hair import HAIR_PART
+from tts2face.models.hair import HAIR_PART, seen_colour
 from tts2face.models.light import Baked
 from tts2face.numeric.arrays import FloatArray, IntArray, decode_srgb, encode_srgb
 
@@ -15,7 +15,6 @@ LINEAR = decode_srgb(np.arange(256) / 255)
 FORWARD = 0.3  # least share of a triangle's normal that points forward where its light counts
 SHADE = (0.4, 1.8)  # least and largest light of a strand, of the mean: the lamps of others shade it again
 USUAL_HUE = 0.75  # share of the hair's usual hue in each place: highlights have that of the lamp
-LAMP_HAIR = 1.25  # light of strands before lamps over that of their colour alone; the means of `head` and of blond hair
 INWARD = 0.2  # weight of the other two corners of the place at which a corner's light is read, off the texture's seams
 
 
@@ -25,13 +24,14 @@ def plain_face(face: Face) -> Face:
 
 
 def _lamp_hair(face: Face) -> Face:
-    """Strands before lamps shine in their own colour: the texture of a haircut brighter, without white reflections."""
+    """Strands in the colour in which they are seen before lamps, without white reflections."""
     hair = next((part for part in face.parts if part.name == HAIR_PART), None)
     if hair is None or face.hairdo is None or not hair.is_textured:
         return face
     textures = list(face.textures)
     own = textures[hair.texture]
-    textures[hair.texture] = replace(own, pixels=encode_srgb(LAMP_HAIR * LINEAR[own.pixels]))
+    levels = np.rint(255 * seen_colour(np.arange(256) / 255)).astype(np.uint8)
+    textures[hair.texture] = replace(own, pixels=levels[own.pixels])
     parts = tuple(replace(part, specular=0.0) if part is hair else part for part in face.parts)
     return replace(face, textures=tuple(textures), parts=parts)
 
