@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from corpus_tools.dense.build_face import CONTENT, SOURCE_FACE, BuiltFace, fit_person, paint_person
 from corpus_tools.dense.mesh_fit import align_to_head, face_landmarks
-from corpus_tools.dense.person_look import LookChoices
+from corpus_tools.dense.person_look import LookChoices, is_child
 from corpus_tools.dense.tracked_pictures import TrackedPictures
 from tts2face.models.consent import PHOTO_TOOL, consent_record
 from tts2face.models.face import Face
@@ -29,6 +29,7 @@ from tts2face.storage.shipped import find_file
 from tts2face.video.pose import remove_pose
 from tts2face.video.tracking import FaceTracker
 
+CHILD_IDENTITY = "nia"  # of the shipped head
 MIRRORED_WEIGHT = 0.03  # of a mirrored picture, which fills what a turned head hides
 OPENING_SCALE = np.array([1.02, 1.25])  # of the opening between lips, for its rim
 # of the head in which landmarks are read as in the pictures
@@ -84,7 +85,8 @@ def build_avatar(  # noqa: PLR0913 - one parameter an option
     head = read_face(find_file(SOURCE_FACE, "face"))
     seen, neutral = _read(photos, head, model, on_warning)
     mirrored = [_mirrored(observed, mirror_table(head)) for observed in seen]
-    fitted = fit_person(head, np.mean(neutral, axis=0))
+    person = np.mean(neutral, axis=0)
+    fitted = fit_person(_child_head(head) if is_child(person) else head, person)
     face, look = paint_person(fitted, [*seen, *mirrored], lambda done, of: None, choices, model=model)
     face = replace(
         face,
@@ -118,6 +120,11 @@ def _read(
         seen.append(TrackedPictures(Path(photo), points, landmarks, (shown.picture.pixels,), 1.0, opening))
         neutral.append(person_landmarks(shown, head, reader.tracker))
     return seen, neutral
+
+
+def _child_head(head: Face) -> Face:
+    """The head with the skull, neck and shoulders of a child, and its own textures."""
+    return replace(read_face(find_file(SOURCE_FACE, "face"), CHILD_IDENTITY), textures=head.textures)
 
 
 def widened(opening: FloatArray) -> FloatArray:

@@ -43,7 +43,7 @@ FINEST, INSIDE_CELLS = 100, 3  # cells that tell a texture, and their distance f
 AFRO_MM = (72.0, 97.0)  # above `FOREHEAD`, and from the middle of the face: curls beyond either are an afro
 TIED_MM = 105.0  # above `FOREHEAD`: what stands so high is tied
 FRINGED_MM = 88.0  # half width of short hair with a fringe that falls
-FRINGE, FRINGE_HALF_MM, FRINGE_FROM_MM, FRINGE_TO = 0.45, 48.0, 6.0, 0.55  # share of the lower forehead under hair
+FRINGE, FRINGE_HALF_MM, FRINGE_FROM_MM, FRINGE_TO = 0.42, 48.0, 6.0, 0.55  # share of the lower forehead under hair
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,6 +37,7 @@ from tts2face.models.named_colours import EYE_COLOURS, HAIR_COLOURS, parse_eye_c
 from tts2face.numeric.arrays import FloatArray, smoothstep
 from tts2face.photo.matte import Network, read_person
 
+NOSE_BASE = 2  # landmark
 UNSEEN_HAIR = "dark-brown"  # where the top of the head is outside of the picture
 N_PERSONS = 12  # pictures in which a network reads the person
 HAIR_LIGHT = (0.005, 0.6)  # luminance of the darkest and lightest hair
@@ -47,6 +48,10 @@ SHINE = 0.5  # logarithm by which hair in a picture is lighter than its strands 
 # Casts of cameras and walls lead off it; what is further off than these is dyed or red.
 HAIR_LINE, NATURAL = np.array([1.0, -0.9]), (0.4, 0.7)
 GREY = 0.35  # log R/G below which hair is rather grey in yellowish light than blond
+CHILD_BROWN = 0.5  # least log R/G of a child's hair
+# Heights of eyes above chin and base of the nose, of the distance of the outer eye corners, summed: a child of
+# nine 1.67, adults 1.75 (a broad smile, no teeth) to 1.99.
+CHILD = 1.71
 NEUTRAL_IRIS = EYE_COLOURS["brown"]
 IRIS_LIGHT, DARK_IRIS, DARK_IRIS_HUE = 0.012, 0.02, (0.55, -0.55)  # least luminance; up to which irises are brown
 BROWN_FROM, BROWN_BLUE = (
@@ -166,7 +171,7 @@ class LookSampler:
             seen, most = hair.colour, 0.0
             if length == "cropped":
                 seen, most = seen + SEEN_SKIN * (seen - eyes.skin), eyes.skin[0] + CROPPED_LIGHT
-            colour = hair_colour(neutral(seen, cast), most)
+            colour = hair_colour(neutral(seen, cast), most, CHILD_BROWN if is_child(self.fit.marks) else 0.0)
             code = "#{:02x}{:02x}{:02x}".format(*srgb_colour(colour).tolist())
         notes = [] if length else ["top of the head not seen"]
         length = length or UNSEEN
@@ -186,13 +191,21 @@ def neutral(colour: FloatArray, cast: FloatArray) -> FloatArray:
     return clean
 
 
-def hair_colour(seen: FloatArray, most: float = 0.0) -> FloatArray:
+def is_child(marks: FloatArray) -> bool:
+    """Whether landmarks (468, 3) of a head are a child's."""
+    outer = marks[[EYE_OUTER_RIGHT, EYE_OUTER_LEFT]]
+    heights = outer[:, 1].mean() - marks[[CHIN, NOSE_BASE], 1]
+    return bool(heights.sum() < CHILD * np.linalg.norm(outer[0] - outer[1]))
+
+
+def hair_colour(seen: FloatArray, most: float = 0.0, least_brown: float = 0.0) -> FloatArray:
     """Colour of hair (3,), `log_colour`, that looks as `seen` in neutral light: natural colours are kept natural.
 
-    `most` limits the logarithm of its luminance.
+    `most` limits the logarithm of its luminance, `least_brown` is the least of R/G: a child's hair is not grey.
     """
     brown = max(float(seen[1:] @ HAIR_LINE / (HAIR_LINE @ HAIR_LINE)), 0.0)
     away = seen[1:] - brown * HAIR_LINE
+    brown = max(brown, least_brown)
     along = brown * min(brown / GREY, 1.0) * HAIR_LINE
     kept = np.clip((np.linalg.norm(away) - NATURAL[0]) / (NATURAL[1] - NATURAL[0]), 0.0, 1.0)
     light = np.clip(min(seen[0], most), *np.log(HAIR_LIGHT))

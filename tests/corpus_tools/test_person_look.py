@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.ndimage import gaussian_filter
 
 from cli.main import run
 from corpus_tools.dense.hair_region import ACROSS_MM, UP_MM, Portrait, find_hair
@@ -24,12 +25,15 @@ from corpus_tools.dense.light_colour import (
 )
 from corpus_tools.dense.mesh_fit import face_landmarks, part_vertices
 from corpus_tools.dense.person_look import (
+    CHILD_BROWN,
     LASH_LENGTH,
     NEUTRAL_IRIS,
     LookSampler,
     PersonLook,
     dress_head,
     hair_colour,
+    iris_colour,
+    is_child,
     parse_hex,
     part_colour,
     shorten_lashes,
@@ -41,12 +45,13 @@ from tts2face.models.face_file import read_face
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_names import BALD
 from tts2face.models.landmarks import N_LANDMARKS, N_MESH_LANDMARKS
-from tts2face.models.named_colours import EYE_COLOURS, HAIR_COLOURS, parse_hair_colour
+from tts2face.models.named_colours import EYE_COLOURS, HAIR_COLOURS, parse_eye_colour, parse_hair_colour
 from tts2face.numeric.arrays import decode_srgb, encode_srgb
 from tts2face.picture.camera import camera_matrices
 from tts2face.picture.camera_view import parse_camera
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import draw
+from tts2face.session.catalogue import identities
 from tts2face.storage.shipped import find_file
 
 CAMERA, SIDE_PX = "0,0,900", 448
@@ -201,6 +206,48 @@ def test_olive_hair_becomes_grey_and_blue_hair_stays_blue() -> None:
 
 
 @pytest.mark.build
+def test_children_are_told_by_their_proportions() -> None:
+    path = find_file("head", "face")
+    children = [
+        entry for entry in (None, *(one.name for one in identities())) if is_child(_marks(read_face(path, entry)))
+    ]
+    assert children == ["nia"]
+
+
+def _marks(face: Face) -> np.ndarray:
+    return face_landmarks(face, face.vertices.astype(np.float64))[:N_MESH_LANDMARKS]
+
+
+def test_a_childs_hair_is_not_grey() -> None:
+    seen = log_colour(np.array((150, 146, 140), float))
+    assert hair_colour(seen)[1] < 0.1
+    child = hair_colour(seen, least_brown=CHILD_BROWN)
+    assert child[1] > 0.4
+    assert child[2] < -0.3
+
+
+def test_green_and_hazel_eyes_are_not_brown() -> None:
+    skin, white = log_colour(SKIN), log_colour(np.array(WHITE, float))
+    for name in ("green", "hazel", "grey", "blue", "brown"):
+        eyes = EyeColours(skin, white, log_colour(255.0 * parse_eye_colour(name)), 12.0)
+        found = iris_colour(eyes, np.zeros(2))
+        known = {other: log_colour(255.0 * parse_eye_colour(other))[1:] for other in EYE_COLOURS}
+        off = {other: float(np.linalg.norm(found[1:] - hue)) for other, hue in known.items()}
+        assert min(off, key=off.__getitem__).removeprefix("dark-") == name
+
+
+@pytest.mark.parametrize("is_curly", [False, True])
+def test_curls_are_told_from_straight_hair(head: Face, is_curly: bool) -> None:
+    """Strands fall straight, or turn to all sides within a few millimetres."""
+    portrait = painted_portrait(head, (70, 120, 170), (60, 42, 30), 45.0, 75.0)
+    size = (2 * len(UP_MM) - 1, 2 * len(ACROSS_MM) - 1)
+    noise = np.random.default_rng(2).normal(size=size)
+    strands = gaussian_filter(noise, 1.5 if is_curly else (12.0, 0.8))
+    fine = np.repeat((50 + 14 * strands / strands.std())[..., None], 3, axis=2).clip(0, 255)
+    found = name_hair(replace(portrait, fine=fine), find_hair(portrait, log_colour(SKIN)), log_colour(SKIN))
+    assert found == ("long and curly" if is_curly else "long")
+
+
 @pytest.mark.parametrize(
     ("identity", "hair", "colour", "lengths", "names"),
     [
