@@ -199,5 +199,7 @@ def test_a_wrong_haircut_is_refused(tmp_path: Path, change: dict[str, object], r
 
 def test_strands_are_seen_in_the_colour_that_is_asked() -> None:
     asked = np.array([parse_hair_colour(name) for name in HAIR_COLOURS])
-    np.testing.assert_allclose(seen_colour(strand_colour(asked)), asked, atol=1e-9)
+    for haircut in ("", "long01"):
+        np.testing.assert_allclose(seen_colour(strand_colour(asked, haircut), haircut), asked, atol=0.01)
     assert (strand_colour(asked)[asked > 0.3] < asked[asked > 0.3]).all()
+    assert (strand_colour(asked, "long01") > strand_colour(asked)).all()

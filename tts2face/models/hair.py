@@ -22,6 +22,10 @@ MEAN_RELIEF = 128.0  # relief at which a strand has the colour of the hair
 # Levels, of 255, at which hair is seen in the middle from in front, and of its strands: `head` in ten colours.
 SEEN_LEVELS = np.array([0, 9, 20, 31, 46, 64, 80, 109, 127, 146, 178, 194, 209, 255.0])
 STRAND_LEVELS = np.array([0, 14, 20, 27, 40, 51, 61, 80, 90, 103, 127, 143, 164, 220.0])
+# Light in the middle of haircuts that hang away from the lamps or shade themselves, of that of the others.
+SHADED_HAIRCUTS = {
+    "afro01": 0.53, "curly01": 0.75, "curly02": 0.63, "fringe01": 0.9, "long01": 0.54, "wavy01": 0.47, "wavy02": 0.9,
+}  # fmt: skip
 MATERIAL = FacePart(HAIR_PART, 0, 0, specular=0.3, shininess=24.0, wrap=0.3, cutout=True, kind="strands")
 
 
@@ -98,7 +102,7 @@ def attach_hair(face: Face, hair: Hair, colour: str) -> Face:
             f"the haircut {hair.metadata.get('name', '')} fits heads of {hair.n_face_vertices} vertices, but the face "
             f"has {len(face.vertices)}; choose another face or no hair"
         )
-    srgb = strand_colour(parse_hair_colour(colour))
+    srgb = strand_colour(parse_hair_colour(colour), str(hair.metadata.get("name", "")))
     textures = face.textures  # the rest of the face is not kept for them
     n_old, n_new = len(face.vertices), len(hair.vertices)
     uv = np.zeros((n_old, 2), np.float32) if face.uv is None else face.uv
@@ -160,15 +164,17 @@ def fit_hair(face: Face, hair: Hair) -> NDArray[np.float32]:
     return fitted
 
 
-def strand_colour(srgb: NDArray[np.float64]) -> NDArray[np.float64]:
+def strand_colour(srgb: NDArray[np.float64], haircut: str = "") -> NDArray[np.float64]:
     """Colour (..., 3) of strands that are seen in a colour before lamps: gloss and light between them brighten hair."""
-    strands: NDArray[np.float64] = np.interp(srgb, SEEN_LEVELS / 255, STRAND_LEVELS / 255)
-    return strands
+    strands = decode_srgb(np.interp(srgb, SEEN_LEVELS / 255, STRAND_LEVELS / 255)) / SHADED_HAIRCUTS.get(haircut, 1.0)
+    colour: NDArray[np.float64] = encode_srgb(np.minimum(strands, 1.0)) / 255
+    return colour
 
 
-def seen_colour(srgb: NDArray[np.floating]) -> NDArray[np.float64]:
+def seen_colour(srgb: NDArray[np.floating], haircut: str = "") -> NDArray[np.float64]:
     """Colour (..., 3) in which strands are seen: the inverse of `strand_colour`."""
-    seen: NDArray[np.float64] = np.interp(srgb, STRAND_LEVELS / 255, SEEN_LEVELS / 255)
+    strands = encode_srgb(decode_srgb(np.asarray(srgb, np.float64)) * SHADED_HAIRCUTS.get(haircut, 1.0)) / 255
+    seen: NDArray[np.float64] = np.interp(strands, STRAND_LEVELS / 255, SEEN_LEVELS / 255)
     return seen
 
 

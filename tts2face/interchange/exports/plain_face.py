@@ -30,7 +30,7 @@ def _lamp_hair(face: Face) -> Face:
         return face
     textures = list(face.textures)
     own = textures[hair.texture]
-    levels = np.rint(255 * seen_colour(np.arange(256) / 255)).astype(np.uint8)
+    levels = np.rint(255 * seen_colour(np.arange(256) / 255, face.hairdo.haircut)).astype(np.uint8)
     textures[hair.texture] = replace(own, pixels=levels[own.pixels])
     parts = tuple(replace(part, specular=0.0) if part is hair else part for part in face.parts)
     return replace(face, textures=tuple(textures), parts=parts)
