@@ -60,7 +60,7 @@ def irises(renderer, weights, head):
 
 
 def seen_eyes(renderer, weights, camera, side):
-    """What is seen of each eyeball beside its lids' opening, over the ball's disc, and whether the lids are shut."""
+    """Area of each eyeball seen beside its lids' opening, over the ball's disc, and whether the lids are shut."""
     scene, face = renderer.scene, renderer.scene.face
     optics, points = camera_matrices(parse_camera(camera), face, (side, side)), posed_points(renderer, weights)
     parts = [part for part in face.parts if part.kind != "strands" and part.name not in OPEN_PARTS]

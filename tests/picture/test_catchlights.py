@@ -83,7 +83,7 @@ def test_eyes_that_are_large_in_the_face_have_large_ones() -> None:
 
 
 @pytest.mark.parametrize("name", FACES)
-def test_both_eyes_of_a_face_shine_wherever_it_looks(name: str) -> None:
+def test_both_eyes_of_a_face_shine_at_any_gaze(name: str) -> None:
     face = load_face(name)
     renderer = mesh_renderer(face, Picture(size="512x512"))
     for right, up, yaw in [(0, 0, 0), (0.7, 0, -0.2), (-0.7, 0.3, 0.2), (0, -0.6, 0), (0.3, 0.6, 0.35)]:

@@ -45,7 +45,7 @@ def tint_hair(face: Face, colour: str) -> Face:
 
 
 def _seen_texels(face: Face, light: BakedLight) -> NDArray[np.float64]:
-    """(N, 2) places in the page of the hair, one in each cell of a grid in which hair is nearest to who looks at it."""
+    """(N, 2) places in the page of the hair, one in each cell of a grid in which hair is in front."""
     hair = next(part for part in face.parts if part.name == HAIR_PART)
     numbers = np.unique(light.triangle_numbers)
     corners, is_hair = face.triangles[numbers], (numbers >= hair.first) & (numbers < hair.first + hair.count)

@@ -29,7 +29,7 @@ LINEAR = decode_srgb(np.arange(256) / 255)
 
 @dataclass(frozen=True, slots=True)
 class Retouching:
-    """What is changed: shares of highlights that stay, on the nose and on hair, and heights of the brows.
+    """Changes: shares of highlights that stay, on the nose and on hair, and heights of the brows.
 
     ``nose`` are the least and greatest height, mm, and half the width of the ridge; ``brow`` is its middle height, how
     far up and down of it skin moves, and displacements by the way from the middle of the face.
