@@ -39,6 +39,7 @@ from tts2face.storage.shipped import find_file
 from tts2face.types import Progress, ignore_progress
 from tts2face.video.networks import LandmarkNetwork, find_bundle, find_segmenter
 
+LEAST_SEEN = 1e-6  # weight of what hair hides
 AROUND_GLOSS = 30.0  # texels, Gaussian, about 5 mm, whose colours lie under gloss
 SOURCE_FACE = "head"  # the shipped face that is adapted
 CONTENT = "a head with the shape and, with the stated consent, the skin of a real person"
@@ -172,7 +173,9 @@ def paint_person(
     def blurred(values: FloatArray, spread: float = AROUND_GLOSS) -> FloatArray:
         return shown.blurred(values, side, spread)
 
-    places = shown.interpolate(fitted.shaped.vertices.astype(np.float64))[:, :2]
+    surface = shown.interpolate(fitted.shaped.vertices.astype(np.float64))
+    places, free = surface[:, :2], ~sampler.under_hair(surface)
+    skin = replace(skin, weight=skin.weight * np.maximum(free, LEAST_SEEN))
     glasses = find_glasses(places, skin.colour, fit.marks)
     if glasses is not None:
         look = replace(look, notes=(*look.notes, "glasses"))

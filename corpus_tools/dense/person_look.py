@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.dense.hair_region import (
+    ACROSS_MM,
+    CELL_MM,
     OFF_BACKGROUND,
     UP_MM,
     Portrait,
@@ -34,11 +36,12 @@ from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_tint import tint_parts
 from tts2face.models.landmarks import CHIN, EYE_OUTER_LEFT, EYE_OUTER_RIGHT
 from tts2face.models.named_colours import EYE_COLOURS, HAIR_COLOURS, parse_eye_colour, parse_hair_colour
-from tts2face.numeric.arrays import FloatArray, smoothstep
+from tts2face.numeric.arrays import FloatArray, Mask, smoothstep
 from tts2face.photo.matte import Network, read_person
 
 NOSE_BASE = 2  # landmark
 UNSEEN_HAIR = "dark-brown"  # where the top of the head is outside of the picture
+SHADOW_CELLS = 2  # of the portrait, beside hair: its shadow on the skin
 N_PERSONS = 12  # pictures in which a network reads the person
 HAIR_LIGHT = (0.005, 0.6)  # luminance of the darkest and lightest hair
 CROPPED_LIGHT = -1.3  # most luminance of cropped hair, of the skin's, logarithm: what is seen is hair and skin mixed
@@ -130,6 +133,8 @@ class LookSampler:
     network: Network | None = None
     shares: list[NDArray[np.float32]] = field(default_factory=list)
     fine: NDArray[np.float32] | None = None
+    slant: FloatArray | None = None  # (2,) of the first picture: mm by which it shows a place aside for each in depth
+    hair: Mask | None = None
     portraits: list[NDArray[np.float32]] = field(default_factory=list)
     eyes: list[EyeColours] = field(default_factory=list)
 
@@ -138,6 +143,8 @@ class LookSampler:
         self.portraits.append(self._cells(picture, points))
         if self.fine is None:
             self.fine = self._cells(picture, points, 2)
+            turn = self.fit.pose(points)[0]
+            self.slant = np.asarray(np.linalg.solve(turn[:2, :2], turn[:2, 2]), np.float64)
         if self.network is not None and len(self.shares) < N_PERSONS:
             apart = float(np.linalg.norm(points[EYE_OUTER_LEFT, :2] - points[EYE_OUTER_RIGHT, :2]))
             share = read_person(picture, points[:, :2].astype(np.float64), apart, self.network).share
@@ -165,6 +172,7 @@ class LookSampler:
         eyes = median_eyes(self.eyes)
         cast = estimate_cast(eyes)
         hair = find_hair(portrait, eyes.skin)
+        self.hair = hair.region
         length = name_hair(portrait, hair, eyes.skin)
         colour, code = log_colour(255.0 * parse_hair_colour(UNSEEN_HAIR)), UNSEEN_HAIR
         if np.isfinite(hair.colour).all():
@@ -183,6 +191,17 @@ class LookSampler:
             cast, eyes.skin, Hairdo(HAIRCUTS[length], code), length, iris, srgb_colour(brows),
             shirt_colour(portrait, hair, cast), tuple(notes),
         )  # fmt: skip
+
+    def under_hair(self, places: FloatArray) -> Mask:
+        """(P,) which places (P, 3) of the head lie under the hair that `look` has found, or beside it in its shadow."""
+        from scipy.ndimage import binary_dilation
+
+        if self.hair is None or self.slant is None or not self.hair.any():
+            return np.zeros(len(places), bool)
+        near = binary_dilation(self.hair, iterations=SHADOW_CELLS)
+        seen = places[:, :2] + (places[:, 2:] - portrait_grid(self.fit.marks)[0, 2]) * self.slant
+        columns, rows = np.rint((seen - (ACROSS_MM[0], UP_MM[0])) / (CELL_MM, -CELL_MM)).astype(np.int64).T
+        return np.asarray(near[rows.clip(0, len(UP_MM) - 1), columns.clip(0, len(ACROSS_MM) - 1)])
 
 
 def neutral(colour: FloatArray, cast: FloatArray) -> FloatArray:

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from PIL import Image
 from scipy.ndimage import gaussian_filter
+from scipy.spatial.transform import Rotation
 
 from cli.main import run
-from corpus_tools.dense.hair_region import ACROSS_MM, UP_MM, Portrait, find_hair
+from corpus_tools.dense.hair_region import ACROSS_MM, CELL_MM, UP_MM, Portrait, find_hair, portrait_grid
 from corpus_tools.dense.hairdo import name_hair
 from corpus_tools.dense.light_colour import (
     GLOSSY,
@@ -224,6 +225,23 @@ def test_a_childs_hair_is_not_grey() -> None:
     child = hair_colour(seen, least_brown=CHILD_BROWN)
     assert child[1] > 0.4
     assert child[2] < -0.3
+
+
+def test_skin_under_a_fringe_is_known(head: Face) -> None:
+    """Places of a head turned in the picture, whose hair lies above the brows."""
+    used, marks = np.arange(N_MESH_LANDMARKS), _marks(head)
+    sampler = LookSampler(PictureFitter(used, head.vertices.astype(np.float64), marks, used, np.zeros((1, 1))))
+    turn = Rotation.from_euler("y", 12, degrees=True).as_matrix()
+    sampler.slant = np.linalg.solve(turn[:2, :2], turn[:2, 2])
+    depth = portrait_grid(marks)[0, 2]
+    across, up = np.meshgrid(ACROSS_MM, UP_MM)
+    sampler.hair = (up > 40) & (np.abs(across) < 60)
+    places = np.array([(x, y, depth) for x in (-30.0, 30.0) for y in (10.0, 60.0)])
+    assert sampler.under_hair(places).tolist() == [False, True, False, True]
+    ahead = np.array([[58.0, 60.0, depth + 60.0]])
+    assert sampler.under_hair(ahead).tolist() == [bool(abs(58 + 60 * sampler.slant[0]) < 60 + 3 * CELL_MM)]
+    sampler.hair = sampler.hair & False
+    assert not sampler.under_hair(places).any()
 
 
 def test_green_and_hazel_eyes_are_not_brown() -> None:
