@@ -94,7 +94,7 @@ PRESETS: dict[str, Preset] = {
     ),
     "kofi": Preset(
         "man, about 35, West African", "male", {"young": 0.85, "old": 0.15}, {"african": 1},
-        Hairdo("cropped", "black"), (0.53, 0.49, 0.44), BLACK, DARK, brows="eyebrow008", rest=_brows(0.16, 0.06),
+        Hairdo("cropped", "black"), (0.53, 0.49, 0.44), BLACK, DARK, brows="eyebrow008", rest=_brows(0.28, 0.1),
     ),
     "mei": Preset(
         "woman, about 28, East Asian", "female", YOUNG, {"asian": 1}, Hairdo("bob02", "#1a1412"),
