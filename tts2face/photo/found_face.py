@@ -35,9 +35,7 @@ HIDDEN_SPREAD, HIDDEN_RATIO = 0.0065, 1.35
 # Least probability of a face in the nine crops, and in larger, smaller and turned ones: in 344 pictures of people, of
 # which some are drawn, dark, grey, small or noisy, the least are .995 and .74. Of six animals one comes to .34.
 SURE_SCORE, SURE_TURNED_SCORE = 0.95, 0.5
-TURNED_CROPS = tuple(
-    (size, turn) for size in (0.88, 1.0, 1.14) for turn in (-0.15, 0.0, 0.15) if (size, turn) != (1, 0)
-)
+TURNED_CROPS = tuple((size, turn) for size in (0.88, 1.14) for turn in (-0.15, 0.15))
 CLOSED_EYES = 0.16  # height over width of an eye; open ones have .28 to .50, shut ones .08
 MAX_OUTSIDE = 0.3  # of the oval of the face beyond the picture: portraits often end at the forehead
 TILE_SHARES = (0.5, 0.3)  # sides of parts of a picture that are searched for small faces, of its shorter side

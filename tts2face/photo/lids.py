@@ -47,9 +47,9 @@ ABOVE_COME, BELOW_COME = (
 )  # of a blink, when the sheets come at the margins, and to their ends
 SIDE_COMES = 0.5  # beside the corners
 FIRST_COME, LAST_COME = 0.06, 0.95  # of a blink, within which the sheet over the eye comes
-ABOVE_GRID, BELOW_GRID = np.linspace(1, 0, 6), np.array([0.0, 0.35, 0.7, 1.0])  # rows of the ways to top and end
-SIDE_GRID = np.array([1.0, 0.67, 0.33])  # of the ways beside the corners
-EYE_GRID = np.array([-0.2, 0.0, 0.17, 0.33, 0.5, 0.67, 0.83, 1.0, 1.2])  # of the opening
+ABOVE_GRID, BELOW_GRID = np.linspace(1, 0, 5), np.array([0.0, 0.5, 1.0])  # rows of the ways to top and end
+SIDE_GRID = np.array([1.0, 0.5])  # of the ways beside the corners
+EYE_GRID = np.array([-0.2, 0.0, 0.25, 0.5, 0.75, 1.0, 1.2])  # of the opening
 EYE_OVERLAP = 0.02  # of the eye distance, beyond the margins
 
 
@@ -214,7 +214,7 @@ class _View:
         share = self._at / self._wide
         taper = smoothstep(np.minimum(share, 1 - share) / LINE_TAPER)
         places = frame.upper[3:-3] + frame.up * soft * 0.5
-        lashes = np.percentile(colours_at(self._pixels.astype(np.float64), places).mean(axis=1), DARK_LASHES)
+        lashes = np.percentile(_blurred_at(self._pixels, places, 0.0).mean(axis=1), DARK_LASHES)
         darkness = float(np.clip(1 - lashes / max(self._light, 1.0), *LINE_DARKNESS))
         found: FloatArray = 1 - darkness * taper * np.exp(-((away / soft) ** 2))
         return found
@@ -266,7 +266,7 @@ class _View:
         places = (
             np.stack([across + self.corner[0], down + self.corner[1]], axis=-1) - GRAIN_FROM * frame.scale * frame.up
         )
-        cheek = colours_at(self._pixels.astype(np.float64), places)
+        cheek = _blurred_at(self._pixels, places, 0.0)
         blur = max(1.0, GRAIN_BLUR * frame.scale)
         fine = cheek - gaussian_filter(cheek, (blur, blur, 0))
         most = MOST_GRAIN * float(np.median(np.abs(fine)))

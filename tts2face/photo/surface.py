@@ -137,8 +137,7 @@ def between_vertices(mesh: PhotoMesh, places: FloatArray) -> tuple[IntArray, Flo
     low, high = places.min(axis=0), places.max(axis=0)
     corners = mesh.places[mesh.triangles]
     near = mesh.triangles[((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1)]
-    found = [_triangle_around(place, mesh.places, near) for place in places]
-    return np.array([numbers for numbers, _ in found]), np.array([weights for _, weights in found])
+    return _triangles_around(places, mesh.places, near)
 
 
 def place_landmarks(
@@ -156,11 +155,12 @@ def place_landmarks(
         if number in own:
             corners[number] = own[number]
         elif eye is None:
-            corners[number], weights[number] = _triangle_around(place, mesh.places, mesh.triangles)
+            at, shares = _triangles_around(place[None], mesh.places, mesh.triangles)
+            corners[number], weights[number] = at[0], shares[0]
         else:
             patch, vertices = eyes[eye]
-            at, weights[number] = _triangle_around(place, patch.places, patch.triangles)
-            corners[number] = vertices[at]
+            at, shares = _triangles_around(place[None], patch.places, patch.triangles)
+            corners[number], weights[number] = vertices[at[0]], shares[0]
     return corners, weights
 
 
@@ -179,15 +179,15 @@ def _vertices(mesh: PhotoMesh, lashes: Sequence[IntArray]) -> Mapping[int, int]:
     return mesh.vertex_of | on_lines
 
 
-def _triangle_around(place: FloatArray, places: FloatArray, triangles: IntArray) -> tuple[IntArray, FloatArray]:
-    """Corners (3,) of the triangle around a place (2,), or nearest to it, and the weights of the place in it."""
-    a, b, c = (places[triangles[:, k]] for k in range(3))
-    first, second, off = b - a, c - a, place - a
+def _triangles_around(places: FloatArray, points: FloatArray, triangles: IntArray) -> tuple[IntArray, FloatArray]:
+    """Corners (N, 3) of the triangles around places (N, 2), or nearest to them, and the weights of the places."""
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    first, second, off = b - a, c - a, places[:, None] - a
     area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
     area = np.where(np.abs(area) < 1e-12, 1e-12, area)
-    along = (off[:, 0] * second[:, 1] - off[:, 1] * second[:, 0]) / area
-    across = (first[:, 0] * off[:, 1] - first[:, 1] * off[:, 0]) / area
-    weights = np.stack([1 - along - across, along, across], axis=1)
-    best = int(weights.min(axis=1).argmax())
-    inside = np.clip(weights[best], 0, None)
-    return triangles[best], inside / inside.sum()
+    along = (off[..., 0] * second[:, 1] - off[..., 1] * second[:, 0]) / area
+    across = (first[:, 0] * off[..., 1] - first[:, 1] * off[..., 0]) / area
+    weights = np.stack([1 - along - across, along, across], axis=-1)
+    best = weights.min(axis=-1).argmax(axis=-1)
+    inside = np.clip(weights[np.arange(len(places)), best], 0, None)
+    return triangles[best], inside / inside.sum(axis=1, keepdims=True)
