@@ -203,7 +203,7 @@ class _ClipReader:
     def _rest_landmarks(self, clip: Clip) -> FloatArray:
         """(478, 3) landmarks of the face at rest, as the tracker reads them; it is the same for all clips."""
         if self._rest is None:
-            motion, head = (replace(one, values=np.zeros_like(one.values)) for one in (clip.motion, clip.head))
+            motion, head = (replace(track, values=np.zeros_like(track.values)) for track in (clip.motion, clip.head))
             still = np.asarray(self._renderer.frame(replace(clip, motion=motion, head=head), 0))[..., :3]
             points, found = self._tracker.read(np.ascontiguousarray(still))
             if not found > 0:
@@ -251,7 +251,7 @@ def _confusions(
 
 
 def mood_measures(landmarks: FloatArray, rest: FloatArray) -> FloatArray:
-    """What moods change of a face, (T, 11), left and right: corners of the mouth, its width, brows, and lids.
+    """Changes of a face that show its mood, (T, 11), left and right: corners of the mouth, its width, brows, and lids.
 
     Parameters
     ----------
