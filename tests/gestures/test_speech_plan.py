@@ -85,6 +85,16 @@ def test_sound_alone_has_phrases_and_accents() -> None:
         assert min(abs(accent.time - peak) for accent in sentence.accents) < 0.15
 
 
+def test_sound_that_rises_at_its_end_asks() -> None:
+    times = np.arange(2 * RATE) / RATE
+    for height, asks in ((9.0, True), (0.0, False)):
+        hertz = 150 * 2 ** (height * np.clip((times - 1.5) / 0.3, 0.0, 1.0) / 12)
+        phase = 2 * np.pi * np.cumsum(hertz) / RATE
+        voice = 0.2 * sum(np.sin(k * phase) / k for k in range(1, 6)) * (times < 1.8)
+        (sentence,) = plan_speech(Speech.without_phones(Waveform(voice, RATE)), (), "en-us").sentences
+        assert (sentence.question is not None) == asks
+
+
 def test_silence_says_nothing() -> None:
     assert plan_speech(Speech.without_phones(Waveform(np.zeros(RATE), RATE)), (), "en-us").sentences == ()
 

@@ -1,31 +1,25 @@
 """Presented head motion: the slow part of the recorded motion, scaled to what viewers see, and that of sentences."""
 
-from collections.abc import Mapping
 from copy import copy
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.gestures.phrase_motion import PhraseMotion
-from tts2face.gestures.presentation import FrameContext, LowPass, PhraseFollower, filtered_spread
+from tts2face.gestures.presentation import MAX_SCALE, FrameContext, LowPass, PhraseFollower, slow_spread
 from tts2face.models.palette import GESTURE_FPS, Style
 from tts2face.numeric.arrays import Float32Array, FloatArray
-from tts2face.storage.array_cache import computed_once
 from tts2face.types import HEAD_CHANNELS
 
 SLOW_HZ = 0.7  # cut-off of the part that is scaled: turns and tilts that last a phrase
 RETURN_HZ = 0.12  # cut-off of what is subtracted, so that the head drifts back to the viewer within some 10 s
 # Standard deviation in radians to which the slow part is scaled, and the largest angle of it. Speakers who look at a
 # listener move by 2 to 5 degrees (yaw) about the direction to the listener.
-TARGET_SPREAD = {"pitch": np.radians(1.2), "yaw": np.radians(3.4), "roll": np.radians(1.2)}
+TARGET_SPREAD = {"pitch": np.radians(1.2), "yaw": np.radians(2.8), "roll": np.radians(1.2)}
 LARGEST_RATIO = 2.6  # of the slow part, in units of its target spread; approached smoothly
-# of a style that hardly moves: more would scale the noise of its tracking
-MAX_SCALE = 20.0
 STILL_S, LISTENING_MOTION = 1.0, 0.4  # listeners turn the head far less than speakers (Hadar et al. 1983)
 ONSET_S = 0.3  # transition from and to recorded styles
 LOWEST_RAD = np.radians(5.0)  # to which slow part and sentences together turn the head up or down, approached smoothly
-CACHE_KIND, CACHE_VERSION = "head-spread", 1  # raised when the spread of the same recordings changes
 
 
 class Glide:
@@ -46,18 +40,8 @@ class Glide:
 
 def slow_scales(style: Style) -> FloatArray:
     """(6,) factors by which the slow part of a style's recorded head motion reaches `TARGET_SPREAD`; 1 or more."""
-    recorded = style.motion["head"]
-
-    def compute() -> dict[str, FloatArray]:
-        head = recorded.astype(np.float64)
-        return {"spread": filtered_spread(head - np.median(head, axis=0), SLOW_HZ)}
-
-    def fits(kept: Mapping[str, NDArray[Any]]) -> bool:
-        return [(name, array.dtype.str, array.shape) for name, array in kept.items()] == [("spread", "<f8", (6,))]
-
-    spread = computed_once(CACHE_KIND, CACHE_VERSION, [recorded], compute, fits)["spread"]
     targets = np.array([TARGET_SPREAD.get(channel, 0.0) for channel in HEAD_CHANNELS])
-    return np.clip(targets / np.maximum(spread, 1e-9), 1.0, MAX_SCALE)
+    return np.clip(targets / np.maximum(slow_spread(style.motion["head"], SLOW_HZ), 1e-9), 1.0, MAX_SCALE)
 
 
 class HeadPresentation:

@@ -22,7 +22,7 @@ HOLD_S, RETURN_S = 0.25, 0.9  # behind the end, before and in which the head com
 ROUND_S = 0.10  # by which movements begin earlier and end later, so that they join smoothly
 USUAL_S, LENGTH_LIMITS = 4.5, (0.45, 1.15)  # sentences of this length have all of it; shorter ones less
 # Of that speaker's pitch and brows, and spread of their logarithm between sentences. Means over sentences lose a third.
-COURSE_SHARE, BROW_COURSE_SHARE = 0.95, 1.3
+COURSE_SHARE, BROW_COURSE_SHARE = 1.1, 1.3
 COURSE_SPREAD = 0.3
 COMMA_SHARE = 0.35  # of the course, between phrases
 COMMA = ((-0.12, 2.2, -0.7, 0.15), (0.48, -2.0, 0.7, 0.26))  # seconds from the end of a phrase, degrees, mm, width in s
@@ -40,9 +40,9 @@ BROW_GAP_S = 0.5
 BROW_TAIL = 0.35  # of it stays up a little longer
 BROW_TAIL_S, BROW_TAIL_WIDTH_S = 0.25, 0.16
 SIDE_SPREAD = 0.16  # of left against right, which people's brows have
-EMPHASIS_DEG, EMPHASIS_MM = 2.6, 1.3  # chin down and brows up on an emphasised word
+EMPHASIS_MM = 1.3  # of the brows on an emphasised word, to which its mark gives a nod
 # A question: brows up and the head a little aside from its stressed word on, and the chin falls less at its end.
-QUESTION_MM, QUESTION_TILT_DEG = 2.2, 3.0
+QUESTION_MM, QUESTION_TILT_DEG = 1.7, 3.0
 QUESTION_FALL = 0.25
 OPEN_QUESTION = 0.6  # share where the tune falls: who, when, why
 ASK_S, ASKED_S = 0.3, 0.6  # in which that begins and ends
@@ -151,13 +151,13 @@ class PhraseMotion:
 
     def _add_accent(self, accent: Accent, start: float, last: float, chances: np.random.Generator) -> float:
         """Add the movements of an accent; returns the time of the last rise of the brows."""
-        up, spread, yaw, roll, rise, uneven, late = chances.normal(size=7)
+        spread, yaw, roll, rise, uneven, late = chances.normal(size=6)
         goes_down, has_rise = chances.random(2)
         time, weight = accent.time + ACCENT_DELAY_S + 0.02 * late, accent.prominence
         size = -ACCENT_DEG * weight * np.exp(ACCENT_SPREAD * spread - 0.5 * ACCENT_SPREAD**2)
         size = -0.8 * size if goes_down < DOWN_SHARE else size
         is_strong = accent.emphasis > 0.0
-        size = EMPHASIS_DEG * accent.emphasis * (1.0 + 0.15 * up) if is_strong else size
+        size = 0.0 if is_strong else size
         moved = size * np.array([1.0, ASIDE[0] * yaw, ASIDE[1] * roll, 0.0, 0.0])
         self._bell(time, ACCENT_WIDTH_S, moved, start)
         self._bell(time + REBOUND_S, 1.2 * ACCENT_WIDTH_S, -REBOUND * moved, start)

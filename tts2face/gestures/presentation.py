@@ -5,10 +5,10 @@ Derived styles keep the form of the recorded motion (profiles of blinks, slow pa
 often and how far; recorded styles and the style ``measured`` are unchanged.
 """
 
+from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Protocol, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,9 @@ from tts2face.gestures.field_kernels import low_pass
 from tts2face.gestures.phrase_motion import PhraseMotion
 from tts2face.gestures.prosody import QUIET_DB
 from tts2face.gestures.speech_plan import SpeechPlan
-from tts2face.models.palette import GESTURE_FPS, FaceRegion
-from tts2face.numeric.arrays import Float32Array, FloatArray
+from tts2face.models.palette import EXPRESSIONS, GESTURE_FPS, FaceRegion, Style
+from tts2face.numeric.arrays import Float32Array, FloatArray, ordered_product
+from tts2face.storage.array_cache import computed_once
 
 SMOOTHING_STAGES = 4  # low-pass stages in series: 80 dB per decade, so that scaled motion adds nothing above 6 Hz
 LOUD_DB = 0.0  # intensity relative to the mean level of speech at which the loudness is 1
@@ -28,11 +29,16 @@ LOUDNESS_EMPHASIS = 0.21
 LISTENING_LOUDNESS = 1.2  # a listener shows the mood as in loud speech: a friendly one smiles
 EMPHASIS_HZ = 0.9
 EMPHASIS_LIMITS = (0.6, 1.35)
-# Expression, brows and cheeks change between phrases: the slow part of the recorded motion, by these factors and to
-# these limits, is followed at the edges of phrases and nearly held within them.
+# Expression, brows and cheeks change between phrases: the slow part of the recorded motion, scaled up to these standard
+# deviations (weights, and mm of each mode) and within so many of them, is followed at the edges of phrases and nearly
+# held within them.
 PHRASE_HZ = 0.5
-PHRASE_FACTORS = MappingProxyType({"expression": 3.0, "brows": 1.6, "cheeks": 1.6})
-PHRASE_LIMITS = MappingProxyType({"expression": 0.12, "brows": 2.0, "cheeks": 1.5})  # weights, and mm of each mode
+CHANGING = frozenset({"expression", "brows", "cheeks"})
+EXPRESSION_SPREADS = (0.03, 0.05, 0.02, 0.03, 0.05)  # in the order of `EXPRESSIONS`
+SMILE_SHARE = 2.5  # of what the face is less sad: corners of the mouth move along one axis
+REGION_SPREAD_MM, PHRASE_LIMIT = 0.6, 2.0
+MAX_SCALE = 20.0  # of a style that hardly moves: more would scale the noise of its tracking
+CACHE_KIND, CACHE_VERSION = "slow-spread", 1  # raised when the spread of the same recordings changes
 EDGE_S = 0.22  # about an edge, in which a change has its way
 HELD_RATE, MOVING_RATE = 0.4, 8.0  # 1/s: within phrases, and at their edges
 IDLE_RATE = 4.0  # in silence
@@ -113,6 +119,31 @@ def filtered_spread(values: FloatArray, cutoff_hz: float) -> FloatArray:
     return np.asarray(np.sqrt(np.square(spectrum).sum(axis=0)) / len(values))
 
 
+def slow_spread(recorded: Float32Array, cutoff_hz: float) -> FloatArray:
+    """(k,) standard deviations of the slow part of a feature's recorded motion (T, k)."""
+
+    def compute() -> dict[str, FloatArray]:
+        motion = recorded.astype(np.float64)
+        return {"spread": filtered_spread(motion - np.median(motion, axis=0), cutoff_hz)}
+
+    def fits(kept: Mapping[str, NDArray[Any]]) -> bool:
+        width = (recorded.shape[1],)
+        return [(name, array.dtype.str, array.shape) for name, array in kept.items()] == [("spread", "<f8", width)]
+
+    return np.array(computed_once(CACHE_KIND, CACHE_VERSION, [recorded, str(cutoff_hz)], compute, fits)["spread"])
+
+
+def phrase_scales(style: Style, feature: str) -> tuple[FloatArray, FloatArray]:
+    """Factors (k, k) by which the slow part of expression, brows or cheeks changes between phrases, and limits (k,)."""
+    recorded, is_expression = style.motion[feature], feature == "expression"
+    targets = np.array(EXPRESSION_SPREADS if is_expression else [REGION_SPREAD_MM] * recorded.shape[1])
+    factors = np.diag(np.minimum(targets / np.maximum(slow_spread(recorded, PHRASE_HZ), 1e-9), MAX_SCALE))
+    if is_expression:
+        sad, happy = map(EXPRESSIONS.index, ("sad", "happy"))
+        factors[sad, happy], targets[happy] = -SMILE_SHARE * factors[sad, sad], SMILE_SHARE * targets[sad]
+    return factors, PHRASE_LIMIT * targets
+
+
 class Emphasis:
     """Emphasis of the expression of a mood: it grows with the loudness."""
 
@@ -175,19 +206,22 @@ class PhrasePresentation:
 
     Parameters
     ----------
-    feature
-        One of `PHRASE_FACTORS`.
     middle : (k,)
         Median of the recordings.
+    scales
+        Factors and limits of the slow part (`phrase_scales`).
     raising
         Movements of sentences and words, and the values (2, k) of a mm of the left and of the right brow; None: none.
     """
 
     def __init__(
-        self, feature: str, middle: Float32Array, raising: tuple[PhraseMotion, FloatArray] | None = None
+        self,
+        middle: Float32Array,
+        scales: tuple[FloatArray, FloatArray],
+        raising: tuple[PhraseMotion, FloatArray] | None = None,
     ) -> None:
-        self._factor, self._limit = PHRASE_FACTORS[feature], PHRASE_LIMITS[feature]
-        self._middle, self._raising = middle.astype(np.float64), raising
+        self._middle, self._scales = middle.astype(np.float64), scales
+        self._raising = raising
         self._slow = LowPass(PHRASE_HZ, np.zeros(len(middle)))
         self._follower = PhraseFollower(len(middle))
 
@@ -201,11 +235,12 @@ class PhrasePresentation:
     def apply(self, values: Float32Array, frames: FrameContext) -> Float32Array:
         """Values (n, k) with slow changes between phrases, and brows that follow sentences and words."""
         slow = self._slow.filter(values.astype(np.float64) - self._middle)
-        added = self._follower.follow(self._limit * np.tanh(self._factor * slow / self._limit), frames)
+        factors, limits = self._scales
+        added = self._follower.follow(limits * np.tanh(ordered_product(slow, factors) / limits), frames)
         if self._raising is not None:
             motion, lifts = self._raising
             motion.add(frames.plan, float(frames.times[0]))
-            added += motion.at(frames.times)[:, 3:] @ lifts
+            added += ordered_product(motion.at(frames.times)[:, 3:], lifts)
         return np.asarray(values + frames.is_presented[:, None] * added, np.float32)
 
 

@@ -36,6 +36,8 @@ PEAK_DB, PEAK_RANGE_DB = -8.0, 6.0
 MEAN_PROMINENCE, PROMINENCE_SPREAD = 0.5, 0.6  # of the vowels of a sentence
 MOST_PROMINENT = 1.6
 LEAST_PROMINENCE, LEAST_GAP_S = 0.15, 0.25  # of an accent, and between two
+# Sound whose pitch rises so far in its last instants, compared with that before them (seconds from its end), asks.
+RISE_SEMITONES, RISE_S = 3.5, ((0.2, 0.0), (0.7, 0.25))
 ASKED_S = 1.6  # at the end of a sentence, in which a question is shown at least
 LEAD_S = 0.25  # before its stressed word, from which on it is shown
 
@@ -342,7 +344,10 @@ def heard_sentences(sound: SoundFeatures) -> Iterator[SpokenSentence]:
     for whole in _runs(sound, SENTENCE_PAUSE_S):
         inside = tuple(phrase for phrase in phrases if whole.start <= phrase.start < whole.end)
         accents = tuple(peak for peak in peaks if whole.start <= peak.time < whole.end)
-        yield SpokenSentence(whole, inside or (whole,), accents)
+        last, before = (sound.highest(whole.end - late, whole.end - early)[1] for late, early in RISE_S)
+        rises = last - before > RISE_SEMITONES
+        question = Span(max(whole.start, whole.end - ASKED_S), whole.end) if rises else None
+        yield SpokenSentence(whole, inside or (whole,), accents, question, rises)
 
 
 def _runs(sound: SoundFeatures, pause_s: float) -> list[Span]:

@@ -28,12 +28,13 @@ from tts2face.gestures.gaze import GazeProcess, HeadFollower
 from tts2face.gestures.head_presentation import HeadPresentation, slow_scales
 from tts2face.gestures.phrase_motion import PhraseMotion
 from tts2face.gestures.presentation import (
-    PHRASE_FACTORS,
+    CHANGING,
     Emphasis,
     FrameContext,
     PhrasePresentation,
     Presentation,
     brow_lifts,
+    phrase_scales,
 )
 from tts2face.gestures.speech_features import FollowedSound, recorded_features
 from tts2face.gestures.speech_plan import NO_PLAN, SpeechPlan
@@ -113,7 +114,8 @@ class GestureFields:
     has_presentation: bool = True
     _made: dict[tuple[str, str, bool], Field] = field(default_factory=dict)
     _profiles: dict[str, tuple[NDArray[np.float64], ...]] = field(default_factory=dict)
-    _scales: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    _head_scales: dict[tuple[str, str], NDArray[np.float64]] = field(default_factory=dict)
+    _scales: dict[tuple[str, str], tuple[NDArray[np.float64], NDArray[np.float64]]] = field(default_factory=dict)
     _middles: dict[tuple[str, str], Float32Array] = field(default_factory=dict)
     _speech: dict[str, Float32Array] = field(default_factory=dict)
 
@@ -158,20 +160,23 @@ class GestureFields:
         """Presentation of a feature of a recorded style for one clip; None for features that are not changed."""
         if not self.has_presentation:
             return None
-        style, key = self.palette.styles[source], [seed, crc32(f"presented {feature}".encode())]
+        style = self.palette.styles[source]
         motion = PhraseMotion([seed, crc32(b"phrases")])
         if feature == "blink":
             if source not in self._profiles:
                 self._profiles[source] = blink_profiles(style)
-            return BlinkPresentation(self._profiles[source], key)
+            return BlinkPresentation(self._profiles[source], [seed, crc32(b"presented blink")])
+        if feature != "head" and feature not in CHANGING:
+            return None
+        key, middle = (source, feature), self.middle(source, feature)
         if feature == "head":
-            if source not in self._scales:
-                self._scales[source] = slow_scales(style)
-            return HeadPresentation(self.middle(source, feature), self._scales[source], motion)
-        if feature in PHRASE_FACTORS:
-            lifts = brow_lifts(self.palette.regions["brows"], self.palette.neutral) if feature == "brows" else None
-            return PhrasePresentation(feature, self.middle(source, feature), None if lifts is None else (motion, lifts))
-        return None
+            if key not in self._head_scales:
+                self._head_scales[key] = slow_scales(style)
+            return HeadPresentation(middle, self._head_scales[key], motion)
+        if key not in self._scales:
+            self._scales[key] = phrase_scales(style, feature)
+        lifts = brow_lifts(self.palette.regions["brows"], self.palette.neutral) if feature == "brows" else None
+        return PhrasePresentation(middle, self._scales[key], None if lifts is None else (motion, lifts))
 
     def gaze_process(self, feature: str, seed: int) -> GazeProcess | None:
         """Gaze of derived styles for one clip; None for other features, and for motion as published."""
