@@ -1,6 +1,6 @@
 """Measure the starter palette's measured style and its moods, and write the tables of gestures.md.
 
-Run: python docs/make_gestures.py [speech] [styles] [moods] [gaze]; the people looked at are those of
+Run: python docs/make_gestures.py [speech] [styles] [moods] [gaze]; the people are those of
 ../shared/recordings/gaze_dialogue.
 """
 
