@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.face.mesh_calibration import calibrate_on_mesh, strengths
+from tts2face.face.mouth_bag import close_mouth
 from tts2face.face.shape_transfer import eye_distance
 from tts2face.face.stand_in import VISEME_PREFIX
 from tts2face.interchange.characters.binding import KEY, CharacterBinding
@@ -229,7 +230,7 @@ def import_face(  # noqa: PLR0913 - one parameter an option
             face = calibrate_on_mesh(face)
         made_of = {KEY: _binding(path, chosen, head, face).as_metadata()}
     face = replace(face, metadata=_provenance(path, character) | made_of)
-    face = bake_occlusion(face, available_cores())
+    face = bake_occlusion(close_mouth(face), available_cores())
     step()
     positions = located.points.places(drawn.vertices) / provisional.scale + provisional.origin
     places = dict(zip(located.numbers.tolist(), positions @ head.turn, strict=True))

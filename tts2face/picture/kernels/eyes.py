@@ -80,7 +80,7 @@ class EyeGeometry:
             self.openings.found,
         )
         offset = (lids - centres[:, None, None]) * (RADIUS_MM / self.openings.radius)[:, None, None, None]
-        rows[:, UPPER:CATCHLIGHT] = np.nan_to_num(offset @ turned[:, :2]).reshape(len(rows), -1)
+        rows[:, UPPER:CATCHLIGHT] = np.nan_to_num(offset @ turned[:, :2]).reshape(len(rows), CATCHLIGHT - UPPER)
         rows[:, CATCHLIGHT:] = self.catchlights(seen, float(np.sign(lights[0][0])))
         return rows
 
