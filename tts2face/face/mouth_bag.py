@@ -34,8 +34,8 @@ def close_mouth(face: Face) -> Face:
     width = float(np.ptp(places[:, 0]))
     out = (places - middle) * (1.0, 1.0, 0.0)
     out /= np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-6)
-    added: list[FloatArray] = []
-    moved: list[FloatArray] = []
+    added: list[NDArray[np.floating]] = []
+    moved: list[NDArray[np.floating]] = []
     colours: list[NDArray[np.uint8]] = []
     triangles: list[NDArray[np.int64]] = []
     before = rows
@@ -74,13 +74,14 @@ def _lip_edges(face: Face) -> NDArray[np.int64]:
     lips = [known[number] for number in LIPS]
     ring: FloatArray = np.einsum("lc,lcx->lx", face.landmark_weights[lips], face.vertices[face.landmark_vertices[lips]])
     same = np.unique(face.vertices.round(DECIMALS), axis=0, return_inverse=True)[1].ravel()
-    edges = np.concatenate([face.triangles[:, [k, (k + 1) % 3]] for k in range(3)]).astype(np.int64)
+    edges: NDArray[np.int64] = np.concatenate([face.triangles[:, [k, (k + 1) % 3]] for k in range(3)]).astype(np.int64)
     ends = np.sort(same[edges], axis=1)
     _, which, counts = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
     open_edges = (counts[which.ravel()] == 1) & (ends[:, 0] != ends[:, 1])
     edges, ends = edges[open_edges], ends[open_edges]
+    none: NDArray[np.int64] = np.zeros((0, 2), np.int64)
     if not len(edges):
-        return edges
+        return none
     piece_of = connected_pieces(np.column_stack([ends, ends[:, 1]]), int(same.max()) + 1)[ends[:, 0]]
     width = float(np.ptp(ring[:, 0]))
     off = np.linalg.norm(face.vertices[edges[:, 0]][:, None] - ring[None], axis=2)
@@ -88,5 +89,6 @@ def _lip_edges(face: Face) -> NDArray[np.int64]:
         own = off[piece_of == piece]
         # the edge runs along all landmarks, and has no other part
         if max(np.median(own.min(axis=0)), np.median(own.min(axis=1))) < NEAR_SHARE * width:
-            return edges[piece_of == piece]
-    return edges[:0]
+            found: NDArray[np.int64] = edges[piece_of == piece]
+            return found
+    return none
