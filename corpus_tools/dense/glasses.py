@@ -25,6 +25,7 @@ N_RIM = 64
 # Mean logarithm by which a bridge is darker, and its fifth faintest column; fourth part of a rim. Without glasses .056,
 # .025 and any; thin wire .078, .035 and .021; others from .13, .07 and .09.
 BRIDGE, FAINT_BRIDGE, FAINT_RIM = 0.06, 0.03, 0.018
+LEAST_RADIUS = 15.2  # mm, mean of a rim: what lies closer is the rim of the lids
 FAINT_COLUMN, FAINT_SHARE = 0.2, 0.25
 COVER_MM, TEMPLE_COVER_MM, TEMPLE_MM = 4.5, 4.0, 74.0  # of the skin about rims and temples, which is painted anew
 HALF_MM = ((19.0, 30.0), (14.0, 27.0))  # least and most half width and height of a rim
@@ -71,7 +72,7 @@ def find_glasses(places: FloatArray, colours: FloatArray, marks: FloatArray) -> 
         y = middle[1] + FLATTENED * radii[..., None] * np.sin(LOWER) - LEFT_LOW[1]
         inner, here, outer = map_coordinates(light, [y, x], order=1, mode="nearest")
         course, depth = _course(np.abs((inner + outer) / 2 - here), RIM_STEP, 2)
-        if np.quantile(depth, FAINT_SHARE) < FAINT_RIM:
+        if np.quantile(depth, FAINT_SHARE) < FAINT_RIM or RADII[course].mean() < LEAST_RADIUS:
             return None
         rims.append(_outline(middle, RADII[course]))
         way = np.column_stack([np.cos(LOWER), FLATTENED * np.sin(LOWER)])

@@ -51,6 +51,7 @@ SHINE = 0.5  # logarithm by which hair in a picture is lighter than its strands 
 # Casts of cameras and walls lead off it; what is further off than these is dyed or red.
 HAIR_LINE, NATURAL = np.array([1.0, -0.9]), (0.4, 0.7)
 GREY = 0.35  # log R/G below which hair is rather grey in yellowish light than blond
+BLACK_SHINE, DARK_GREY = 1.0, (0.9, 1.6)  # logarithms: of shine on black hair, which is so much darker than skin
 CHILD_BROWN = 0.5  # least log R/G of a child's hair
 # Heights of eyes above chin and base of the nose, of the distance of the outer eye corners, summed: a child of
 # nine 1.67, adults 1.75 (a broad smile, no teeth) to 1.99.
@@ -179,7 +180,8 @@ class LookSampler:
             seen, most = hair.colour, 0.0
             if length == "cropped":
                 seen, most = seen + SEEN_SKIN * (seen - eyes.skin), eyes.skin[0] + CROPPED_LIGHT
-            colour = hair_colour(neutral(seen, cast), most, CHILD_BROWN if is_child(self.fit.marks) else 0.0)
+            seen = without_gloss_of_dark(neutral(seen, cast), eyes.skin)
+            colour = hair_colour(seen, most, CHILD_BROWN if is_child(self.fit.marks) else 0.0)
             code = "#{:02x}{:02x}{:02x}".format(*srgb_colour(colour).tolist())
         notes = [] if length else ["top of the head not seen"]
         length = length or UNSEEN
@@ -215,6 +217,13 @@ def is_child(marks: FloatArray) -> bool:
     outer = marks[[EYE_OUTER_RIGHT, EYE_OUTER_LEFT]]
     heights = outer[:, 1].mean() - marks[[CHIN, NOSE_BASE], 1]
     return bool(heights.sum() < CHILD * np.linalg.norm(outer[0] - outer[1]))
+
+
+def without_gloss_of_dark(hair: FloatArray, skin: FloatArray) -> FloatArray:
+    """Colour (3,), `log_colour`, of hair beside skin: grey that is much darker than skin is black hair that shines."""
+    is_grey = hair[1:] @ HAIR_LINE / (HAIR_LINE @ HAIR_LINE) < GREY
+    shine = BLACK_SHINE * is_grey * smoothstep(skin[0] - hair[0], *DARK_GREY)
+    return np.array([hair[0] - shine, *hair[1:]])
 
 
 def hair_colour(seen: FloatArray, most: float = 0.0, least_brown: float = 0.0) -> FloatArray:
