@@ -28,6 +28,7 @@ DARKER, OTHER_HUE, IS_HAIR = 0.45, 0.28, 0.9
 CHROMA_SCALE, WEAK_LIGHT = 0.3, 0.01  # of distances between colours, beside luminance; dark ones have no hue
 N_NEAREST, MIN_SEEDS = 8, 60
 SMALL, MOST_APART = 0.05, 2.5  # added to distances before logarithms, and most of their difference
+COLLAR_APART = 0.4  # distance of clothes before the neck from hair
 SMOOTH_CELLS = 1.0  # Gaussian
 BROW_MM, NECK_MM = 4.0, 12.0  # above the brows nothing inside the face is sure; below the chin clothes may be like hair
 THROAT_HALF_MM, CLOTHES_APART, FALL_CELLS = 30.0, 0.35, 2  # hair falls: it lies below hair, at most so far beside it
@@ -113,7 +114,8 @@ def find_hair(portrait: Portrait, skin: FloatArray) -> SeenHair:
     apart = np.clip(np.log(_distance(space, is_skin) + SMALL) - np.log(to_hair + SMALL), -MOST_APART, MOST_APART)
     hair = person & (gaussian_filter(apart, SMOOTH_CELLS) > 0) & ~((oval > 0) & (up < brow + BROW_MM))
     clothes = person & (up < chin - CLOTHES_MM) & ((np.abs(across) > SHOULDER_MM) | (up < chin - CHEST_MM))
-    clothes |= person & (up < chin - COLLAR_MM) & (np.abs(across) < COLLAR_HALF_MM) & (unlike > IS_HAIR)
+    collar = person & (up < chin - COLLAR_MM) & (np.abs(across) < COLLAR_HALF_MM) & (unlike > IS_HAIR)
+    clothes |= collar & (to_hair > COLLAR_APART)  # the shaded neck may be as dark as hair
     low = up < chin - NECK_MM
     if clothes.sum() > MIN_SEEDS:
         from_clothes = np.log(_distance(space, clothes) + SMALL) - np.log(to_hair + SMALL)

@@ -29,8 +29,9 @@ HAIRCUTS: Mapping[str, str] = {
 UNSEEN = "flat"  # where the top of the head is outside of the picture
 TEMPLE_MM, MIN_LOCK_MM = 36.0, 9.0  # hair beside the face, from the middle of it; thinner locks do not count
 # Lowest hair beside the face above the chin, mean of both sides: haircuts with free ears 94 and higher, bobs 3 to 49,
-# long hair below -25. A side that shows none beside the temple does not count.
-BOB_MM, LONG_MM, TEMPLE_HAIR_MM = 75.0, -12.0, 10.0
+# long hair below -8. A side that shows none beside the temple does not count.
+BOB_MM, LONG_MM, TEMPLE_HAIR_MM = 75.0, -6.0, 10.0
+CURLY_BOB_MM = 45.0  # short curls stand off the neck
 FLAT_MM = (62.0, 78.0)  # hair above `FOREHEAD`, and its half width: less of both lies on the skull
 # Flat hair is cropped where the skin shows through, up to this difference from it, or where the temples show so little.
 SEE_THROUGH, CROPPED_MM = 2.0, 6.0
@@ -121,9 +122,10 @@ def name_hair(portrait: Portrait, hair: SeenHair, skin: FloatArray) -> str:
     seen = measure_hair(portrait, hair.region)
     if seen.end < LONG_MM:
         return _long_name(seen)
-    if seen.end < BOB_MM:
+    is_curly = _strands(seen) < CURLY_WIDE
+    if seen.end < (CURLY_BOB_MM if is_curly else BOB_MM):
         plain = "bob with a fringe" if seen.fringe > FRINGE else "bob"
-        return "wavy bob" if _strands(seen) < CURLY_WIDE else plain
+        return "wavy bob" if is_curly else plain
     return _short_name(seen, float(difference_from_skin(hair.colour - skin, DARKER)))
 
 
