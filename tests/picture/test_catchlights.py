@@ -1,10 +1,13 @@
 """Catchlights: where they lie in an iris, and that pictures of faces have them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.picture.film.lit_face import lit_tiny_face
 from tests.picture.posed_eyes import FACES, gazing, irises
+from tests.picture.tiny_face import tiny_face
 from tts2face.face.deformation import REST_HEAD
 from tts2face.models.face_loading import load_face
 from tts2face.picture.catchlights import PLACE_RIGHT, PLACE_UP, SCALE, STRENGTH, catchlight_sizes, place_catchlight
@@ -99,3 +102,15 @@ def test_a_picture_without_lamps_keeps_the_light_that_it_has() -> None:
     renderer = mesh_renderer(face, Picture(size="128x128"))
     picture = renderer.draw(np.zeros(len(face.shape_names), np.float32))
     assert picture.max() < 230
+
+
+def test_faces_without_eyes_or_landmarks_of_lids_are_drawn() -> None:
+    for face in (tiny_face(), replace(tiny_face(), eyes=())):
+        picture = mesh_renderer(face, Picture(size="64x64", quality="draft")).draw(np.zeros(len(face.shape_names)))
+        assert picture.std() > 5
+    lit = lit_tiny_face()
+    lamp = np.zeros((1, 17), np.float32)
+    lamp[0, 2], lamp[0, 14:] = 500, 5
+    for eyes in (lit.eyes, ()):
+        shown = replace(lit, eyes=eyes, light=lit.light.changed(lambda light: replace(light, lamps=lamp)))
+        assert mesh_renderer(shown, Picture(size="64x64")).draw(np.zeros(len(lit.shape_names))).std() > 5

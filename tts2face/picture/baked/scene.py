@@ -292,7 +292,7 @@ class LitScene:
         pupil = min(painted * (1 + DILATION * _weight(self.face, weights, PUPIL_SHAPE)), 0.95 * iris)
         rows[:, PUPIL:KEY] = pupil, iris, painted / pupil, (iris - painted) / (iris - pupil)
         # a picture keeps the light that it has
-        if len(lamps := self.surface.light.lamps):
+        if len(lamps := self.surface.light.lamps) and len(rows):
             view = self.optics.view
             seen = self.surface.eyes.seen(pose, view)
             lamp = view[:, :3] @ lamps[0, :3] + view[:, 3] - seen[0].mean(axis=0)
