@@ -29,6 +29,7 @@ SKIN_LANDMARKS = (50, 280, 205, 425, 151, 9, 108, 337)  # cheeks and forehead
 IRISES = ((468, (469, 470, 471, 472)), (473, (474, 475, 476, 477)))  # centre and rim, as in LID_RINGS
 MIN_IRIS_PX = 3.5  # radius; below it iris, lashes and white are mixed
 IRIS_RING, IRIS_TOP = (0.4, 0.9), 0.35  # of the radius: between pupil and limbus, below the lashes' shadow
+MIN_BRIGHT = 0.6  # share of the ring
 PUPIL = 0.25  # of the light of the ring's brighter cells: less is a wide pupil, as drawn people have
 OFF_IRIS, OFF_LIDS = 1.35, 0.18  # of the radius: what is white of the eye, and how far lids reach into it
 IRIS_MIX_PX = 0.5  # over the radius: share of the surroundings' light; rendered eyes have .05 to .1 at 5 px
@@ -101,7 +102,8 @@ def _without_pupil(ring: FloatArray) -> FloatArray:
     if not len(ring):
         return ring
     bright: FloatArray = ring[ring[:, 0] > np.quantile(ring[:, 0], PLAIN_IRIS[1]) + np.log(PUPIL)]
-    return bright
+    # where few cells are so bright, they are reflections in a dark iris
+    return bright if len(bright) > MIN_BRIGHT * len(ring) else ring
 
 
 def _median_between(colours: FloatArray, quantiles: tuple[float, float]) -> FloatArray:
