@@ -105,6 +105,15 @@ def test_most_turns_begin_with_a_look_away_and_up_and_end_on_the_listener() -> N
     assert np.sum(up) / np.sum(away) == pytest.approx(0.6, abs=0.15)
 
 
+def test_no_look_away_begins_between_sentences() -> None:
+    for seed in range(20):
+        process = GazeProcess(HABITS, [seed])
+        for begin in np.arange(0.0, 30.0, 3.0).tolist():
+            made(process, 2.0, begin=begin)
+            silent = np.linalg.norm(made(process, 1.0, begin=begin + 2.0, decibels=-35.0), axis=1) >= FACE_DEG
+            assert not (~silent[1:-1] & silent[2:]).any()  # the first two frames may end a jump of before
+
+
 def test_frames_in_pieces_are_those_of_the_whole_and_a_copy_goes_on_alone() -> None:
     whole = made(GazeProcess(HABITS, [4]), 30)
     process = GazeProcess(HABITS, [4])

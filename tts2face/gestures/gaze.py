@@ -135,7 +135,9 @@ class GazeProcess:
         """Whether the look ends at a place in speech."""
         left = self._rest.look_s
         if place.left_s == math.inf or self._state == LISTENING:
-            return left <= 0.0
+            # between sentences and behind the last one, a speaker who looks at the partner goes on
+            is_kept = self._state == SPEAKING and self._quiet_s > 0.0 and self._fixations[-1].is_on_face
+            return left <= 0.0 and not is_kept
         if self._fixations[-1].is_on_face:
             return place.is_start and left <= EARLY_S and place.left_s > LAST_S and not place.is_addressed
         return (
