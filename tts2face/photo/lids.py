@@ -35,7 +35,8 @@ LINE_WIDTH, LINE_LEAST_PX = 0.010, 0.7  # of the shadow between shut lids
 LINE_TAPER = 0.12  # of the width of the eye, over which it begins and ends
 LINE_DARKNESS = (0.2, 0.8)  # limits of its share of the light
 DARK_LASHES = 25  # per cent of what lies at the upper margin are darker than its lashes
-CHANGED = (0.3, 1.0)  # of the height of the lashes, over which the crease above them goes
+CHANGED = (0.3, 0.7)  # of the height of the lashes, over which what is above them becomes the lid
+LASHES_TAPER = 0.1  # of the width of the eye, over which they begin and end
 GRAIN_FROM, GRAIN_BLUR, MOST_GRAIN = 0.30, 0.012, 2.5  # below the eye, where the grain of skin is taken; its blur; sd
 LID_MEETING = 0.05  # of the opening of an eye from its lower lid, where the lids meet
 FORWARD_MM, EYE_FORWARD_MM = 8.0, 10.0  # way of a sheet in a whole blink, over skin and over the eye
@@ -134,12 +135,13 @@ class LidFrame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShutEye:
-    """Picture of an eye that is shut, and the change (R, 25, 3) of the colours of its lashes when they have come there.
+    """Pictures of an eye that is shut and of its lashes, and the change (R, 25, 3) of their colours on their way there.
 
     Rows of lashes are those of `BAND_ROWS` from above, and the margin.
     """
 
     picture: LidPicture
+    lashes: LidPicture
     change: FloatArray
 
 
@@ -148,13 +150,10 @@ def shut_eye(pixels: Pixels, frame: LidFrame) -> ShutEye:
     view = _View(pixels, frame)
     skin = view.skin()
     picture = view.over(skin * view.line_between()[..., None], view.share_of_lid())
-    heights = np.array([*BAND_ROWS[::-1], 0.0])
-    places = frame.upper + (heights[:, None] * frame.lashes)[..., None] * frame.up
-    blur = COLOUR_BLUR * frame.scale
+    lashes = view.over(skin, view.share_above_lashes())
+    places = frame.upper + (np.array([*BAND_ROWS[::-1], 0.0])[:, None] * frame.lashes)[..., None] * frame.up
     here, there = (colours_at(skin, places + way - view.corner) for way in (0.0, frame.meeting - frame.upper))
-    share = smoothstep(heights, *CHANGED)[:, None, None]
-    own = share * _blurred_at(pixels, places, blur) + (1 - share) * here
-    return ShutEye(LidPicture(picture, view.corner), there - own)
+    return ShutEye(LidPicture(picture, view.corner), LidPicture(lashes, view.corner), there - here)
 
 
 class _View:
@@ -204,6 +203,13 @@ class _View:
         outer, inner = (way * frame.scale for way in BESIDE)
         beside = np.maximum(-self._at / outer, (self._at - self._wide) / inner)
         found: FloatArray = np.minimum(*ends) * (1 - smoothstep(beside, 0.2, 1.0))
+        return found
+
+    def share_above_lashes(self) -> FloatArray:
+        """(h, w) 1 above the lashes of the upper lid and at their ends, falling to 0 among them."""
+        share = self._at / self._wide
+        ends = 1 - smoothstep(np.minimum(share, 1 - share) / LASHES_TAPER)
+        found: FloatArray = np.maximum(smoothstep(self.above / self.along(self._frame.lashes), *CHANGED), ends)
         return found
 
     def line_between(self) -> FloatArray:

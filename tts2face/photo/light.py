@@ -222,7 +222,7 @@ def picture_light(
         camera_yaws_deg=np.zeros(0, np.float32),
         camera_modes=np.zeros((0, 3, LEAST_SIDE**2), np.int8),
         camera_sizes=np.zeros(0, np.float32),
-        page_of={SKIN: 0, LASHES: 0, LIDS: 1, LID_OVER_EYE: 1, EYES: 1, PICTURED: 1},
+        page_of={SKIN: 0, LASHES: 1, LIDS: 1, LID_OVER_EYE: 1, EYES: 1, PICTURED: 1},
         rows=rows.astype(np.int32),
         responses=answers,
         response_sizes=sizes,

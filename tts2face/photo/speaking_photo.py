@@ -230,7 +230,8 @@ def _picture_eyes_and_teeth(face: Skinned, teeth: OwnTeeth | None) -> Pictured:
         teeth = teeth.in_light_of(cheek_light(pixels, face.landmarks))
     frames = [LidFrame.of(face.landmarks, face.lids, eye, person.scale) for eye in (0, 1)]
     shut = [shut_eye(pixels, frame) for frame in frames]
-    pictures: list[EyePatch | LidPicture | OwnTeeth] = [*(eye.picture for eye in shut), *patches[0], *patches[1]]
+    of_lids = [picture for eye in shut for picture in (eye.picture, eye.lashes)]
+    pictures: list[EyePatch | LidPicture | OwnTeeth] = [*of_lids, *patches[0], *patches[1]]
     if teeth is not None:
         pictures.append(teeth)
     darkened = darken_lip_edges(pixels, person.lips, person.scale)
@@ -244,7 +245,7 @@ def _lay_surface(face: Pictured) -> Laid:
     surface.add(face.skin, uv=pages.uv(_shown_places(mesh, face.person)))
     surface.parts.append((SKIN, mesh.triangles))
     lashes = [_add_lids(face, surface, eye) for eye in (0, 1)]
-    eyes, corners_of = [], iter(pages.patch_corners[len(lashes) :])
+    eyes, corners_of = [], iter(pages.patch_corners[2 * len(lashes) :])
     for eye, parts in enumerate(face.patches):
         for patch in parts:
             vertices = _eye_vertices(face, patch.places, patch.ahead_mm)
@@ -263,7 +264,7 @@ def _lay_surface(face: Pictured) -> Laid:
 def _add_lids(face: Pictured, surface: PhotoSurface, eye: int) -> Changing:
     """Add what comes over an eye that shuts; returns the vertices of its lashes."""
     mesh, frame = face.mesh, face.frames[eye]
-    own = face.pages.patch_corners[eye]
+    own, of_lashes = face.pages.patch_corners[2 * eye : 2 * eye + 2]
 
     def add(part: str, sheet: LidSheet, vertices: Vertices, way: FloatArray, uv: FloatArray) -> IntArray:
         _blink(face, vertices, eye, way)
@@ -291,7 +292,7 @@ def _add_lids(face: Pictured, surface: PhotoSurface, eye: int) -> Changing:
     placed = replace(skin, places=skin.places - forward(sheet.places, LASHES_MM))
     way = np.tile(face.camera.ways_to_head(lid_ways(mesh, eye)[0]), (len(rows), 1)) + forward(sheet.places, FORWARD_MM)
     shown = sheet.places + LASHES_INTO * frame.scale * frame.up
-    numbers = add(LASHES, sheet, placed, way, face.pages.uv(shown))
+    numbers = add(LASHES, sheet, placed, way, face.pages.uv(shown, of_lashes))
     return Changing(numbers, way, face.shut[eye].change.reshape(-1, 3))
 
 
