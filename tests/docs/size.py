@@ -21,9 +21,10 @@ TOLERANCES = (0, 500, 500)  # by which they may differ, so that few commits have
 # of subtitles, transcripts, captures and films of other programs, and what says how they were read (4,400), names of
 # characters' shapes, their calibration, VRM Animation and materials of scenes (900), heads without shapes (1,000),
 # repairs of their scans (250), and voices: their rate, pitch, questions and pauses (800), those of faces, of servers
-# and that are added (800), words in no dictionary and of other languages (600), SSML of other services, emphasis (400), and
-# what makes a face alive: motion by sentence and its statistics (750), moods against rest and consent (350), mouths, eyes
-# and hair as drawn (450), lids and mouths of photographs (250), hair, glasses and children of avatars (500).
+# and that are added (800), words in no dictionary and of other languages (600), SSML of other services, emphasis
+# (400), and what makes a face alive: motion by sentence and its statistics (750), moods against rest and consent (350),
+# mouths, eyes and hair as drawn (450), lids and mouths of photographs (250), hair, glasses and children of avatars
+# (500).
 MOST_STATEMENTS = 68_900
 
 
