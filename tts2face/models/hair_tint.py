@@ -97,9 +97,9 @@ def _tinted(light: BakedLight, tint: HairTint, srgb: NDArray[np.float64], seen: 
         above = int(np.clip(np.searchsorted(middles[order], wanted), 1, len(order) - 1))
         low, high = order[above - 1], order[above]
         inside = float(np.clip(wanted, middles[low], middles[high]))
-        mixed = pages_light[low] + np.float32((inside - middles[low]) / (middles[high] - middles[low])) * (
-            pages_light[high] - pages_light[low]
-        )
+        apart = float(middles[high] - middles[low])
+        share = np.float32((inside - middles[low]) / apart if apart else 0.0)  # two dark colours may share a channel
+        mixed = pages_light[low] + share * (pages_light[high] - pages_light[low])
         own[..., channel] = np.searchsorted(bounds, np.float32(wanted / max(inside, 1e-6)) * mixed)
     grey = curves[1][0]
     # black hair has next to no light to compare with

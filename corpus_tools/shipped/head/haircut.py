@@ -45,22 +45,58 @@ Finish = Callable[
 AXIS_Z, FRONT_DEG = -60.0, (36.0, 60.0)  # the vertical axis of the head; a fringe lies in front of these angles
 FRINGE_TOP, BROW_Y = 62.0, 25.0  # heights between which a fringe ends up
 BUST_Y, SUNK_MM = -335.0, 3.0
-LOCK_DEG, LOCK_Y, LOCK_SHARE = (36.0, 53.0), (36.0, 46.0), 0.1  # the lock ahead of the temple, below these heights
+# the lock ahead of the temple, below these heights
+LOCK_DEG = (36.0, 53.0)
+LOCK_Y = (36.0, 46.0)
+LOCK_SHARE = 0.1
 ROOTS_Y, ROOTS_Z = 46.0, -40.0  # above the forehead
 ROOT_MM, ROOT_SPREAD_MM = 7.0, 2.2  # width of a hairline, and that of its raggedness
 # Half width of a parting in the middle, heights between which it begins, and share of the direction of its roots.
-PARTING_MM, PARTING_Y, ROOT_TURN = 9.0, (50.0, 75.0), 1.0
-CURL_TOP, CURL_ROOT, CURL_SIDE, CURL_SPREAD = 0.68, (0.86, 0.98), 0.08, 0.03  # shares of the texture
-CURL_HAZE, CURL_SOLID, CURL_TURN = 70.0, 190.0, 0.42  # coverage of haze and of curls, of 255; spread of directions
+PARTING_MM = 9.0
+PARTING_Y = (50.0, 75.0)
+ROOT_TURN = 1.0
+# shares of the texture
+CURL_TOP = 0.68
+CURL_ROOT = (0.86, 0.98)
+CURL_SIDE = 0.08
+CURL_SPREAD = 0.03
+# coverage of haze and of curls, of 255; spread of directions
+CURL_HAZE = 70.0
+CURL_SOLID = 190.0
+CURL_TURN = 0.42
 CROWN_Y, N_CROWN_MEANS = (40.0, 80.0), 12  # heights between which the crown begins
-CROPPED, STUBBLE, STUBBLE_COVER = "cropped", "stubble", 0.5  # share of the coverage of cropped hair
+# share of the coverage of cropped hair
+CROPPED = "cropped"
+STUBBLE = "stubble"
+STUBBLE_COVER = 0.5
 PACKAGED = {"data": ASSETS_PACKAGE}
 N_ANCHORS = 180
 N_SAMPLES = 60_000  # points on the cards
 SOLID = 0.4  # coverage of a card from which it hides the scalp
 SCALP_SIDE, STUBBLE_SIDE = 1024, 1024
-FUZZ_MM, FUZZ, FUZZ_SIDE = 1.6, 0.42, 512  # height of the layer above a cropped scalp, coverage, pixels
+# height of the layer above a cropped scalp, coverage, pixels
+FUZZ_MM = 1.6
+FUZZ = 0.42
+FUZZ_SIDE = 512
 SEED = 11
+GROWN: Mapping[str, tuple[str, LockStyle]] = {
+    "curly01": ("short curls", LockStyle(560, 48.0, 13.0, 14, lift=0.7, weight=0.1, curl=(5.0, 25.0), above=3.0)),
+    "curly02": (
+        "curls to the shoulders",
+        LockStyle(420, 0.0, 15.0, 30, -140.0, 0.35, 0.2, 4.0, (7.0, 34.0), order=0.15, above=8.0, cling=0.1),
+    ),
+    "wavy01": (
+        "long and wavy, parted",
+        LockStyle(380, 0.0, 25.0, 26, -205.0, 0.2, 0.25, 10.0, (5.0, 62.0), order=0.75, above=10.0, cling=0.2),
+    ),
+    "wavy02": (
+        "chin-length waves, parted at the side",
+        LockStyle(330, 0.0, 21.0, 18, -85.0, 0.25, 0.26, 22.0, (5.0, 50.0), order=0.6, above=9.0, cling=0.2),
+    ),
+}
+FRINGE = LockStyle(80, 0.0, 18.0, 14, lift=0.2, weight=0.2, above=7.0, fringe_y=24.0, cling=0.25)
+FRINGED = "long01"  # the haircut that `fringe01` is with a fringe; beside this share its picture has room
+FREE_SHARE = 0.64
 
 
 def trim_fringe(cards: Cards) -> Cards:
@@ -214,26 +250,6 @@ HAIRCUTS: Mapping[str, Haircut] = {
     "short03": Haircut("short bob with a side fringe", edits=(trim_fringe,)),
     "short04": Haircut("short, combed back", 768, edits=(sink_strands,)),
 }
-
-
-GROWN: Mapping[str, tuple[str, LockStyle]] = {
-    "curly01": ("short curls", LockStyle(560, 48.0, 13.0, 14, lift=0.7, weight=0.1, curl=(5.0, 25.0), above=3.0)),
-    "curly02": (
-        "curls to the shoulders",
-        LockStyle(420, 0.0, 15.0, 30, -140.0, 0.35, 0.2, 4.0, (7.0, 34.0), order=0.15, above=8.0, cling=0.1),
-    ),
-    "wavy01": (
-        "long and wavy, parted",
-        LockStyle(380, 0.0, 25.0, 26, -205.0, 0.2, 0.25, 10.0, (5.0, 62.0), order=0.75, above=10.0, cling=0.2),
-    ),
-    "wavy02": (
-        "chin-length waves, parted at the side",
-        LockStyle(330, 0.0, 21.0, 18, -85.0, 0.25, 0.26, 22.0, (5.0, 50.0), order=0.6, above=9.0, cling=0.2),
-    ),
-}
-FRINGE = LockStyle(80, 0.0, 18.0, 14, lift=0.2, weight=0.2, above=7.0, fringe_y=24.0, cling=0.25)
-FRINGED = "long01"  # the haircut that `fringe01` is with a fringe; beside this share its picture has room
-FREE_SHARE = 0.64
 
 
 def build_haircuts(folder: Path, cage: Cage, skin: HeadSkin, head: FloatArray) -> Iterator[tuple[str, Hair]]:

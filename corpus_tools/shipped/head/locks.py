@@ -20,7 +20,10 @@ TORSO = np.array(
 )  # a point of the axis between the shoulders, from which the shirt's surface faces
 FRINGE_WAY = np.array([0.1, -0.4, 1.0])  # of the roots above the forehead
 NECK_Y = -115.0  # below it the shirt keeps hair out
-FACE_Y, FACE_Z, FACE_HALF = (-112.0, 48.0), (-40.0, -12.0), 70.0  # heights, depths and half width that stay free
+# heights, depths and half width that stay free
+FACE_Y = (-112.0, 48.0)
+FACE_Z = (-40.0, -12.0)
+FACE_HALF = 70.0
 FACE_MM = 26.0  # over which hair is led beside the face
 EAR_REACH, OVER_EAR = 1.3, (1.0, 0.0, 0.001)  # of its ellipsoid: there hair is kept off to the side
 PART_MM = 9.0  # by which locks begin beyond a parting
@@ -31,8 +34,14 @@ UNEVEN = 0.14  # share by which locks are shorter and longer
 SPREAD_TRIES = 6  # candidates for each root, of which the one farthest from the others is taken
 LOOSE_MM, CURL_ROOT_MM = 14.0, 22.0  # of a lock, over which it leaves the skull, and over which its curl grows
 # The picture of strands: ribbons side by side, and strands in each.
-N_RIBBONS, RIBBON_PX, PICTURE_PX, N_STRANDS = 5, 104, 520, 44
-STRAND_PX, SWAY_PX, ROOT_SHARE, LIGHTNESS = 1.15, 3.0, 0.04, 0.24
+N_RIBBONS = 5
+RIBBON_PX = 104
+PICTURE_PX = 520
+N_STRANDS = 44
+STRAND_PX = 1.15
+SWAY_PX = 3.0
+ROOT_SHARE = 0.04
+LIGHTNESS = 0.24
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,8 +202,8 @@ def _ribbons(path: FloatArray, style: LockStyle, generator: np.random.Generator)
     number = np.asarray(generator.integers(N_RIBBONS, size=n), np.float64)
     left = (number[:, None] + np.array([0.04, 0.96])) / N_RIBBONS
     uv = np.stack(np.broadcast_arrays(left[:, None, :], share[None, :, None]), axis=-1)
-    one = grid_triangles(steps, 2)
-    triangles = one[None] + (2 * steps * np.arange(n))[:, None, None]
+    ribbon = grid_triangles(steps, 2)
+    triangles = ribbon[None] + (2 * steps * np.arange(n))[:, None, None]
     count = 2 * n * steps
     return Cards(corners.reshape(-1, 3), triangles.reshape(-1, 3), uv.reshape(-1, 2), np.arange(count))
 

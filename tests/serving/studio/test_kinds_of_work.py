@@ -219,7 +219,7 @@ def test_a_talker_and_its_first_sentence_go_on(tmp_path, monkeypatch, task):
         take = store.add_take(number, 0, make_take(tmp_path), "video/webm")
         store.judge(number, 0, replace(take, state=GOOD))
         if task == "build":
-            recordings.build(number, "I agree.")
+            recordings.build(number, "me")
         else:
             (folder / "talker.talker").touch()
             recordings.speak(number, "Hello.")
@@ -241,7 +241,7 @@ def test_cancelled_work_on_a_recording_says_so(tmp_path, monkeypatch):
         recordings = Recordings(tmp_path, host.work)
         take = store.add_take(number, 0, make_take(tmp_path), "video/webm")
         store.judge(number, 0, replace(take, state=GOOD))
-        recordings.build(number, "I agree.")
+        recordings.build(number, "me")
         await until(lambda: recordings.work_on(number).state == RUNNING)
         recordings.cancel(number)
         assert (recordings.work_on(number).state, recordings.work_on(number).message) == (CANCELLED, "")

@@ -20,12 +20,7 @@ from tts2face.interchange.characters.character import Character
 from tts2face.interchange.characters.eyeballs import mark_eyeballs
 from tts2face.interchange.characters.fitting import drop_unsuited_shapes, missing_shapes, place_face
 from tts2face.interchange.characters.gltf_reader import read_gltf_character
-from tts2face.interchange.characters.head_mesh import (
-    HeadMesh,
-    build_head_mesh,
-    moved_box,
-    source_weights,
-)
+from tts2face.interchange.characters.head_mesh import HeadMesh, build_head_mesh, moved_box, source_weights
 from tts2face.interchange.characters.import_notes import colour_notes, name_notes, place_notes, pose_notes, some_of
 from tts2face.interchange.characters.landmark_table import read_landmark_table
 from tts2face.interchange.characters.landmarks import (

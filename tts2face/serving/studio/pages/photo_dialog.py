@@ -161,7 +161,8 @@ class PhotoDialog:
         self._name.value = self._status.text = ""
         self._consent.clear()
         self._makes.value = SPEAKING_PICTURE
-        self._eyes.value, self._age_keep.value, self._no_glasses.value = "", False, False
+        self._eyes.value = ""
+        self._age_keep.value = self._no_glasses.value = False
         self._show_choice()
 
     def _delete_picture(self) -> None:
