@@ -12,8 +12,8 @@ from tests.world import World
 from tts2face.gestures.elements import ChannelEdit
 from tts2face.gestures.timeline import Timeline
 from tts2face.lips.options import ExcludedToken
-from tts2face.request import Request
 from tts2face.models.palette import FEATURES
+from tts2face.request import Request
 from tts2face.session.corrections import SentenceEdges
 from tts2face.session.named_models import Models
 from tts2face.session.project import Project
