@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from corpus_tools.dense.hair_region import (
     ACROSS_MM,
@@ -29,19 +30,27 @@ HAIRCUTS: Mapping[str, str] = {
 UNSEEN = "flat"  # where the top of the head is outside of the picture
 TEMPLE_MM, MIN_LOCK_MM = 36.0, 9.0  # hair beside the face, from the middle of it; thinner locks do not count
 # Lowest hair beside the face above the chin, mean of both sides: haircuts with free ears 94 and higher, bobs 3 to 49,
-# long hair below -8. A side that shows none beside the temple does not count.
-BOB_MM, LONG_MM, TEMPLE_HAIR_MM = 75.0, -6.0, 10.0
+# long hair below -10. A side that shows none beside the temple does not count.
+# Hair that falls so low on one side lies in shadow or behind the shoulder on the other.
+BOB_MM, LONG_MM, TEMPLE_HAIR_MM, ONE_SIDE_MM = 75.0, (-6.0, 9.0), 10.0, -30.0
+LONG_WIDE_MM = 114.0  # half width from which hair that ends about the chin lies on shoulders
 CURLY_BOB_MM = 45.0  # short curls stand off the neck
-FLAT_MM = (62.0, 78.0)  # hair above `FOREHEAD`, and its half width: less of both lies on the skull
-# Flat hair is cropped where the skin shows through, up to this difference from it, or where the temples show so little.
-SEE_THROUGH, CROPPED_MM = 2.0, 6.0
+FLAT_MM = (62.0, 80.0)  # hair above `FOREHEAD`, and its half width: less of both lies on the skull
+# Flat hair is cropped where the temples show so little of it (0 to 12; others from 14), and less or skin through it, up
+# to this difference from skin.
+SEE_THROUGH, CROPPED_MM = 4.5, (7.5, 13.5)
 SHADED_CROWN = 0.24  # share of a bald crown that is unlike skin: shaved hair; bald people have less
 # Median coherence of the directions of strands (Bigun and Granlund 1987) over 4.5 and 9 mm: afros and short curls .36
 # to .46 and .32 to .37, long curls .52 and .43, straight hair from .55 and .46, long and straight from .7 and .65.
-CURLY, CURLY_WIDE, WAVY_WIDE = 0.48, 0.47, 0.55
-NEAR_MM, WIDE_MM, FINE_MM, SHADE_MM = 4.5, 9.0, 1.5, 6.0
+CURLY, CURLY_BELOW, CURLY_WIDE, WAVY_WIDE = 0.48, 0.42, 0.47, 0.55  # above the brows, below them; of hair that falls
+# Mean resultant of these directions over 20 mm, of long hair below the brows, is .94 to .97 of straight hair, .90 to
+# .93 of waves, whose coherence is .58 to .68; less of straight locks side by side, whose coherence is more.
+WAVY_COURSE, WAVY_COHERENT = (0.85, 0.934), 0.69
+NEAR_MM, WIDE_MM, COURSE_MM, FINE_MM, SHADE_MM = 4.5, 9.0, 20.0, 1.5, 6.0
 FINEST, INSIDE_CELLS = 100, 3  # cells that tell a texture, and their distance from the outline in fine cells
-AFRO_MM = (72.0, 97.0)  # above `FOREHEAD`, and from the middle of the face: curls beyond either are an afro
+# Curls are an afro where they end higher above the chin (from 106 mm; curls that fall 61 to 104) and are wider, from
+# the middle of the face (from 87; short curls 78 to 81), or very wide. With less at the temples hair is combed back.
+AFRO_MM, SLEEK_MM = (105.0, 84.0, 120.0), 28.0
 TIED_MM = 105.0  # above `FOREHEAD`: what stands so high is tied
 FRINGED_MM = 88.0  # half width of short hair with a fringe that falls
 FRINGE, FRINGE_HALF_MM, FRINGE_FROM_MM, FRINGE_TO = 0.42, 48.0, 6.0, 0.55  # share of the lower forehead under hair
@@ -53,7 +62,8 @@ class HairMeasures:
 
     ``temples`` is its width on both sides beside the brows, ``half_width`` that from the middle of the face above the
     chin. ``fringe`` is the share of the lower forehead under it, and ``coherence`` that of the directions of its
-    strands over 4 and 9 mm above the brows, then below; NaN where too little is seen.
+    strands over 4 and 9 mm above the brows, then below; ``course`` is how far they stay the same over 20 mm, below.
+    NaN where too little is seen.
     """
 
     end: float
@@ -62,6 +72,7 @@ class HairMeasures:
     half_width: float
     fringe: float
     coherence: tuple[float, float, float, float]
+    course: float
 
 
 def measure_hair(portrait: Portrait, hair: Mask) -> HairMeasures:
@@ -71,46 +82,58 @@ def measure_hair(portrait: Portrait, hair: Mask) -> HairMeasures:
     beside = [(hair & (side * ACROSS_MM > TEMPLE_MM)).sum(axis=1) * CELL_MM for side in (-1, 1)]
     ends = [UP_MM[np.flatnonzero(width >= MIN_LOCK_MM)].min(initial=forehead) for width in beside]
     falling = [end for end in ends if end < forehead - TEMPLE_HAIR_MM] or [forehead]
+    if min(falling) < chin + ONE_SIDE_MM:
+        falling = [min(falling)]
     middle = hair[:, np.abs(ACROSS_MM) < TEMPLE_MM]
     tops = UP_MM[np.argmax(middle[:, middle.any(axis=0)], axis=0)]
     temples = np.abs(UP_MM - (brow + 10.0)) < CELL_MM
     band = (ring_depth(marks, FACE_OVAL) > INSIDE_CELLS) & (np.abs(across) < FRINGE_HALF_MM)
     band &= (up > brow + FRINGE_FROM_MM) & (up < brow + FRINGE_FROM_MM + FRINGE_TO * (forehead - brow))
+    above, below = (_coherence(portrait, hair, part) for part in (up > brow, up <= brow))
     return HairMeasures(
         float(np.mean(falling)) - chin,
         float(np.median(tops)) - forehead if tops.size else 0.0,
         sum(float(width[temples].mean()) for width in beside),
         float(np.abs(across[hair & (up > chin)]).max(initial=0.0)),
         float((hair & band).sum() / max(band.sum(), 1)),
-        (*_coherence(portrait, hair, up > brow), *_coherence(portrait, hair, up <= brow)),
+        (*above[:2], *below[:2]),
+        below[2],
     )
 
 
-def _coherence(portrait: Portrait, hair: Mask, where: Mask) -> tuple[float, float]:
-    """Coherence of the directions of strands over `NEAR_MM` and `WIDE_MM` in a part (R, C) of the hair."""
+def _coherence(portrait: Portrait, hair: Mask, where: Mask) -> tuple[float, float, float]:
+    """Coherence of directions of strands over `NEAR_MM` and `WIDE_MM` in a part (R, C) of hair, and their course."""
     from scipy.ndimage import binary_erosion, gaussian_filter
 
     if portrait.fine is None:
-        return np.nan, np.nan
+        return np.nan, np.nan, np.nan
     rows, columns = (np.minimum(np.arange(length) // 2, length // 2) for length in portrait.fine.shape[:2])
     is_hair, is_part = (cells[np.ix_(rows, columns)] for cells in (hair, where))
     inner = binary_erosion(is_hair, iterations=INSIDE_CELLS)
     is_part = is_part & inner
     if is_part.sum() < FINEST:
-        return np.nan, np.nan
+        return np.nan, np.nan, np.nan
     per_cell = 2.0 / CELL_MM
     light = np.where(is_hair, np.log(np.nan_to_num(portrait.fine) @ LUMINANCE + 8.0), 0.0)
     near = gaussian_filter(is_hair.astype(np.float64), SHADE_MM * per_cell) + 1e-6
     relief = np.where(is_hair, light - gaussian_filter(light, SHADE_MM * per_cell) / near, 0.0)
     down, along = np.gradient(gaussian_filter(relief, FINE_MM * per_cell))
-    found = []
-    for reach in (NEAR_MM, WIDE_MM):
-        xx, xy, yy = (
-            gaussian_filter(inner * part, reach * per_cell) for part in (along * along, along * down, down * down)
-        )
-        share = np.sqrt((xx - yy) ** 2 + 4 * xy**2) / (xx + yy + 1e-12)
-        found.append(float(np.median(share[is_part])))
-    return found[0], found[1]
+    found, doubled = [], along + 1j * down
+    power, square = np.abs(doubled) ** 2, doubled**2  # the structure tensor: its trace, and its direction, doubled
+    for reach in (WIDE_MM, NEAR_MM):
+        turned = _blurred(inner * square, reach * per_cell)
+        turned /= gaussian_filter(inner * power, reach * per_cell) + 1e-12
+        found.append(float(np.median(np.abs(turned)[is_part])))
+    turned = np.where(is_part, turned, 0.0)
+    course = np.abs(_blurred(turned, COURSE_MM * per_cell))
+    course /= gaussian_filter(np.abs(turned), COURSE_MM * per_cell) + 1e-9
+    return found[1], found[0], float(np.median(course[is_part]))
+
+
+def _blurred(values: NDArray[np.complex128], spread: float) -> NDArray[np.complex128]:
+    from scipy.ndimage import gaussian_filter
+
+    return np.asarray(gaussian_filter(values.real, spread) + 1j * gaussian_filter(values.imag, spread))
 
 
 def name_hair(portrait: Portrait, hair: SeenHair, skin: FloatArray) -> str:
@@ -120,7 +143,7 @@ def name_hair(portrait: Portrait, hair: SeenHair, skin: FloatArray) -> str:
     if not hair.region.any():
         return "stubble" if hair.hairy > SHADED_CROWN else "bald"
     seen = measure_hair(portrait, hair.region)
-    if seen.end < LONG_MM:
+    if seen.end < LONG_MM[int(seen.half_width > LONG_WIDE_MM)]:
         return _long_name(seen)
     is_curly = _strands(seen) < CURLY_WIDE
     if seen.end < (CURLY_BOB_MM if is_curly else BOB_MM):
@@ -137,8 +160,10 @@ def _strands(seen: HairMeasures) -> float:
 
 def _long_name(seen: HairMeasures) -> str:
     strands = _strands(seen)
-    if strands < WAVY_WIDE:
-        return "long and curly" if strands < CURLY_WIDE else "long and wavy"
+    if strands < CURLY_WIDE:
+        return "long and curly"
+    if strands < WAVY_WIDE or (strands < WAVY_COHERENT and WAVY_COURSE[0] < seen.course < WAVY_COURSE[1]):
+        return "long and wavy"
     return "long with a fringe" if seen.fringe > FRINGE else "long"
 
 
@@ -147,7 +172,9 @@ def _short_name(seen: HairMeasures, unlike: float) -> str:
     if seen.top > TIED_MM:
         return "tied back"
     if seen.top < FLAT_MM[0] and seen.half_width < FLAT_MM[1]:
-        return "cropped" if unlike < SEE_THROUGH or seen.temples < CROPPED_MM else "flat"
-    if seen.coherence[0] < CURLY:
-        return "afro" if seen.top > AFRO_MM[0] or seen.half_width > AFRO_MM[1] else "curly"
+        return "cropped" if seen.temples < CROPPED_MM[int(unlike < SEE_THROUGH)] else "flat"
+    is_curly = seen.coherence[0] < CURLY or seen.coherence[2] < CURLY_BELOW
+    if is_curly and seen.temples > SLEEK_MM:
+        is_round = seen.end > AFRO_MM[0] and seen.half_width > AFRO_MM[1]
+        return "afro" if is_round or seen.half_width > AFRO_MM[2] else "curly"
     return "short with a fringe" if seen.fringe > FRINGE and seen.half_width > FRINGED_MM else "short"

@@ -32,9 +32,13 @@ IRIS_RING, IRIS_TOP = (0.4, 0.9), 0.35  # of the radius: between pupil and limbu
 MIN_BRIGHT = 0.6  # share of the ring
 PUPIL = 0.25  # of the light of the ring's brighter cells: less is a wide pupil, as drawn people have
 OFF_IRIS, OFF_LIDS = 1.35, 0.18  # of the radius: what is white of the eye, and how far lids reach into it
+# Drawn eyes are open by so many radii of what the tracker takes for the iris (2.0 to 2.35; people by 1.4 to 1.8), which
+# is their pupil; the coloured part lies beyond it, lit below.
+DRAWN_OPEN, DRAWN_RING = 1.9, (0.4, 1.5)
 IRIS_MIX_PX = 0.5  # over the radius: share of the surroundings' light; rendered eyes have .05 to .1 at 5 px
 MIN_OWN_LIGHT = 0.5  # of what is seen
-BRIGHT_WHITE, PLAIN_IRIS = 0.6, (0.2, 0.8)  # quantiles of luminance: white without shadow, iris without catchlights
+# quantiles of luminance: white without shadow, that of a whole drawn eye, iris without catchlights
+BRIGHT_WHITE, DRAWN_WHITE, PLAIN_IRIS = (0.6, 1.0), (0.9, 1.0), (0.2, 0.8)
 # of a colour, below which its median is noise
 MIN_PIXELS = 6
 # Skin of cheeks and forehead in the renderer's studio light is gain * texture ** power in linear light, by channel:
@@ -90,20 +94,24 @@ def sample_eyes(picture: NDArray[np.uint8], points: NDArray[np.floating]) -> Eye
         colours = log_colour(sample_picture(picture, grid)[0])
         off = np.linalg.norm(grid - middle, axis=1) / radius
         is_open = polygon_depth(grid, opening, radius) > OFF_LIDS * radius
-        ring = (off > IRIS_RING[0]) & (off < IRIS_RING[1]) & (grid[:, 1] > middle[1] - IRIS_TOP * radius)
-        whites.append(_median_between(colours[is_open & (off > OFF_IRIS)], (BRIGHT_WHITE, 1.0)))
-        irises.append(_median_between(_without_pupil(colours[is_open & ring]), PLAIN_IRIS))
+        is_drawn = high[1] - low[1] > DRAWN_OPEN * radius
+        inner, outer = DRAWN_RING if is_drawn else IRIS_RING
+        top = 0.0 if is_drawn else IRIS_TOP * radius
+        ring = (off > inner) & (off < outer) & (grid[:, 1] > middle[1] - top)
+        white = is_open & (is_drawn | (off > OFF_IRIS))
+        whites.append(_median_between(colours[white], DRAWN_WHITE if is_drawn else BRIGHT_WHITE))
+        irises.append(_median_between(_without_pupil(colours[is_open & ring], is_drawn=is_drawn), PLAIN_IRIS))
         radii.append(radius)
     return EyeColours(skin, _mean_known(whites), _mean_known(irises), float(np.mean(radii)))
 
 
-def _without_pupil(ring: FloatArray) -> FloatArray:
+def _without_pupil(ring: FloatArray, *, is_drawn: bool) -> FloatArray:
     """Colours (N, 3) of a ring of the iris that are not as dark as a pupil beside its brighter ones."""
     if not len(ring):
         return ring
     bright: FloatArray = ring[ring[:, 0] > np.quantile(ring[:, 0], PLAIN_IRIS[1]) + np.log(PUPIL)]
     # where few cells are so bright, they are reflections in a dark iris
-    return bright if len(bright) > MIN_BRIGHT * len(ring) else ring
+    return bright if is_drawn or len(bright) > MIN_BRIGHT * len(ring) else ring
 
 
 def _median_between(colours: FloatArray, quantiles: tuple[float, float]) -> FloatArray:

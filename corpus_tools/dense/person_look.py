@@ -19,7 +19,6 @@ from corpus_tools.dense.hair_region import (
 from corpus_tools.dense.hairdo import HAIRCUTS, UNSEEN, name_hair
 from corpus_tools.dense.light_colour import (
     MIN_IRIS_PX,
-    SCLERA_CHROMA,
     EyeColours,
     clear_iris,
     estimate_cast,
@@ -58,10 +57,9 @@ CHILD_BROWN = 0.5  # least log R/G of a child's hair
 CHILD = 1.71
 NEUTRAL_IRIS = EYE_COLOURS["brown"]
 IRIS_LIGHT, DARK_IRIS, DARK_IRIS_HUE = 0.012, 0.02, (0.55, -0.55)  # least luminance; up to which irises are brown
-BROWN_FROM, BROWN_BLUE = (
-    0.45,
-    -0.3,
-)  # least log R/G and most log B/G of brown irises; hazel, green and grey ones are less red
+BROWN_FROM, BROWN_BLUE = 0.45, -0.3  # least log R/G and most log B/G of brown irises; others are less red
+PALE_IRIS, PALE_BROWN_FROM = 0.11, 0.6  # luminance from which irises are hazel up to this log R/G
+IRIS_WHITE = np.array([0.08, 0.0])  # log R/G and B/G of the white of the eye, beside which irises are measured
 BROWN_SLOPE, BROWN_LIGHT = -0.8, 0.035  # of B/G: their least R/G; usual luminance
 WHITE_SHARE, OFF_SKIN = 0.7, (0.05, 0.3)  # of the white's cast; log R/G by which it must be less red than the skin
 AMBER = -0.9  # log B/G up to which more yellow is redder; irises beyond are amber
@@ -250,11 +248,11 @@ def iris_colour(eyes: EyeColours, cast: FloatArray) -> FloatArray:
     light, hue = max(by_cast[0], np.log(IRIS_LIGHT)), by_cast[1:]
     if np.isfinite(eyes.sclera).all():
         trust = WHITE_SHARE * smoothstep(eyes.skin[1] - eyes.sclera[1], *OFF_SKIN)
-        hue = hue + trust * (clear[1:] - eyes.sclera[1:] + SCLERA_CHROMA - hue)
+        hue = hue + trust * (clear[1:] - eyes.sclera[1:] + IRIS_WHITE - hue)
     red, blue = hue
     if light < np.log(DARK_IRIS):
         return np.array([light, *DARK_IRIS_HUE])
-    if red > BROWN_FROM and blue < BROWN_BLUE:
+    if red > (PALE_BROWN_FROM if light > np.log(PALE_IRIS) else BROWN_FROM) and blue < BROWN_BLUE:
         usual = np.log(BROWN_LIGHT)
         return np.array([min(light, (light + usual) / 2), max(red, BROWN_SLOPE * max(blue, AMBER)), blue])
     return np.array([light, red, blue])
