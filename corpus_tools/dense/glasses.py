@@ -14,22 +14,34 @@ from tts2face.numeric.arrays import FloatArray, Mask
 
 MATERIAL = FacePart(WORN_PART, 0, 0, specular=0.5, shininess=50.0, wrap=0.3)
 # The front view in which they are sought: 1 mm a cell, from the middle between the eyes.
-LEFT_LOW, RIGHT_HIGH, BLUR_MM = (-72, -52), (72, 40), 0.9
+LEFT_LOW = (-72, -52)
+RIGHT_HIGH = (72, 40)
+BLUR_MM = 0.9
 LUMA, DARKEST = np.array([0.299, 0.587, 0.114]), 8.0  # added before logarithms
 LINE_MM = 3.0  # to both sides of a line, where the skin is lighter
-BRIDGE_HALF_MM, BRIDGE_MM, BRIDGE_BLUR = 7, (-18, 16), (0.5, 1.0)
+BRIDGE_HALF_MM = 7
+BRIDGE_MM = (-18, 16)
+BRIDGE_BLUR = (0.5, 1.0)
 BRIDGE_STEP, RIM_STEP = 0.01, 0.02  # cost of a millimetre by which a line leaves its course
 RADII = np.arange(13.0, 34.0)
 LOWER, FLATTENED = np.radians(np.arange(180.0, 361.0, 5.0)), 0.9  # directions from the eye, and height over width
 N_RIM = 64
 # Mean logarithm by which a bridge is darker, and its fifth faintest column; fourth part of a rim. Without glasses .056,
 # .025 and any; thin wire .078, .035 and .021; others from .13, .07 and .09.
-BRIDGE, FAINT_BRIDGE, FAINT_RIM = 0.06, 0.03, 0.018
+BRIDGE = 0.06
+FAINT_BRIDGE = 0.03
+FAINT_RIM = 0.018
 LEAST_RADIUS = 15.2  # mm, mean of a rim: what lies closer is the rim of the lids
 FAINT_COLUMN, FAINT_SHARE = 0.2, 0.25
-COVER_MM, TEMPLE_COVER_MM, TEMPLE_MM = 4.5, 4.0, 74.0  # of the skin about rims and temples, which is painted anew
+# of the skin about rims and temples, which is painted anew
+COVER_MM = 4.5
+TEMPLE_COVER_MM = 4.0
+TEMPLE_MM = 74.0
 HALF_MM = ((19.0, 30.0), (14.0, 27.0))  # least and most half width and height of a rim
-WIRE_MM, AHEAD_MM, BEHIND_EAR_MM = 1.2, 21.0, 9.0  # rims stand so far before the centre of the eyeball
+# rims stand so far before the centre of the eyeball
+WIRE_MM = 1.2
+AHEAD_MM = 21.0
+BEHIND_EAR_MM = 9.0
 WRAP_MM, SQUARE = 4.0, 0.85  # by which rims bend back at their outer side; exponent of their outline
 EAR_HIGH, EAR_DEEP = (0.0, 12.0), (-85.0, -55.0)
 MOST_LIGHT = 150.0  # of the colour of a frame, sRGB: lighter ones are gloss
@@ -168,7 +180,7 @@ def _frame(face: Face, glasses: Glasses) -> tuple[FloatArray, NDArray[np.int64]]
     skin = face.vertices[part_vertices(face, ("skin",))].astype(np.float64)
     half = np.ptp(glasses.rims, axis=1).mean(axis=0) / 2
     tubes, inner = [], []
-    for eye in sorted(face.eyes, key=lambda one: float(one.centre[0])):
+    for eye in sorted(face.eyes, key=lambda either: float(either.centre[0])):
         sign = float(np.sign(eye.centre[0]))
         turn = np.linspace(0, 2 * np.pi, N_RIM, endpoint=False)
         across, up = (np.sign(way) * np.abs(way) ** SQUARE for way in (np.cos(turn), np.sin(turn)))

@@ -19,22 +19,40 @@ LIP_RING = (*OUTER_LIP_UPPER, *OUTER_LIP_LOWER[-2:0:-1])
 PERSON = 0.5  # share from which a cell shows the person
 # Cells of surely something: skin below the brows, inside the face and off eyes and lips; the crown above the forehead;
 # clothes below and beside the neck, and before it.
-IN_FACE_MM, BELOW_BROWS_MM, OFF_EYES_MM, OFF_LIPS_MM = 8.0, 12.0, 9.0, 5.0
+IN_FACE_MM = 8.0
+BELOW_BROWS_MM = 12.0
+OFF_EYES_MM = 9.0
+OFF_LIPS_MM = 5.0
 SURE_SKIN = 0.75  # of these cells: the others are glasses, beards and shadows
-CROWN_MM, CROWN_HALF_MM, OFF_OVAL_MM, INSIDE_CELLS = 10.0, 75.0, 4.0, 2
-CLOTHES_MM, SHOULDER_MM, CHEST_MM, COLLAR_MM, COLLAR_HALF_MM = 70.0, 95.0, 110.0, 20.0, 28.0
+CROWN_MM = 10.0
+CROWN_HALF_MM = 75.0
+OFF_OVAL_MM = 4.0
+INSIDE_CELLS = 2
+CLOTHES_MM = 70.0
+SHOULDER_MM = 95.0
+CHEST_MM = 110.0
+COLLAR_MM = 20.0
+COLLAR_HALF_MM = 28.0
 # Difference from skin, as a distance: 1 for these logarithms of luminance (darker) and of R/G and B/G.
-DARKER, OTHER_HUE, IS_HAIR = 0.45, 0.28, 0.9
+DARKER = 0.45
+OTHER_HUE = 0.28
+IS_HAIR = 0.9
 CHROMA_SCALE, WEAK_LIGHT = 0.3, 0.01  # of distances between colours, beside luminance; dark ones have no hue
 N_NEAREST, MIN_SEEDS = 8, 60
 SMALL, MOST_APART = 0.05, 2.5  # added to distances before logarithms, and most of their difference
 COLLAR_APART = 0.4  # distance of clothes before the neck from hair
 SMOOTH_CELLS = 1.0  # Gaussian
 BROW_MM, NECK_MM = 4.0, 12.0  # above the brows nothing inside the face is sure; below the chin clothes may be like hair
-THROAT_HALF_MM, CLOTHES_APART, FALL_CELLS = 30.0, 0.35, 2  # hair falls: it lies below hair, at most so far beside it
+# hair falls: it lies below hair, at most so far beside it
+THROAT_HALF_MM = 30.0
+CLOTHES_APART = 0.35
+FALL_CELLS = 2
 MIN_HAIRY = 0.35  # share of the crown: bald people .19 to .31, cropped ones from .39
 # Without a segmentation network, the person is what differs from the edges of the picture.
-EDGE_CELLS, MIN_ROW_CELLS, OFF_BACKGROUND, WALL_MM = 4, 20, 0.6, 150.0
+EDGE_CELLS = 4
+MIN_ROW_CELLS = 20
+OFF_BACKGROUND = 0.6
+WALL_MM = 150.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,7 +111,9 @@ def find_hair(portrait: Portrait, skin: FloatArray) -> SeenHair:
     colours = log_colour(np.nan_to_num(portrait.srgb))
     light = np.exp(colours[..., :1])
     space = np.concatenate([colours[..., :1], colours[..., 1:] * light / (light + WEAK_LIGHT) / CHROMA_SCALE], axis=-1)
-    oval, chin, brow = ring_depth(marks, FACE_OVAL), marks[CHIN, 1], marks[list(BROW_TOPS), 1].max()
+    oval = ring_depth(marks, FACE_OVAL)
+    chin = marks[CHIN, 1]
+    brow = marks[list(BROW_TOPS), 1].max()
     person = known & _person(portrait, space, known, oval)
     is_skin = _skin_cells(portrait, person, oval, space)
     unlike = difference_from_skin(colours - skin, DARKER)

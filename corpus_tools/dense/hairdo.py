@@ -32,7 +32,10 @@ TEMPLE_MM, MIN_LOCK_MM = 36.0, 9.0  # hair beside the face, from the middle of i
 # Lowest hair beside the face above the chin, mean of both sides: haircuts with free ears 94 and higher, bobs 3 to 49,
 # long hair below -10. A side that shows none beside the temple does not count.
 # Hair that falls so low on one side lies in shadow or behind the shoulder on the other.
-BOB_MM, LONG_MM, TEMPLE_HAIR_MM, ONE_SIDE_MM = 75.0, (-6.0, 9.0), 10.0, -30.0
+BOB_MM = 75.0
+LONG_MM = (-6.0, 9.0)
+TEMPLE_HAIR_MM = 10.0
+ONE_SIDE_MM = -30.0
 LONG_WIDE_MM = 114.0  # half width from which hair that ends about the chin lies on shoulders
 CURLY_BOB_MM = 45.0  # short curls stand off the neck
 FLAT_MM = (62.0, 80.0)  # hair above `FOREHEAD`, and its half width: less of both lies on the skull
@@ -42,18 +45,30 @@ SEE_THROUGH, CROPPED_MM = 4.5, (7.5, 13.5)
 SHADED_CROWN = 0.24  # share of a bald crown that is unlike skin: shaved hair; bald people have less
 # Median coherence of the directions of strands (Bigun and Granlund 1987) over 4.5 and 9 mm: afros and short curls .36
 # to .46 and .32 to .37, long curls .52 and .43, straight hair from .55 and .46, long and straight from .7 and .65.
-CURLY, CURLY_BELOW, CURLY_WIDE, WAVY_WIDE = 0.48, 0.42, 0.47, 0.55  # above the brows, below them; of hair that falls
+# above the brows, below them; of hair that falls
+CURLY = 0.48
+CURLY_BELOW = 0.42
+CURLY_WIDE = 0.47
+WAVY_WIDE = 0.55
 # Mean resultant of these directions over 20 mm, of long hair below the brows, is .94 to .97 of straight hair, .90 to
 # .93 of waves, whose coherence is .58 to .68; less of straight locks side by side, whose coherence is more.
 WAVY_COURSE, WAVY_COHERENT = (0.85, 0.934), 0.69
-NEAR_MM, WIDE_MM, COURSE_MM, FINE_MM, SHADE_MM = 4.5, 9.0, 20.0, 1.5, 6.0
+NEAR_MM = 4.5
+WIDE_MM = 9.0
+COURSE_MM = 20.0
+FINE_MM = 1.5
+SHADE_MM = 6.0
 FINEST, INSIDE_CELLS = 100, 3  # cells that tell a texture, and their distance from the outline in fine cells
 # Curls are an afro where they end higher above the chin (from 106 mm; curls that fall 61 to 104) and are wider, from
 # the middle of the face (from 87; short curls 78 to 81), or very wide. With less at the temples hair is combed back.
 AFRO_MM, SLEEK_MM = (105.0, 84.0, 120.0), 28.0
 TIED_MM = 105.0  # above `FOREHEAD`: what stands so high is tied
 FRINGED_MM = 88.0  # half width of short hair with a fringe that falls
-FRINGE, FRINGE_HALF_MM, FRINGE_FROM_MM, FRINGE_TO = 0.42, 48.0, 6.0, 0.55  # share of the lower forehead under hair
+# share of the lower forehead under hair
+FRINGE = 0.42
+FRINGE_HALF_MM = 48.0
+FRINGE_FROM_MM = 6.0
+FRINGE_TO = 0.55
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +93,9 @@ class HairMeasures:
 def measure_hair(portrait: Portrait, hair: Mask) -> HairMeasures:
     """Measures of hair cells (R, C) in a portrait."""
     marks, (across, up) = portrait.marks, np.meshgrid(ACROSS_MM, UP_MM)
-    chin, forehead, brow = marks[CHIN, 1], marks[FOREHEAD, 1], marks[list(BROW_TOPS), 1].max()
+    chin = marks[CHIN, 1]
+    forehead = marks[FOREHEAD, 1]
+    brow = marks[list(BROW_TOPS), 1].max()
     beside = [(hair & (side * ACROSS_MM > TEMPLE_MM)).sum(axis=1) * CELL_MM for side in (-1, 1)]
     ends = [UP_MM[np.flatnonzero(width >= MIN_LOCK_MM)].min(initial=forehead) for width in beside]
     falling = [end for end in ends if end < forehead - TEMPLE_HAIR_MM] or [forehead]
@@ -137,7 +154,7 @@ def _blurred(values: NDArray[np.complex128], spread: float) -> NDArray[np.comple
 
 
 def name_hair(portrait: Portrait, hair: SeenHair, skin: FloatArray) -> str:
-    """What hair is called, a key of `HAIRCUTS`, on skin of a colour (3,), `log_colour`; empty if it is not seen."""
+    """Name of hair, a key of `HAIRCUTS`, on skin of a colour (3,), `log_colour`; empty if it is not seen."""
     if np.isnan(hair.hairy):
         return ""
     if not hair.region.any():

@@ -56,7 +56,10 @@ CHILD_BROWN = 0.5  # least log R/G of a child's hair
 # nine 1.67, adults 1.75 (a broad smile, no teeth) to 1.99.
 CHILD = 1.71
 NEUTRAL_IRIS = EYE_COLOURS["brown"]
-IRIS_LIGHT, DARK_IRIS, DARK_IRIS_HUE = 0.012, 0.02, (0.55, -0.55)  # least luminance; up to which irises are brown
+# least luminance; up to which irises are brown
+IRIS_LIGHT = 0.012
+DARK_IRIS = 0.02
+DARK_IRIS_HUE = (0.55, -0.55)
 BROWN_FROM, BROWN_BLUE = 0.45, -0.3  # least log R/G and most log B/G of brown irises; others are less red
 PALE_IRIS, PALE_BROWN_FROM = 0.11, 0.6  # luminance from which irises are hazel up to this log R/G
 IRIS_WHITE = np.array([0.08, 0.0])  # log R/G and B/G of the white of the eye, beside which irises are measured
@@ -67,7 +70,10 @@ BROW_LIGHT = -1.9  # most luminance of brows, of the skin's, logarithm
 ROOT_MM, LASH_MM = 0.7, 10.0  # off the skin: roots of lashes, and lashes that are shown
 LASH_LENGTH = 0.55  # of the default head's, which are those of made-up eyes
 NEUTRAL_SHIRT = "6a6b6d"
-SHIRT_MM, SHIRT_SPREAD, MIN_SHIRT_CELLS = 30.0, 0.5, 60  # below the chin; deviation of its luminance, logarithm
+# below the chin; deviation of its luminance, logarithm
+SHIRT_MM = 30.0
+SHIRT_SPREAD = 0.5
+MIN_SHIRT_CELLS = 60
 SHIRT_HUE, SHIRT_LIGHT = 0.35, (0.03, 0.2)  # share of its colour that is kept, bounds of its luminance
 VIVID_SHADE = 0.25  # by which the upper bound falls with the colour, logarithms
 NAMING_LIGHT = 0.5  # weight of luminance beside hue where a colour is named

@@ -28,7 +28,10 @@ DARK_SHARE, DARK_WEIGHT = 35, 0.15  # per cent of its pixels that lids shade, an
 WHITE_SHARES = (82, 97)  # per cent of an eye's pixels are less light than those of its white
 SHADE_FADE = 0.03  # of the eye distance, over which the shadow of the lids goes on beyond them
 GAZE_FADE = (1.2, 3.2)  # radii around the iris that turn with it, and beyond which nothing does
-WHOLE, MOSTLY, SHOWN = 0.99, 0.5, 0.4  # shares of a pixel within the opening: for colours, for the white, and as seen
+# shares of a pixel within the opening: for colours, for the white, and as seen
+WHOLE = 0.99
+MOSTLY = 0.5
+SHOWN = 0.4
 SHADE_BLUR_PX = 0.7  # of that shadow
 CATCHLIGHT_IRIS_PX = 9.0  # radius of an iris on which catchlights are sharp enough to lie still
 CATCHLIGHT_WITHIN, CATCHLIGHT_REACH = 0.95, 1.2  # radii of the iris, in which its peak and all of it lie

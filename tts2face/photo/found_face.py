@@ -244,7 +244,7 @@ def _read(pixels: Pixels, tracker: FaceTracker, crop: Crop, n_faces: int) -> Fou
 def _least_turned(pixels: Pixels, tracker: FaceTracker, crop: Crop) -> float:
     """Least probability of a face in crops of other sizes and angles, rad, but for one of them."""
     turned = (replace(crop, side=size * crop.side, angle=crop.angle + turn) for size, turn in TURNED_CROPS)
-    return sorted(tracker.read_crop(pixels, one)[1] for one in turned)[1]
+    return sorted(tracker.read_crop(pixels, other)[1] for other in turned)[1]
 
 
 def _check(found: FoundFace, shape: tuple[int, ...], name: str, reduced_by: float) -> None:

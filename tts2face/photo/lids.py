@@ -36,8 +36,11 @@ LINE_TAPER = 0.12  # of the width of the eye, over which it begins and ends
 LINE_DARKNESS = (0.2, 0.8)  # limits of its share of the light
 DARK_LASHES = 25  # per cent of what lies at the upper margin are darker than its lashes
 CHANGED = (0.3, 0.7)  # of the height of the lashes, over which what is above them becomes the lid
-LASHES_TAPER = 0.1  # of the width of the eye, over which they begin and end
-GRAIN_FROM, GRAIN_BLUR, MOST_GRAIN = 0.30, 0.012, 2.5  # below the eye, where the grain of skin is taken; its blur; sd
+LASHES_TAPER = 0.1  # of the width of the eye, at either side
+# below the eye, where the grain of skin is taken; its blur; sd
+GRAIN_FROM = 0.30
+GRAIN_BLUR = 0.012
+MOST_GRAIN = 2.5
 LID_MEETING = 0.05  # of the opening of an eye from its lower lid, where the lids meet
 FORWARD_MM, EYE_FORWARD_MM = 8.0, 10.0  # way of a sheet in a whole blink, over skin and over the eye
 LASHES_MM = 0.4  # behind the skin, in which the lashes that move lie at rest
@@ -185,7 +188,7 @@ class _View:
     def along(self, values: FloatArray) -> FloatArray:
         """(h, w, ...) values (25, ...) of the columns of the eye, or of those beyond its corners, too."""
         rows = values.reshape(len(values), -1).T
-        found = np.stack([np.interp(self._at, self._columns[len(values)], one) for one in rows], axis=-1)
+        found = np.stack([np.interp(self._at, self._columns[len(values)], row) for row in rows], axis=-1)
         return found.reshape(*self._at.shape, *values.shape[1:])
 
     def over(self, skin: FloatArray, share: FloatArray) -> Pixels:

@@ -22,7 +22,10 @@ CLOSED_GAP = 0.02  # of the eye distance, as all lengths below; closed lips have
 SEARCHED = 0.03  # to either side of the landmarks
 N_PLACES = 25  # that are compared across the line at each point
 SEAM_BLUR, LIP_BLUR = 0.005, 0.004
-LEAST_BLUR_PX, LEAST_LIP_BLUR_PX, LEAST_CONTRAST, TINY_PX = 0.6, 0.5, 1e-3, 1e-6
+LEAST_BLUR_PX = 0.6
+LEAST_LIP_BLUR_PX = 0.5
+LEAST_CONTRAST = 1e-3
+TINY_PX = 1e-6
 STIFF_STEP = 0.01  # between neighbours, whose cost is the stiffness of a path
 LIP_MIDDLE = slice(6, -6)  # points whose colours are those of the lip
 SEAM_STIFFNESS, LIP_STIFFNESS = 2.0, 1.0  # cost of steps between neighbours
@@ -32,7 +35,10 @@ LIP_SPREAD = np.array([22.0, 7.0, 9.0])  # of a lip's colour in Lab
 N_SIDE = 3  # places on each side of an edge whose colours are compared
 EDGE_SHADE, EDGE_DARKNESS = 0.006, 0.55  # reach of the shadow between lips that meet, and its share of the light
 EDGE_REACH, EDGE_FINE = 3, 4  # reaches beyond which there is no shade, and points of a finer edge
-SMOOTHING, WAY_SMOOTHING, CORNER_POINTS = 5, 7, 4  # points of means, and points over which corners take less
+# points of means, and points over which corners take less
+SMOOTHING = 5
+WAY_SMOOTHING = 7
+CORNER_POINTS = 4
 LID_MARGINS = (RIGHT_LIDS, LEFT_LIDS)  # of the person, which the picture shows on its left and right
 N_LID = 25  # points along the margin of a lid, from the outer corner to the inner one
 BELOW = ((230, 231, 229, 118, 119, 117), (450, 451, 449, 347, 348, 346))  # landmarks of skin below the eyes
@@ -45,7 +51,10 @@ COST = 1.2  # of a step, over its length
 GAIN, LEAST_STEP = 0.15, 0.012  # of a step that is taken
 LARGE_EYES, LARGE_EYES_TRUST = 0.165, 0.4  # opening of drawn eyes, and the share of cost and gain that they need
 LARGE_EYES_MORE = 0.025  # so that no rim of the eye is left when its lids are shut
-GROWN_REACH, GROWN_STEP, GROWN_MORE = 0.12, 0.006, 0.008  # way that drawn eyes grow, steps of it, and way beyond
+# way that drawn eyes grow, steps of it, and way beyond
+GROWN_REACH = 0.12
+GROWN_STEP = 0.006
+GROWN_MORE = 0.008
 GROWN_UP, GROWN_THICK = 0.02, 2  # way above the upper margin, and half of the least thickness in steps
 GROWN_SKIN, DARK_LASHES = 0.4, 0.45  # likeness to skin, and lightness over that of skin, at which they end
 CORNER_STEPS, CORNER_SKIN = np.arange(0.006, 0.05, 0.006), 0.25  # of corners, up to where there is skin
@@ -365,7 +374,7 @@ class _Eye:
         lines = []
         for line, height, sign in zip((upper, lower), heights, (-1, 1), strict=True):
             way = _smooth(np.interp(at, columns[seen], height)[:, None], SMOOTHING) + sign * GROWN_MORE * self._scale
-            way[[0, -1]] = [[np.mean([one[end] for one in heights])] for end in (0, -1)]
+            way[[0, -1]] = [[np.mean([height[end] for height in heights])] for end in (0, -1)]
             lines.append(np.column_stack([corner + at[:, None] * self._along + way * across, line[:, 2]]))
         return lines
 

@@ -24,7 +24,10 @@ from tts2face.photo.spreading import Spreading
 
 OWN_SHAPES = ("eyeBlink", "eyeLook", "tongue")  # prefixes of the head's shapes whose skin is moved otherwise
 # Towards landmarks of the skin, of the face's oval, of brows, and lips and lids.
-SKIN_PULL, OVAL_PULL, BROW_PULL, LINE_PULL = 0.05, 0.003, 0.2, 1e3
+SKIN_PULL = 0.05
+OVAL_PULL = 0.003
+BROW_PULL = 0.2
+LINE_PULL = 1e3
 STILL_FROM = 0.75  # of the eye distance from the face, beyond which no shape moves it
 BROWS = (
     ((70, 46), (63, 53), (105, 52), (66, 65), (107, 55)),
@@ -97,7 +100,9 @@ def face_shapes(
     pull = np.full(len(mesh.landmarks), SKIN_PULL)
     pull[np.isin(mesh.landmarks, FACE_OVAL)] = OVAL_PULL
     pull[np.isin(mesh.landmarks, [number for brow in BROWS for pair in brow for number in pair])] = BROW_PULL
-    known, values, pulls = [mesh.landmark_vertices], [moved[mesh.landmarks]], [pull]
+    known = [mesh.landmark_vertices]
+    values = [moved[mesh.landmarks]]
+    pulls = [pull]
     for vertices, weights, numbers in lines:
         known.append(vertices)
         values.append(np.einsum("ij,jkc->ikc", weights, moved[list(numbers)]))

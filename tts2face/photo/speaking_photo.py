@@ -3,20 +3,18 @@
 `speaking_photo` is a column of steps. Each takes the face as the one before it left it, and returns it with more parts.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any, TypeVar
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from tts2face.face.landmarks import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.models.face import Face, FacePart
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.light import Photographed
 from tts2face.models.photo_view import PhotoView
-from tts2face.numeric.arrays import Float32Array, FloatArray, IntArray, Pixels
+from tts2face.numeric.arrays import FloatArray, IntArray
 from tts2face.photo.camera import PhotoCamera, find_camera
 from tts2face.photo.eyes import EYE_BEHIND_MM, SIDES, EyePatch, eye_patches, gaze_shapes
 from tts2face.photo.fit import NOTHING_GIVEN, PhotoFit, PhotoPlaces
@@ -29,13 +27,12 @@ from tts2face.photo.lids import (
     LidFrame,
     LidPicture,
     LidSheet,
-    ShutEye,
     sheet_over_eye,
     sheets_over_skin,
     shut_eye,
 )
 from tts2face.photo.light import SMILING, Changing, MouthRows, picture_light, wrinkles
-from tts2face.photo.lines import InnerLips, LidLines, darken_lip_edges, find_lid_lines, find_lip_line
+from tts2face.photo.lines import InnerLips, darken_lip_edges, find_lid_lines, find_lip_line
 from tts2face.photo.mesh import PhotoMesh, build_mesh
 from tts2face.photo.mouth import MouthInside, MouthPlace, cheek_light, mouth_light, mouth_walls
 from tts2face.photo.photograph import OPAQUE, Photograph
@@ -52,6 +49,7 @@ from tts2face.photo.shapes import (
     lid_ways,
 )
 from tts2face.photo.spreading import Spreading
+from tts2face.photo.steps import BREATH, Filled, HeadModel, Laid, Pictured, Skinned, Traced, after
 from tts2face.photo.surface import (
     EYES,
     LASHES,
@@ -68,99 +66,10 @@ from tts2face.photo.surface import (
 )
 from tts2face.photo.teeth import OwnTeeth, find_teeth, teeth_and_tongue
 
-BREATH = "breath"
 SMILE_KEPT = 0.6  # of a smile with parted lips, while they speak
 INTO_LIP = 0.012  # of the eye distance, by which the edges of parted lips are taken from within the lip
 N_NEAR = 6  # vertices of the skin around a place behind it
 FOLLOW_STEPS = 255  # of the share of the head's motion, as files hold it
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Model:
-    """The shipped head without hair, its landmarks (478, 3), mm, and the names of the shapes of photographed faces."""
-
-    head: Face
-    landmarks: FloatArray
-    names: tuple[str, ...]
-
-    @classmethod
-    def of(cls, head: Face) -> "_Model":
-        return cls(head, scatter_landmarks(head, landmark_positions(head)), (*head.shape_names, BREATH))
-
-    def motion(self) -> dict[str, FloatArray]:
-        """(478, 3) motion of the landmarks in each shape, mm; 0 for those that the head lacks."""
-        moved = landmark_motion(self.head, np.arange(len(self.head.shapes)))
-        spread = np.nan_to_num(scatter_landmarks(self.head, moved))
-        return dict(zip(self.head.shape_names, np.moveaxis(spread, -1, 0), strict=True))
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Traced:
-    """A face in a picture after the first step: its camera, landmarks, lips and lids, corrected where a person did so.
-
-    ``landmarks`` (478, 3) and ``pivot`` (3,) are pixels and depths.
-    """
-
-    model: _Model
-    seen: PhotographedFace
-    camera: PhotoCamera
-    landmarks: FloatArray
-    given: PhotoPlaces
-    person: PhotoPerson
-    lids: LidLines
-    pivot: FloatArray
-
-    @property
-    def pixels(self) -> Pixels:
-        """(H, W, 3) of the picture."""
-        return self.seen.picture.pixels
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Skinned(Traced):
-    """The face with its skin: a mesh over the picture, pixels and depths (V, 3) of it, its motion and its creases."""
-
-    mesh: PhotoMesh
-    photo: FloatArray
-    skin: Vertices
-    creases: FloatArray
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Pictured(Skinned):
-    """The face with pictures of what lies behind its skin: patches and lids of its eyes, and the person's own teeth."""
-
-    patches: Sequence[Sequence[EyePatch]]
-    teeth: OwnTeeth | None
-    frames: Sequence[LidFrame]
-    shut: Sequence[ShutEye]
-    pages: PhotoPages
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Laid(Pictured):
-    """The face with a surface of skin, lids and eyes, which the mouth is added to; landmarks lie on its corners."""
-
-    surface: PhotoSurface
-    corners: NDArray[np.int32]
-    weights: Float32Array
-    lashes: Changing
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Filled(Laid):
-    """The face with a mouth, and the place (3,) of the edge of its upper teeth."""
-
-    mouth: MouthRows
-    teeth_edge: FloatArray
-
-
-Step = TypeVar("Step", bound=Traced)
-
-
-def _and(step: type[Step], before: Traced, **parts: Any) -> Step:
-    """The face after a step, with what the step adds."""
-    return step(**{field.name: getattr(before, field.name) for field in fields(before)}, **parts)
 
 
 def speaking_photo(
@@ -192,7 +101,7 @@ def speaking_photo(
 
 def _trace(seen: PhotographedFace, head: Face, fit: PhotoFit) -> Traced:
     """The camera that took the picture, and lines of the face in it."""
-    model, picture, found = _Model.of(head), seen.picture, seen.found
+    model, picture, found = HeadModel.of(head), seen.picture, seen.found
     pixels, scale = picture.pixels, found.eye_distance_px
     camera = find_camera(found, model.landmarks)
     landmarks = camera.depths_of(found.landmarks)
@@ -217,7 +126,7 @@ def _cover_with_skin(face: Traced) -> Skinned:
     mesh = build_mesh(person.size, face.landmarks, person.lips, face.lids, person.scale)
     photo, skin = _skin(mesh, person, face.camera, model)
     creases = wrinkles(face.pixels, mesh, dict(zip(model.names, skin.shapes, strict=True)), person)
-    return _and(Skinned, face, mesh=mesh, photo=photo, skin=skin, creases=creases)
+    return after(Skinned, face, mesh=mesh, photo=photo, skin=skin, creases=creases)
 
 
 def _picture_eyes_and_teeth(face: Skinned, teeth: OwnTeeth | None) -> Pictured:
@@ -236,7 +145,7 @@ def _picture_eyes_and_teeth(face: Skinned, teeth: OwnTeeth | None) -> Pictured:
         pictures.append(teeth)
     darkened = darken_lip_edges(pixels, person.lips, person.scale)
     pages = lay_pages(darkened, face.mesh, moves(face.skin), pictures)
-    return _and(Pictured, face, patches=patches, teeth=teeth, frames=frames, shut=shut, pages=pages)
+    return after(Pictured, face, patches=patches, teeth=teeth, frames=frames, shut=shut, pages=pages)
 
 
 def _lay_surface(face: Pictured) -> Laid:
@@ -257,8 +166,8 @@ def _lay_surface(face: Pictured) -> Laid:
                 eyes.append((patch, rows))
     margins = [_add_margin(face, surface, eye) for eye in (0, 1)]
     corners, weights = place_landmarks(mesh, face.landmarks, eyes, margins)
-    joined = Changing(*(np.concatenate([getattr(rows, one.name) for rows in lashes]) for one in fields(Changing)))
-    return _and(Laid, face, surface=surface, corners=corners, weights=weights, lashes=joined)
+    joined = Changing(*(np.concatenate([getattr(rows, column.name) for rows in lashes]) for column in fields(Changing)))
+    return after(Laid, face, surface=surface, corners=corners, weights=weights, lashes=joined)
 
 
 def _add_lids(face: Pictured, surface: PhotoSurface, eye: int) -> Changing:
@@ -325,7 +234,7 @@ def _fill_mouth(face: Laid) -> Filled:
         lit=[_add_inside(surface, part, pages) for part in (*inside, walls) if part.texels is None],
         dark=light.dark,
     )
-    return _and(Filled, face, mouth=mouth, teeth_edge=edge)
+    return after(Filled, face, mouth=mouth, teeth_edge=edge)
 
 
 def _face(face: Filled, metadata: Mapping[str, Any]) -> Face:
@@ -377,7 +286,7 @@ def _parts(surface: PhotoSurface) -> tuple[FacePart, ...]:
     return tuple(parts)
 
 
-def _skin(mesh: PhotoMesh, person: PhotoPerson, camera: PhotoCamera, model: _Model) -> tuple[FloatArray, Vertices]:
+def _skin(mesh: PhotoMesh, person: PhotoPerson, camera: PhotoCamera, model: HeadModel) -> tuple[FloatArray, Vertices]:
     """Pixels and depths (V, 3) of the picture, and vertices of its skin with closed lips."""
     spreading = Spreading(mesh.places, mesh.triangles, person.scale)
     found = face_shapes(mesh, spreading, model.motion(), person)

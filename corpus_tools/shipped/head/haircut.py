@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from corpus_tools.dense.texels import find_texels
 from corpus_tools.shipped.head.assets import ASSETS_PACKAGE, Asset, read_asset
 from corpus_tools.shipped.head.cage import Cage
-from corpus_tools.shipped.head.locks import LockStyle, grow_locks, lock_tangents, paint_ribbons
+from corpus_tools.shipped.head.locks import FRINGE, GROWN, grow_locks, lock_tangents, paint_ribbons
 from corpus_tools.shipped.head.noise import value_noise
 from corpus_tools.shipped.head.scalp import (
     MIDDLE,
@@ -79,22 +79,6 @@ FUZZ_MM = 1.6
 FUZZ = 0.42
 FUZZ_SIDE = 512
 SEED = 11
-GROWN: Mapping[str, tuple[str, LockStyle]] = {
-    "curly01": ("short curls", LockStyle(560, 48.0, 13.0, 14, lift=0.7, weight=0.1, curl=(5.0, 25.0), above=3.0)),
-    "curly02": (
-        "curls to the shoulders",
-        LockStyle(420, 0.0, 15.0, 30, -140.0, 0.35, 0.2, 4.0, (7.0, 34.0), order=0.15, above=8.0, cling=0.1),
-    ),
-    "wavy01": (
-        "long and wavy, parted",
-        LockStyle(380, 0.0, 25.0, 26, -205.0, 0.2, 0.25, 10.0, (5.0, 62.0), order=0.75, above=10.0, cling=0.2),
-    ),
-    "wavy02": (
-        "chin-length waves, parted at the side",
-        LockStyle(330, 0.0, 21.0, 18, -85.0, 0.25, 0.26, 22.0, (5.0, 50.0), order=0.6, above=9.0, cling=0.2),
-    ),
-}
-FRINGE = LockStyle(80, 0.0, 18.0, 14, lift=0.2, weight=0.2, above=7.0, fringe_y=24.0, cling=0.25)
 FRINGED = "long01"  # the haircut that `fringe01` is with a fringe; beside this share its picture has room
 FREE_SHARE = 0.64
 

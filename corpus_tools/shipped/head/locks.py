@@ -1,5 +1,6 @@
 """Haircuts that are grown: locks from the scalp, each a ribbon of strands that falls, waves or curls."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,6 +70,24 @@ class LockStyle:
     above: float = 4.0
     cling: float = 0.0
     fringe_y: float | None = None
+
+
+GROWN: Mapping[str, tuple[str, LockStyle]] = {
+    "curly01": ("short curls", LockStyle(560, 48.0, 13.0, 14, lift=0.7, weight=0.1, curl=(5.0, 25.0), above=3.0)),
+    "curly02": (
+        "curls to the shoulders",
+        LockStyle(420, 0.0, 15.0, 30, -140.0, 0.35, 0.2, 4.0, (7.0, 34.0), order=0.15, above=8.0, cling=0.1),
+    ),
+    "wavy01": (
+        "long and wavy, parted",
+        LockStyle(380, 0.0, 25.0, 26, -205.0, 0.2, 0.25, 10.0, (5.0, 62.0), order=0.75, above=10.0, cling=0.2),
+    ),
+    "wavy02": (
+        "chin-length waves, parted at the side",
+        LockStyle(330, 0.0, 21.0, 18, -85.0, 0.25, 0.26, 22.0, (5.0, 50.0), order=0.6, above=9.0, cling=0.2),
+    ),
+}
+FRINGE = LockStyle(80, 0.0, 18.0, 14, lift=0.2, weight=0.2, above=7.0, fringe_y=24.0, cling=0.25)
 
 
 def grow_locks(skin: HeadSkin, head: FloatArray, style: LockStyle, generator: np.random.Generator) -> Cards:
