@@ -111,7 +111,7 @@ def test_a_character_becomes_a_face(tmp_path: Path) -> None:
     message, checked = check("face", tmp_path / "avatar", tmp_path)
     assert message == ""
     about = json.loads((checked / "description.json").read_text())
-    assert (about["summary"], about["licence"]) == ("mesh with 51 shapes", "made by a test")  # it has no tongue
+    assert (about["summary"], about["licence"]) == ("mesh with 52 shapes", "made by a test")
     face = read_face(checked / "content")
     assert face.metadata["character"]["file"] == str(checked / "content")
     assert face.scores is not None  # calibrated on the mesh
