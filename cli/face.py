@@ -174,7 +174,7 @@ def photo(  # noqa: PLR0913 - one parameter a flag
     consent = agreed(photos[0], consent, name)
     result = build_avatar(
         photos, out, consent=consent, name=name, eye_color=eye_color, age_keep=age_keep, no_glasses=no_glasses,
-        model=model,        on_warning=warner(quiet=quiet),
+        model=model, on_warning=warner(quiet=quiet),
     )  # fmt: skip
     _state_person(out, person)
     if preview is not None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.gestures.presentation import FrameContext
+from tts2face.gestures.prosody import PAUSE_DB
 from tts2face.models.palette import GESTURE_FPS, Style
 from tts2face.numeric.arrays import Float32Array, FloatArray, IntArray
 
@@ -33,7 +34,6 @@ EDGE_SHARE = 0.42  # of edges of phrases have one, where a share of the interval
 EARLY_SHARE = 0.5
 EDGE_DELAY_S = 0.3  # behind an edge, at most
 PATIENCE_S = 0.7  # a blink that is due waits so long for an edge that comes
-PAUSE_DB = -20.0  # intensity of a pause, relative to the mean level of speech
 TURN_PAUSE_S = 1.0  # of silence behind which a face no longer speaks
 
 

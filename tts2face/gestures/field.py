@@ -23,7 +23,7 @@ from tts2face.gestures.field_kernels import (
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.numeric.arrays import Float32Array, principal_axes
 from tts2face.numeric.kd_tree import KdTree, build_tree, count_nodes
-from tts2face.storage.array_cache import computed_once
+from tts2face.storage.array_cache import computed_once, holds
 
 N_SEARCH_AXES = 8  # principal axes of the windows in which the search tree is built
 AXES_STRIDE = 8  # the axes are computed from every eighth window; all windows give the same axes
@@ -258,7 +258,7 @@ def _is_index(
         "tree_axes": ("<i4", (n_nodes,)),
         "tree_cuts": ("<f4", (n_nodes,)),
     }
-    if {name: (array.dtype.str, array.shape) for name, array in kept.items()} != wanted:
+    if not holds(kept, wanted):
         return False
     spans, axes = kept["tree_spans"], kept["tree_axes"]
     return bool(

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.gestures.blinks import PAUSE_DB
 from tts2face.gestures.presentation import FrameContext
+from tts2face.gestures.prosody import PAUSE_DB
 from tts2face.models.gaze import FACE_DEG, LISTENING, SPEAKING, GazeHabit, GazeModel, LogNormal
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.numeric.arrays import Float32Array, FloatArray, smoothstep

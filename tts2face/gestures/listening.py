@@ -9,9 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.gestures.blinks import PAUSE_DB
 from tts2face.gestures.elements import BrowRaise, ListeningSpan, Nod
-from tts2face.gestures.prosody import prosody_features, speech_intensity
+from tts2face.gestures.prosody import PAUSE_DB, prosody_features, speech_intensity
 from tts2face.gestures.timeline import Timeline
 from tts2face.types import Waveform
 

@@ -19,7 +19,7 @@ from tts2face.gestures.prosody import QUIET_DB
 from tts2face.gestures.speech_plan import SpeechPlan
 from tts2face.models.palette import EXPRESSIONS, GESTURE_FPS, FaceRegion, Style
 from tts2face.numeric.arrays import Float32Array, FloatArray, ordered_product
-from tts2face.storage.array_cache import computed_once
+from tts2face.storage.array_cache import computed_once, holds
 
 SMOOTHING_STAGES = 4  # low-pass stages in series: 80 dB per decade, so that scaled motion adds nothing above 6 Hz
 LOUD_DB = 0.0  # intensity relative to the mean level of speech at which the loudness is 1
@@ -127,8 +127,7 @@ def slow_spread(recorded: Float32Array, cutoff_hz: float) -> FloatArray:
         return {"spread": filtered_spread(motion - np.median(motion, axis=0), cutoff_hz)}
 
     def fits(kept: Mapping[str, NDArray[Any]]) -> bool:
-        width = (recorded.shape[1],)
-        return [(name, array.dtype.str, array.shape) for name, array in kept.items()] == [("spread", "<f8", width)]
+        return holds(kept, {"spread": ("<f8", (recorded.shape[1],))})
 
     return np.array(computed_once(CACHE_KIND, CACHE_VERSION, [recorded, str(cutoff_hz)], compute, fits)["spread"])
 

@@ -15,6 +15,7 @@ AUDIBLE_DB = 30.0  # relative to 20 micropascals; a sound with a lower maximum c
 HIGH_SEMITONES = 12.0
 QUIET_DB, PROSODY_LOUD_DB = -35.0, 10.0  # limits relative to the mean level of speech; values beyond are clipped
 SILENT_PROSODY = np.array([QUIET_DB, 0.0], np.float32)
+PAUSE_DB = -20.0  # intensity of a pause, relative to the mean level of speech
 LEVEL_STEP_S = 0.02  # between the instants from which the level of speech is taken
 MIN_PITCH_SOUND_S = 0.1  # shorter sounds have no pitch
 

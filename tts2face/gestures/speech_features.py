@@ -14,7 +14,7 @@ from tts2face.gestures.prosody import SpeechIntensity, prosody_features, speech_
 from tts2face.gestures.speech_plan import SoundFeatures, SpeechPlan, SpokenSentence, heard_sentences
 from tts2face.models.palette import GESTURE_FPS, Style
 from tts2face.numeric.arrays import Float32Array, FloatArray
-from tts2face.storage.array_cache import computed_once
+from tts2face.storage.array_cache import computed_once, holds
 from tts2face.types import Waveform
 
 NEAR_S = 0.4  # about the beginning and the end of a sentence
@@ -60,8 +60,7 @@ def recorded_features(style: Style) -> Float32Array:
         return {"features": np.concatenate(parts).astype(np.float32)}
 
     def fits(kept: Mapping[str, NDArray[Any]]) -> bool:
-        shapes = [(name, array.dtype.str, array.shape) for name, array in kept.items()]
-        return shapes == [("features", "<f4", (len(style.intensity), N_FEATURES))]
+        return holds(kept, {"features": ("<f4", (len(style.intensity), N_FEATURES))})
 
     inputs = [style.intensity, style.pitch, style.lengths]
     return np.array(computed_once(CACHE_KIND, CACHE_VERSION, inputs, compute, fits)["features"])

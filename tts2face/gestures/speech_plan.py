@@ -15,14 +15,13 @@ from lexicon.pauses import last_mark
 from lexicon.phones import PHONES
 from lexicon.sequence import SILENCE, WordSpan
 from lexicon.text_language import common_words
-from tts2face.gestures.prosody import SpeechIntensity, prosody_features, speech_intensity
+from tts2face.gestures.prosody import PAUSE_DB, SpeechIntensity, prosody_features, speech_intensity
 from tts2face.numeric.arrays import FloatArray, smooth_gaussian
 from tts2face.sound.quick_pitch import semitones
 from tts2face.sound.retuned import matched_words
 from tts2face.types import Speech, Waveform
 
 STEP_S, SMOOTHING_S = 0.025, 0.04  # of loudness and pitch
-PAUSE_DB = -20.0  # level of a pause, relative to the mean level of speech
 PHRASE_PAUSE_S, SENTENCE_PAUSE_S = 0.12, 0.45  # silence that ends a phrase, and a sentence whose words are not known
 LEAST_PHRASE_S = 0.25  # of sound: shorter ones are noises
 LEAST_WORDS = 3  # on either side of a word that begins a clause

@@ -15,9 +15,8 @@ from tts2face.numeric.kernels import UNIT, ZERO, inlined_kernel
 RIGHT, UP, PLACE_RIGHT, PLACE_UP, SCALE, STRENGTH = 0, 3, 6, 7, 8, 9
 N_CATCHLIGHT_COLUMNS = 10
 HEIGHT_SHARE, ASIDE_SHARE = 0.74, 0.34  # of the height seen of the iris, from below, and of half its width, to the side
-SIZE_OF_EYE = (
-    0.6  # radius over the iris's, by the radius of the eyeball over the distance of the eyes: drawn ones shine
-)
+# radius over the iris's, by the radius of the eyeball over the distance of the eyes: drawn ones shine
+SIZE_OF_EYE = 0.6
 SIZES, LONE_EYE = (0.15, 0.22), 0.18  # limits of that radius, and that of a face with one eye
 MOST_OF_SEEN = 0.24  # of the height seen of the iris: its radius under narrow lids
 SMALL, WHOLE = 0.1, 1.2  # heights seen, over the iris's radius, between which it grows

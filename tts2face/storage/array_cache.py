@@ -2,7 +2,7 @@
 
 import hashlib
 import zlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
@@ -48,6 +48,11 @@ def computed_once(
         found = compute()
         write_cached(kind, version, name, found)
     return found
+
+
+def holds(kept: Arrays, wanted: Mapping[str, tuple[str, tuple[int, ...]]]) -> bool:
+    """Whether arrays are those wanted by name, with their type and shape."""
+    return {name: (array.dtype.str, array.shape) for name, array in kept.items()} == wanted
 
 
 def read_cached(kind: str, version: int, name: str) -> dict[str, NDArray[Any]] | None:
