@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.dense.grids import grid_triangles, wind_outward
 from tts2face.numeric.arrays import FloatArray, unit_vectors
 
 N_SECTION = 8
@@ -22,12 +23,5 @@ def tube(path: FloatArray, radius_mm: float, *, is_closed: bool = False) -> tupl
     rings = rings[:, np.append(np.arange(N_SECTION), 0)]
     if is_closed:
         rings = np.concatenate([rings, rings[:1]])
-    n = N_SECTION + 1
-    row, column = (grid.ravel() for grid in np.meshgrid(np.arange(len(rings) - 1), np.arange(N_SECTION), indexing="ij"))
-    here = row * n + column
-    halves = (here, here + 1, here + n + 1), (here, here + n + 1, here + n)
-    triangles = np.concatenate([np.stack(corners, axis=1) for corners in halves]).astype(np.int64)
     points = rings.reshape(-1, 3)
-    a, b, c = (points[triangles] - path.mean(axis=0)).transpose(1, 0, 2)
-    is_outward = np.einsum("fc,fc->f", a, np.cross(b, c)).sum() > 0
-    return points, triangles if is_outward else triangles[:, ::-1]
+    return points, wind_outward(points, grid_triangles(len(rings), N_SECTION + 1), path.mean(axis=0))

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from corpus_tools.dense.grids import grid_triangles, wind_outward
 from corpus_tools.shipped.drawn.build_drawn import CAST
 from corpus_tools.shipped.drawn.character import CharacterColours, DrawnCharacter, Hairstyle
 from corpus_tools.shipped.drawn.clothes import _roll
-from corpus_tools.shipped.drawn.fields import Front, smooth_line, wind_outward
+from corpus_tools.shipped.drawn.fields import Front, smooth_line
 from corpus_tools.shipped.drawn.hair import (
     LOWEST_DEG,
     MIDDLE,
@@ -27,7 +28,6 @@ from corpus_tools.shipped.drawn.sculpt import apply_proportions
 from corpus_tools.shipped.drawn.tiles import COLLAR, MARGIN, SHIRT, cut_seam, hair_tiles, in_tile
 from corpus_tools.shipped.drawn.worn import HAIRCUTS, comb, cut, grow, lay_closer
 from corpus_tools.shipped.head.skin import HeadSkin
-from corpus_tools.shipped.head.subdivision import grid_triangles
 from lexicon.errors import DataError
 from tests.face.people import DRAWN
 from tts2face.models.face_loading import load_face

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
+from corpus_tools.dense.grids import grid_triangles
 from corpus_tools.shipped.head import assets
 from corpus_tools.shipped.head.assets import Asset, asset_files, parse_asset, unpack_assets
 from corpus_tools.shipped.head.haircut import (
@@ -22,7 +23,6 @@ from corpus_tools.shipped.head.haircut import (
     trim_fringe,
 )
 from corpus_tools.shipped.head.strands import Cards, StrandStyle, bake_strands, strand_angles, strand_tangents
-from corpus_tools.shipped.head.subdivision import grid_triangles
 from corpus_tools.shipped.head.teeth import LOWER, UPPER, follow_lips
 from corpus_tools.shipped.head.tongue import shape_tip
 from lexicon.errors import DataError

@@ -4,12 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from corpus_tools.dense.grids import grid_triangles
 from corpus_tools.shipped.drawn.character import Brow, Colour
 from corpus_tools.shipped.drawn.fields import profile, smooth_line, smooth_rows
 from corpus_tools.shipped.head.correspondence import nearest_surface_points
 from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
 from corpus_tools.shipped.head.skin import HeadSkin, vertex_normals
-from corpus_tools.shipped.head.subdivision import grid_triangles, triangulate
+from corpus_tools.shipped.head.subdivision import triangulate
 from tts2face.numeric.arrays import FloatArray, unit_vectors
 
 N_ALONG_BROW, N_ACROSS = 96, 7

@@ -4,12 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from corpus_tools.dense.grids import grid_triangles, wind_outward
 from corpus_tools.shipped.drawn.character import Collar, Colour
-from corpus_tools.shipped.drawn.fields import wind_outward
 from corpus_tools.shipped.drawn.tiles import COLLAR, SHIRT, cut_seam, in_tile
 from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
 from corpus_tools.shipped.head.skin import HeadSkin
-from corpus_tools.shipped.head.subdivision import grid_triangles
 from tts2face.numeric.arrays import FloatArray, smoothstep, unit_vectors
 
 MATERIAL = {"specular": 0.02, "shininess": 6.0, "wrap": 0.6}

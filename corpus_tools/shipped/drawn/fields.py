@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 from scipy.spatial import cKDTree
 
-from tts2face.numeric.arrays import FloatArray, IntArray
+from tts2face.numeric.arrays import FloatArray
 
 
 def bump(points: FloatArray, centre: tuple[float, ...], reach: tuple[float, ...]) -> FloatArray:
@@ -36,12 +36,6 @@ def profile(knots: Iterable[tuple[float, float]], at: FloatArray) -> FloatArray:
 def smooth_rows(values: FloatArray, spread: float) -> FloatArray:
     """Values (n, ...) after a Gaussian along their first axis, in steps."""
     return np.asarray(gaussian_filter1d(values, spread, axis=0, mode="nearest"))
-
-
-def wind_outward(points: FloatArray, triangles: IntArray, about: FloatArray | float = 0.0) -> IntArray:
-    """Triangles (F, 3) of a closed surface whose normals point away from `about`."""
-    a, b, c = (points[triangles] - about).transpose(1, 0, 2)
-    return triangles if np.einsum("fc,fc->f", a, np.cross(b, c)).sum() > 0 else triangles[:, ::-1]
 
 
 class Front:

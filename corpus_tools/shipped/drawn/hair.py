@@ -8,12 +8,13 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
 
+from corpus_tools.dense.grids import grid_triangles, wind_outward
 from corpus_tools.shipped.drawn.character import CharacterColours, Curls, Hairstyle, Lock
-from corpus_tools.shipped.drawn.fields import arc_length, profile, smooth_rows, wind_outward
+from corpus_tools.shipped.drawn.fields import arc_length, profile, smooth_rows
 from corpus_tools.shipped.drawn.tiles import hair_tiles, in_tile
 from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
 from corpus_tools.shipped.head.skin import HeadSkin, vertex_normals
-from corpus_tools.shipped.head.subdivision import grid_triangles, join_triangles, triangulate
+from corpus_tools.shipped.head.subdivision import join_triangles, triangulate
 from tts2face.models.lit_hair import swing_shapes
 from tts2face.numeric.arrays import FloatArray, IntArray, smoothstep, unit_vectors
 

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.dense.grids import grid_triangles
 from corpus_tools.shipped.drawn.character import Colour, Profile
 from corpus_tools.shipped.drawn.fields import Front, arc_length, profile
 from corpus_tools.shipped.head.lid_edges import LidEdge
 from corpus_tools.shipped.head.parts import Eyeball, HeadPart, MaterialSpan
 from corpus_tools.shipped.head.skin import HeadSkin
-from corpus_tools.shipped.head.subdivision import grid_triangles
 from tts2face.numeric.arrays import FloatArray, smoothstep, unit_vectors
 
 N_ALONG, N_ROWS = 72, 4

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
+from corpus_tools.dense.grids import grid_triangles
 from corpus_tools.shipped.drawn.character import DrawnCharacter
 from corpus_tools.shipped.head.cage import Cage
 from corpus_tools.shipped.head.head import COVERED_POSES, ReferenceHead, cover_in_pose
@@ -14,7 +15,6 @@ from corpus_tools.shipped.head.lips import lip_front
 from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
 from corpus_tools.shipped.head.retreat import add_retreat
 from corpus_tools.shipped.head.skin import HeadSkin
-from corpus_tools.shipped.head.subdivision import grid_triangles
 from corpus_tools.shipped.head.teeth import (
     COVER_MM,
     LOWER,

@@ -4,11 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from corpus_tools.dense.grids import grid_triangles
 from corpus_tools.shipped.head.edge_rings import EdgeRings, find_narrowest_ring
 from corpus_tools.shipped.head.eyes import RECEDE_MM, ball_radius
 from corpus_tools.shipped.head.parts import Eyeball, HeadPart, MaterialSpan
 from corpus_tools.shipped.head.skin import HeadSkin
-from corpus_tools.shipped.head.subdivision import grid_triangles, join_triangles
+from corpus_tools.shipped.head.subdivision import join_triangles
 from tts2face.numeric.arrays import IntArray
 
 REACH_MM = 30.0

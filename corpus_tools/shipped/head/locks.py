@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
 
+from corpus_tools.dense.grids import grid_triangles
 from corpus_tools.shipped.head.scalp import EAR, MIDDLE, hair_share
 from corpus_tools.shipped.head.skin import HeadSkin, vertex_normals
 from corpus_tools.shipped.head.strands import Cards
-from corpus_tools.shipped.head.subdivision import grid_triangles
 from tts2face.models.hair import MEAN_RELIEF
 from tts2face.numeric.arrays import FloatArray, IntArray, smoothstep, unit_vectors
 

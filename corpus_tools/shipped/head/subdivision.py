@@ -61,19 +61,6 @@ def triangulate(quads: NDArray[np.integer]) -> NDArray[np.int64]:
     return np.stack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]], axis=1).reshape(-1, 3).astype(np.int64)
 
 
-def grid_triangles(n_rows: int, n_columns: int, *, is_closed: bool = False) -> NDArray[np.int64]:
-    """(F, 3) triangles of a surface stored row by row; a closed one joins its last column to its first."""
-    steps = n_columns if is_closed else n_columns - 1
-    row, column = (grid.ravel() for grid in np.meshgrid(np.arange(n_rows - 1), np.arange(steps), indexing="ij"))
-    here, beside = row * n_columns + column, row * n_columns + (column + 1) % n_columns
-    return np.concatenate(
-        [
-            np.stack([here, beside, beside + n_columns], axis=1),
-            np.stack([here, beside + n_columns, here + n_columns], axis=1),
-        ]
-    ).astype(np.int64)
-
-
 def join_triangles(triangles: Sequence[NDArray[np.int64]], n_points: Iterable[int]) -> NDArray[np.int64]:
     """(F, 3) triangles of pieces, one after the other, over the joined points of all; `n_points` is of each piece."""
     firsts = accumulate(n_points, initial=0)  # one more than there are pieces

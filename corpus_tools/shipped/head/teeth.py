@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.dense.grids import grid_triangles
 from corpus_tools.shipped.head.cage import SCALE
 from corpus_tools.shipped.head.parts import HeadPart, MaterialSpan
-from corpus_tools.shipped.head.subdivision import grid_triangles, join_triangles
+from corpus_tools.shipped.head.subdivision import join_triangles
 from tts2face.numeric.arrays import FloatArray, smoothstep
 
 # Sizes after Wheeler, Dental Anatomy. The incisors touch the inner side of the lips, 2.5 mm (upper) and 6 mm (lower)
