@@ -1,11 +1,13 @@
-"""A text with its marks: runs of style, rate, volume and tone, and pauses, nods and names at positions.
+"""A text with its marks: runs of style, rate, volume and tone, and pauses, gestures and names at positions.
 
 Positions are character indices of the spoken text, which does not contain the marks themselves.
 """
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 from lexicon.errors import InputError
+from lexicon.gesture_names import GESTURES
 from lexicon.ipa import IpaPhone
 from lexicon.tones import EVEN, Tone
 from lexicon.values.checks import check_limits
@@ -15,7 +17,9 @@ VOLUME_LIMITS = (0.0, 2.0)
 PITCH_LIMITS = (-12.0, 12.0)  # semitones: an octave, as SSML services allow
 RANGE_LIMITS = (0.0, 2.0)
 EMPHASIS_DB = 3.0  # of strong emphasis: accented words are 2-5 dB louder (Krahmer and Swerts 2007)
-NOD_SIZE_LIMITS = (0.1, 2.0)  # above 12 degrees a nod is a bow
+GESTURE_SIZE_LIMITS = (0.1, 2.0)  # above 12 degrees a nod is a bow
+GESTURE_SECONDS_LIMITS = (0.1, 30.0)  # a blink is shorter, a look longer than others
+GESTURE_DEG_LIMITS = (-35.0, 35.0)  # farther, people turn the head (Stahl 1999, Experimental Brain Research 126)
 MAX_PAUSE_S = 10.0  # s, at one position; speech services allow 10 to 20
 MAX_NESTING = 16  # levels of marks within marks
 MAX_NOTES = 20  # on one text
@@ -62,15 +66,67 @@ class PauseMark:
 
 
 @dataclass(frozen=True, slots=True)
-class NodMark:
-    """A nod with the word at or after a character."""
+class GestureMark:
+    """A gesture with the word at or after a character; its fields are those of `tts2face.gestures.elements.Gesture`."""
 
     at: int
+    name: str = "nod"
     size: float = 1.0
+    seconds: float | None = None
+    down_deg: float | None = None
+    left_deg: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse sizes out of range."""
-        check_limits("the size of a nod", self.size, NOD_SIZE_LIMITS)
+        """Refuse unknown names, and values out of range."""
+        check_gesture(self)
+
+
+class GestureFields(Protocol):
+    """Fields of a gesture, wherever it stands."""
+
+    @property
+    def name(self) -> str:
+        """One of `GESTURES`."""
+
+    @property
+    def size(self) -> float:
+        """Factor of its movements."""
+
+    @property
+    def seconds(self) -> float | None:
+        """Its duration; None is its usual one."""
+
+    @property
+    def down_deg(self) -> float | None:
+        """Degrees down of its direction; None is the usual one."""
+
+    @property
+    def left_deg(self) -> float | None:
+        """Degrees to the person's own left."""
+
+
+def check_gesture(gesture: GestureFields) -> None:
+    """Refuse unknown gestures, and values out of range.
+
+    Raises
+    ------
+    InputError
+        There is no such gesture, it has no direction, or a value is out of range.
+    """
+    if gesture.name not in GESTURES:
+        raise InputError(f"there is no gesture {gesture.name[:40]!r}; choose {', '.join(GESTURES)}")
+    what = gesture.name.replace("_", " ")
+    check_limits(f"the size of the gesture {what}", gesture.size, GESTURE_SIZE_LIMITS)
+    if gesture.seconds is not None:
+        check_limits(f"the duration of the gesture {what}", gesture.seconds, GESTURE_SECONDS_LIMITS, " s")
+    for direction, degrees in (("down", gesture.down_deg), ("left", gesture.left_deg)):
+        if degrees is None:
+            continue
+        if GESTURES[gesture.name].directions == "none":
+            raise InputError(
+                f"the gesture {what} has no direction; remove it, or choose look_at, look_away, tilt or wink"
+            )
+        check_limits(f"the direction {direction} of the gesture {what} in degrees", degrees, GESTURE_DEG_LIMITS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +146,7 @@ class PhoneMark:
     segments: tuple[IpaPhone, ...]
 
 
-Mark = PauseMark | NodMark | NameMark | PhoneMark
+Mark = PauseMark | GestureMark | NameMark | PhoneMark
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from itertools import pairwise
 from lexicon.capitals import sentence_case
 from lexicon.given_phones import TextWord, ToneSpan, phrase_words
 from lexicon.ipa import IpaPhone
-from lexicon.marked_text import Mark, MarkedText, NodMark, PauseMark, PhoneMark, StyleRun
+from lexicon.marked_text import GestureMark, Mark, MarkedText, PauseMark, PhoneMark, StyleRun
 from lexicon.normalize import spoken_form
 from lexicon.pauses import PARAGRAPH_S, pause_behind
 from lexicon.sentence_length import n_letters, overlapping_runs, pieces_of_text
@@ -186,7 +186,7 @@ def text_prefix(written: str, n: int) -> str:
 
 
 def index_by_letters(text: MarkedText) -> MarkedText:
-    """A marked text with positions in letters; at one position the last run, the sum of pauses and the largest nod.
+    """A marked text with positions in letters; at one position the last run, the sum of pauses, the largest gestures.
 
     Raises
     ------
@@ -200,19 +200,20 @@ def index_by_letters(text: MarkedText) -> MarkedText:
         letters[position] = letters[before] + n_letters(text.text[before:position])
     runs = {letters[run.start]: replace(run, start=letters[run.start]) for run in text.runs}
     pauses: dict[int, PauseMark] = {}
-    nods: dict[int, NodMark] = {}
+    gestures: dict[tuple[int, str], GestureMark] = {}
     names: list[Mark] = []
     for mark in text.marks:
         at = letters[mark.at]
         if isinstance(mark, PauseMark):
             pauses[at] = PauseMark(at, mark.seconds + (pauses[at].seconds if at in pauses else 0.0))
-        elif isinstance(mark, NodMark):
-            nods[at] = NodMark(at, max(mark.size, nods[at].size if at in nods else 0.0))
+        elif isinstance(mark, GestureMark):
+            gesture, earlier = replace(mark, at=at), gestures.get((at, mark.name))
+            gestures[at, mark.name] = earlier if earlier and earlier.size > mark.size else gesture
         elif isinstance(mark, PhoneMark):
             names.append(replace(mark, at=at, end=letters[mark.end]))
         else:
             names.append(replace(mark, at=at))
-    marks = sorted([*nods.values(), *names, *pauses.values()], key=lambda mark: mark.at)
+    marks = sorted([*gestures.values(), *names, *pauses.values()], key=lambda mark: mark.at)
     return replace(text, runs=tuple(runs.values()), marks=tuple(marks))
 
 

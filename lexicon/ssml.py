@@ -21,7 +21,7 @@ from xml.parsers import expat
 
 from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE
-from lexicon.marked_text import MAX_NESTING, MarkedText, MarkedTextBuilder, NameMark, NodMark, PhoneMark
+from lexicon.marked_text import MAX_NESTING, GestureMark, MarkedText, MarkedTextBuilder, NameMark, PhoneMark
 from lexicon.say_as import reads_kind, say_as
 from lexicon.ssml_leniency import (
     LANGUAGE,
@@ -310,7 +310,7 @@ class _SsmlReader:
             raise InputError(f"<emphasis> has no level {level[:40]!r}; use {', '.join(EMPHASES)}")
         emphasis, size = EMPHASES[level]
         if size:
-            self._builder.add_mark(NodMark(self._builder.at, size))
+            self._builder.add_mark(GestureMark(self._builder.at, size=size))
         self._builder.open_emphasis("<emphasis>", emphasis)
 
     def _prosody(self, attributes: Attributes) -> None:

@@ -1,8 +1,8 @@
 """Parse the marks in a text, or SSML; any other bracket is text.
 
-Marks: ``[pause 0.4]``, ``[nod]``, ``[style:delighted] ... [/style]``, ``[phoneme:təˈmɑtoʊ]tomato[/phoneme]``, and words
-that are typed with emphasis (`lexicon.emphasis`). A further markup of texts: a function as those of `MARKUPS`, its row,
-and its name in `tts2face.request.MARKUPS`.
+Marks: ``[pause 0.4]``, ``[nod]`` and other gestures (`lexicon.gesture_marks`), ``[style:delighted] ... [/style]``,
+``[phoneme:təˈmɑtoʊ]tomato[/phoneme]``, and words that are typed with emphasis (`lexicon.emphasis`). A further markup of
+texts: a function as those of `MARKUPS`, its row, and its name in `tts2face.request.MARKUPS`.
 """
 
 import re
@@ -13,14 +13,16 @@ from types import MappingProxyType
 from lexicon.emphasis import EmphasisedWords, find_emphases
 from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE
-from lexicon.marked_text import MarkedText, MarkedTextBuilder, NodMark, PauseMark
+from lexicon.gesture_marks import FIRST_WORDS, parse_gesture
+from lexicon.marked_text import GestureMark, MarkedText, MarkedTextBuilder, PauseMark
 from lexicon.ssml import VoiceHz, _add_phonemes, parse_ssml, typical_hz
 
 # A bracket, one of the words, and the rest up to the closing bracket, which a mark must have; words with phones up to
 # their end. Each part ends where the next begins, so that the scan is linear.
 MARK_PATTERN = re.compile(
     r"\[phoneme:(?P<phones>[^\[\]]*)\](?P<words>[^\[\]]*)\[/phoneme\]"
-    r"|\[(?P<name>/?(?:style|nod|pause)\b|phoneme(?=:)|/phoneme(?=\]))(?P<rest>[^\[\]]*)(?P<end>\]?)"
+    r"|\[(?P<name>/?(?:style|pause)\b|/nod\b|phoneme(?=:)|/phoneme(?=\]))(?P<rest>[^\[\]]*)(?P<end>\]?)"
+    rf"|\[(?P<gesture>(?i:{'|'.join(FIRST_WORDS)})(?![^\W_])[^\[\]]*)(?P<gesture_end>\]?)"
 )
 MAX_QUOTED_CHARACTERS = 40
 # without possessive repeats, which Python 3.11.2 loses within each other
@@ -117,7 +119,7 @@ def _add_text(builder: MarkedTextBuilder, text: str, span: tuple[int, int], emph
         if words.start < at:  # a mark stands within it
             continue
         builder.add_text(text[at : words.start])
-        builder.add_mark(NodMark(builder.at, words.emphasis))
+        builder.add_mark(GestureMark(builder.at, size=words.emphasis))
         builder.open_emphasis(words.text, words.emphasis)
         builder.add_text(words.text)
         builder.close("emphasis", words.text)
@@ -127,6 +129,8 @@ def _add_text(builder: MarkedTextBuilder, text: str, span: tuple[int, int], emph
 
 def _read_mark(builder: MarkedTextBuilder, match: "re.Match[str]") -> None:
     shown = " ".join(match.group()[:MAX_QUOTED_CHARACTERS].split())
+    if match["gesture"] is not None:
+        return _read_gesture(builder, match, shown)
     if match["name"] is None:
         return _add_phonemes(builder, match["words"], match["phones"], "ipa")
     name, rest = match["name"], match["rest"].strip()
@@ -134,8 +138,6 @@ def _read_mark(builder: MarkedTextBuilder, match: "re.Match[str]") -> None:
         raise InputError(f"the mark {shown!r} has no closing bracket; write {_mark_syntax(name)}")
     if name == "pause":
         builder.add_mark(PauseMark(builder.at, _parse_number(rest.removesuffix("s").rstrip(), shown, name)))
-    elif name == "nod":
-        builder.add_mark(NodMark(builder.at, _parse_number(rest, shown, name) if rest else 1.0))
     elif name == "style" and rest[:1] == ":" and rest[1:].strip():
         builder.open_style("style", shown, rest[1:].strip())
     elif name == "/style" and not rest:
@@ -143,6 +145,19 @@ def _read_mark(builder: MarkedTextBuilder, match: "re.Match[str]") -> None:
     else:
         raise InputError(f"cannot read the mark {shown}; write {_mark_syntax(name)}")
     return None
+
+
+def _read_gesture(builder: MarkedTextBuilder, match: "re.Match[str]", shown: str) -> None:
+    """Add a gesture; other words in brackets that begin as one are text, but those of a nod."""
+    gesture = parse_gesture(match["gesture"], builder.at) if match["gesture_end"] else None
+    if gesture is not None:
+        builder.add_mark(gesture)
+    elif not match["gesture"].startswith("nod"):
+        builder.add_text(match.group())
+    elif not match["gesture_end"]:
+        raise InputError(f"the mark {shown!r} has no closing bracket; write {_mark_syntax('nod')}")
+    else:
+        raise InputError(f"cannot read the mark {shown}; write {_mark_syntax('nod')}")
 
 
 def _parse_number(written: str, shown: str, name: str) -> float:

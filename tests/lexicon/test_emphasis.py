@@ -6,7 +6,7 @@ import pytest
 
 from lexicon.emphasis import is_direction
 from lexicon.given_phones import pronounce_words
-from lexicon.marked_text import NodMark
+from lexicon.marked_text import GestureMark
 from lexicon.sentences import split_sentences
 from lexicon.spoken_words import pronounce_marked
 from lexicon.text_marks import parse_marks
@@ -91,7 +91,7 @@ def test_in_writing_without_spaces_asterisks_are_left_out() -> None:
 
 def test_emphasis_nods_and_a_mark_within_it_ends_it() -> None:
     found = parse_marks("It is *not* here, *so [pause 1] there*.")
-    assert found.marks[0] == NodMark(6, 1.0)
+    assert found.marks[0] == GestureMark(6, size=1.0)
     assert found.text == "It is not here, *so  there*."
 
 

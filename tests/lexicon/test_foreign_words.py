@@ -9,7 +9,7 @@ from lexicon import foreign_words
 from lexicon.errors import BackendError
 from lexicon.foreign_words import letter_names, make_readable
 from lexicon.g2p import languages
-from lexicon.marked_text import NodMark, PauseMark
+from lexicon.marked_text import GestureMark, PauseMark
 from lexicon.scripts import check_readable
 from lexicon.text_language import LANGUAGE_OF_SCRIPT
 from lexicon.text_marks import parse_marks
@@ -50,7 +50,7 @@ def test_letters_that_no_language_reads_are_named_and_marks_stay_where_they_are(
     assert readable.text == "A kha mo ro word kha mo end now."
     assert notes == ("Khmer words are spelled",)
     nod, pause = readable.marks
-    assert (nod, pause) == (NodMark(12), PauseMark(17, 0.5))
+    assert (nod, pause) == (GestureMark(12), PauseMark(17, 0.5))
     assert [(run.start, run.styles) for run in readable.runs] == [(0, ()), (28, ("calm",)), (31, ())]
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from lexicon.errors import InputError
 from lexicon.growing_text import MAX_HELD_CHARACTERS, GrowingText
-from lexicon.marked_text import MAX_NESTING, MarkedText, NameMark, NodMark, PauseMark, StyleRun
+from lexicon.marked_text import MAX_NESTING, GestureMark, MarkedText, NameMark, PauseMark, StyleRun
 from lexicon.text_marks import parse_marks
 from lexicon.tones import Tone
 
@@ -45,7 +45,7 @@ def test_marks_keep_their_positions(parts: list, last: str) -> None:
     found = parse_marks("".join(f"{text}[nod {size:g}]" for text, size in parts) + last)
     assert found.text == "".join(text for text, _ in parts) + last
     places = [sum(len(text) for text, _ in parts[: k + 1]) for k in range(len(parts))]
-    assert found.marks == tuple(NodMark(at, size) for at, (_, size) in zip(places, parts, strict=True))
+    assert found.marks == tuple(GestureMark(at, size=size) for at, (_, size) in zip(places, parts, strict=True))
 
 
 def test_every_mark() -> None:
@@ -53,14 +53,18 @@ def test_every_mark() -> None:
         "Well, [pause 0.4]yes [nod 0.5][pause .5s][style:head=calm]one [style: cross ]two[/style][/style].[nod]"
     )
     assert found.text == "Well, yes one two."
-    assert found.marks == (PauseMark(6, 0.4), NodMark(10, 0.5), PauseMark(10, 0.5), NodMark(18))
+    assert found.marks == (PauseMark(6, 0.4), GestureMark(10, size=0.5), PauseMark(10, 0.5), GestureMark(18))
     assert found.runs == (StyleRun(0), StyleRun(10, ("head=calm",)), StyleRun(14, ("head=calm", "cross")), StyleRun(17))
     assert found.has_voice_changes
     assert not parse_marks("[style:a]b[/style]").has_voice_changes
 
 
 def test_pauses_at_one_place_add_up() -> None:
-    assert parse_marks("a[pause 1][nod][pause 2]b[pause 3]").marks == (PauseMark(1, 3.0), NodMark(1), PauseMark(2, 3.0))
+    assert parse_marks("a[pause 1][nod][pause 2]b[pause 3]").marks == (
+        PauseMark(1, 3.0),
+        GestureMark(1),
+        PauseMark(2, 3.0),
+    )
 
 
 @pytest.mark.parametrize(
@@ -76,7 +80,7 @@ def test_pauses_at_one_place_add_up() -> None:
         ("[pause 1", "has no closing bracket"),
         ("[nod", "has no closing bracket; write .nod., or"),
         ("[nod often]", r"cannot read the mark \[nod often\]; write \[nod\]"),
-        ("[nod 9]", "size of a nod must lie between 0.1 and 2, not 9"),
+        ("[nod 9]", "size of the gesture nod must lie between 0.1 and 2, not 9"),
         ("[/nod]", r"cannot read the mark \[/nod\]"),
         ("[style]a[/style]", r"cannot read the mark \[style\]; write \[style:NAME\]"),
         ("[style delighted]", "cannot read the mark"),
@@ -113,7 +117,7 @@ def test_every_element() -> None:
     )
     assert found.text.split() == ["One", "&", "two", "<3", "four", "five", "six"]
     at = {word: found.text.index(f" {word}") for word in ("four", "five", "six")}
-    assert found.marks == (NodMark(at["five"], 1.0), NameMark(at["six"], "here"), PauseMark(at["six"], 1.7))
+    assert found.marks == (GestureMark(at["five"], size=1.0), NameMark(at["six"], "here"), PauseMark(at["six"], 1.7))
     assert [run.start for run in found.runs] == [0, at["four"], at["five"], at["six"], len(found.text)]
     assert found.runs[1].rate == pytest.approx(0.75 * 1.2)
     assert found.runs[1].volume == pytest.approx(1.995, abs=0.01)

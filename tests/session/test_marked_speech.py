@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lexicon.errors import InputError
-from lexicon.marked_text import MAX_PAUSE_S, NodMark
+from lexicon.marked_text import MAX_PAUSE_S, GestureMark
 from lexicon.sentences import Sentence, index_by_letters, split_sentences
 from lexicon.sequence import SILENCE
 from lexicon.text_marks import parse_marks
@@ -275,7 +275,7 @@ def test_any_text_is_cut_without_loss(bits: list) -> None:
     parts = list(split_sentences(text, "de"))
     written = "".join(part.source for sentence in parts for part in sentence.utterances)
     assert [letter for letter in written if letter.isalnum()] == [letter for letter in text.text if letter.isalnum()]
-    nods = {mark.at for mark in index_by_letters(text).marks if isinstance(mark, NodMark)}
+    nods = {mark.at for mark in index_by_letters(text).marks if isinstance(mark, GestureMark)}
     assert sum(len(sentence.marks) for sentence in parts) == (len(nods) if parts else 0)
     for sentence in parts:
         bounds = [(part.first, part.last) for part in sentence.utterances]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lexicon.errors import InputError
-from lexicon.marked_text import NOD_SIZE_LIMITS
+from lexicon.marked_text import GESTURE_SIZE_LIMITS
 from lexicon.values.checks import check_limits
 from lexicon.values.fields import check_fields
 from tts2face.models.palette import EXPRESSIONS, FEATURES
@@ -194,7 +194,7 @@ class Nod:
         check_fields(self)
         if not 0.0 <= self.time < math.inf:
             raise InputError(f"a nod needs a time of 0 s or more, not {self.time:g}")
-        check_limits("the size of a nod", self.size, NOD_SIZE_LIMITS)
+        check_limits("the size of a nod", self.size, GESTURE_SIZE_LIMITS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,7 +209,7 @@ class BrowRaise:
         check_fields(self)
         if not 0.0 <= self.time < math.inf:
             raise InputError(f"a brow raise needs a time of 0 s or more, not {self.time:g}")
-        check_limits("the size of a brow raise", self.size, NOD_SIZE_LIMITS)
+        check_limits("the size of a brow raise", self.size, GESTURE_SIZE_LIMITS)
 
 
 @dataclass(frozen=True, slots=True)

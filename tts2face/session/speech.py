@@ -10,7 +10,7 @@ import numpy as np
 
 from lexicon.errors import InputError, SilentTextError
 from lexicon.given_phones import TextWord
-from lexicon.marked_text import MAX_PAUSE_S, Mark, MarkedText, NameMark, NodMark, StyleRun
+from lexicon.marked_text import MAX_PAUSE_S, GestureMark, Mark, MarkedText, NameMark, StyleRun
 from lexicon.pauses import PAUSES_S, last_mark
 from lexicon.sentence_length import n_letters
 from lexicon.sentences import Phrase, Sentence, index_by_letters
@@ -301,7 +301,8 @@ def resolve_marks(
         previous_end = max(end, previous_end)
         if start < end:
             spans += [StyleSpan(feature, style, start, end) for feature, style in innermost_styles(run.styles).items()]
-    nods = tuple(Nod(times.onset(mark.at), mark.size) for mark in marks if isinstance(mark, NodMark))
+    gestures = [mark for mark in marks if isinstance(mark, GestureMark)]
+    nods = tuple(Nod(times.onset(mark.at), mark.size) for mark in gestures if mark.name == "nod")
     names = tuple(MarkTime(mark.name, times.onset(mark.at)) for mark in marks if isinstance(mark, NameMark))
     return Timeline(spans=tuple(spans), nods=nods), names
 

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from lexicon.marked_text import NOD_SIZE_LIMITS
+from lexicon.marked_text import GESTURE_SIZE_LIMITS
 from tts2face.gestures.elements import CHANNEL_OFFSET_LIMITS, EXPRESSION_WEIGHT_LIMITS, GAIN_LIMITS, GAZE_LIMITS_DEG
 from tts2face.gestures.kinds import KINDS
 from tts2face.models.palette import EXPRESSIONS, FEATURES
@@ -17,7 +17,7 @@ from tts2face.types import HEAD_CHANNELS
 MODULE = Path(__file__).parent / "components" / "protocol.js"
 LIMITS = {  # of the values of elements: of keys, of both angles of the gaze, of the size of a nod
     "strengths": GAIN_LIMITS, "curves": EXPRESSION_WEIGHT_LIMITS, "edits": CHANNEL_OFFSET_LIMITS,
-    "gaze": GAZE_LIMITS_DEG, "nods": NOD_SIZE_LIMITS,
+    "gaze": GAZE_LIMITS_DEG, "nods": GESTURE_SIZE_LIMITS,
 }  # fmt: skip
 HEAD = """// Edits and elements of a timeline as the server has them, made of its tables by
 // `python -m tts2face.serving.studio.protocol`: change those, and run it again.

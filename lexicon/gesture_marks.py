@@ -1,0 +1,54 @@
+"""Gestures in a text: ``[nod 0.5]``, ``[brows up]``, ``[wink left]``, ``[look up 2s]``, ``[look at left 20 down 5]``.
+
+Behind the name stand, in any order, the size as a number, the duration in seconds with its ``s``, and directions, each
+with its degrees or without. ``[look left]`` is short for ``[look at left]``.
+"""
+
+import re
+
+from lexicon.gesture_names import DIRECTIONS, GESTURES, gesture_name
+from lexicon.marked_text import GestureMark
+
+FIRST_WORDS = tuple(dict.fromkeys([*(name.partition("_")[0] for name in GESTURES)]))
+_NUMBER = r"(?:[0-9]{1,4}(?:\.[0-9]{0,4})?|\.[0-9]{1,4})"
+_REST = re.compile(
+    rf"\s*+(?:(?P<direction>{'|'.join(DIRECTIONS)})(?:\s+(?P<degrees>{_NUMBER})(?:°|\s*deg(?:rees)?)?)?"
+    rf"|(?P<seconds>{_NUMBER})\s?s|(?P<size>{_NUMBER}))(?=[\s,]|$),?",
+    re.IGNORECASE,
+)
+_MAX_NAME_WORDS = 2
+
+
+def parse_gesture(written: str, at: int) -> GestureMark | None:
+    """The gesture that is written between the brackets of a mark, for a character; None if it is none.
+
+    Raises
+    ------
+    InputError
+        A value is out of range, or a gesture without direction has one.
+    """
+    words = re.split(r"[\s_-]+", written.strip(), maxsplit=_MAX_NAME_WORDS)
+    for n_words in range(min(_MAX_NAME_WORDS, len(words)), 0, -1):
+        name = gesture_name("_".join(words[:n_words]))
+        if name is not None:
+            return _parse_rest(name, " ".join(words[n_words:]), at)
+    return _parse_rest("look_at", " ".join(words[1:]), at) if words[0].casefold() == "look" else None
+
+
+def _parse_rest(name: str, rest: str, at: int) -> GestureMark | None:
+    found: dict[str, float] = {}
+    place = 0
+    while rest[place:].strip():
+        part = _REST.match(rest, place)
+        if part is None:
+            return None
+        place = part.end()
+        if not part["direction"]:
+            found |= {key: float(part[key]) for key in ("seconds", "size") if part[key]}
+            continue
+        usual = DIRECTIONS[part["direction"].casefold()]
+        for key, degrees in zip(("down_deg", "left_deg"), usual, strict=True):
+            given = float(part["degrees"]) if part["degrees"] else abs(degrees)
+            if degrees:
+                found[key] = given if degrees > 0 else -given
+    return GestureMark(at, name, **found)
