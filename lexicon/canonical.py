@@ -38,6 +38,14 @@ _TRANSLATION = (
 )
 _SPOKEN_PUNCTUATION = frozenset(".,;:!?'-–/&@#%‰§¶^")
 _MARKS = re.compile("[\u0300-\u036f\u0483-\u0489\u1ab0-\u1aff\u1dc0-\u1dff\u20d0-\u20ff\ufe20-\ufe2f]+")
+# Canonical order puts signs of a consonant (shadda; dagesh, shin and sin dot) behind its vowels, where espeak-ng 1.52
+# drops the vowel of Arabic (mudarrsa) and spells Persian and Hebrew words ("Hebrew shin dot")
+_SIGNS_OF_CONSONANTS = (
+    # fathatan is written on the alif or on the letter before it; espeak-ng says its n only there (شكرًا)
+    (re.compile("\u064e?([\u0627\u0649])\u064b"), "\u064b\\1"),
+    (re.compile("([\u064b-\u0650\u0652\u0656-\u065e\u0670]+)(\u0651)"), r"\2\1"),
+    (re.compile("([\u05b0-\u05bb\u05c7]+)([\u05bc\u05c1\u05c2]+)"), r"\2\1"),
+)
 # Applied in order; each is linear in the text, as no pattern has overlapping repeats.
 _STEPS: tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...] = (
     (re.compile(r"\r"), "\n"),
@@ -94,10 +102,20 @@ def _strongest_mark(run: re.Match[str]) -> str:
     return max(run.group(), key=_STRENGTH.find) + (" " if run.group()[-1] == " " else "")
 
 
+def signs_before_vowels(text: str) -> str:
+    """A text in which the shadda of Arabic and the points of Hebrew consonants stand before the vowels of a letter."""
+    if text.isascii():
+        return text
+    for pattern, order in _SIGNS_OF_CONSONANTS:
+        text = pattern.sub(order, text)
+    return text
+
+
 def canonical_text(text: str, *, keep_marks: bool = False) -> str:
     """The text in canonical characters: NFKC, ASCII digits, plain quotes, single spaces, no adjacent marks.
 
-    Loose combining marks are removed unless `keep_marks` is set, for scripts that are written with them.
+    Loose combining marks are removed unless `keep_marks` is set, for scripts that are written with them, in the order
+    of `signs_before_vowels`.
     """
     text = _ABOUT.sub("about ", _AREA_CODE.sub(r"\1-", text))
     text = _SUPERSCRIPT.sub(lambda run: "^" + unicodedata.normalize("NFKC", run.group()).replace("−", "-"), text)
@@ -106,6 +124,8 @@ def canonical_text(text: str, *, keep_marks: bool = False) -> str:
     text = unicodedata.normalize("NFKC", text).translate(_translation_table())
     if not keep_marks:
         text = unicodedata.normalize("NFKC", _MARKS.sub("", text)).translate(_translation_table())
+    else:
+        text = signs_before_vowels(text)
     for pattern, replacement in _STEPS:
         text = pattern.sub(replacement, text)
     return _PUNCTUATION_RUN.sub(_strongest_mark, text).strip(" ,;:—").lstrip("… ")

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from lexicon import form_readers as forms
 from lexicon import written_forms as readings
-from lexicon.canonical import canonical_text
+from lexicon.canonical import canonical_text, signs_before_vowels
 from lexicon.capitals import sentence_case
 from lexicon.german_dates import read_german_dates
 from lexicon.japanese import has_kanji, to_kana
@@ -261,4 +261,4 @@ def spoken_form(text: str, language: str) -> str:
         text = read_german_dates(text)
     text = name_foreign_letters(text.translate(_AS_ESPEAK_READS), language)
     text = _LONG_NUMBER.sub(lambda number: " ".join(number.group()), text)
-    return add_vowels(_LONG_WORD.sub(r"\g<0> ", text), language)
+    return signs_before_vowels(add_vowels(_LONG_WORD.sub(r"\g<0> ", text), language))

@@ -26,16 +26,29 @@ NOTE = (
 def add_vowels(text: str, language: str) -> str:
     """A text with marks of its vowels, where the language is written without them and a model of it is installed.
 
-    A text with such marks stays as it is, as does one of another language. Letters do not change.
+    The marks of a text stay as they are: a word with marks at half of its letters or more gets no others, one with
+    fewer (شكراً) gets those of its other letters. Texts of other languages do not change, and letters never do.
     """
     if not _lacks_vowels(text, language) or len(text) > MAX_CHARACTERS:
         return text
     model = _model(language)
     if model is None:
         return text
-    marked = model(text)
+    plain = without_vowels(text, language)
+    marked = model(plain)
     # the models leave out what they have not learnt
-    return marked if without_vowels(marked, language) == text else _by_word(text, language, model)
+    if without_vowels(marked, language) != plain:
+        marked = _by_word(plain, language, model)
+    pairs = zip(re.split(r"(\s+)", text), re.split(r"(\s+)", marked), strict=True)
+    return "".join(_with_marks(own, other, _MARKS[language]) for own, other in pairs)
+
+
+def _with_marks(word: str, marked: str, marks: re.Pattern[str]) -> str:
+    """A word with the marks of another spelling of it at letters that have none, if most letters have none."""
+    if not _is_bare(word, marks):
+        return word
+    own, other = (re.findall(rf"[^{marks.pattern[1:-1]}]{marks.pattern}*", spelling) for spelling in (word, marked))
+    return "".join(mine if len(mine) > 1 else theirs for mine, theirs in zip(own, other, strict=True))
 
 
 def without_vowels(text: str, language: str) -> str:
@@ -51,7 +64,12 @@ def vowel_note(text: str, language: str) -> str:
 
 def _lacks_vowels(text: str, language: str) -> bool:
     marks = _MARKS.get(language)
-    return marks is not None and marks.search(text) is None and _LETTER.search(text) is not None
+    return marks is not None and any(_is_bare(word, marks) for word in text.split())
+
+
+def _is_bare(word: str, marks: re.Pattern[str]) -> bool:
+    """Whether fewer than half of the letters of a word have marks."""
+    return 2 * len(marks.findall(word)) < len(_LETTER.findall(word))
 
 
 def _by_word(text: str, language: str, model: Callable[[str], str]) -> str:
