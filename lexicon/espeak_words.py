@@ -13,7 +13,7 @@ from itertools import accumulate, pairwise
 from lexicon.chunks import split_chunks
 from lexicon.g2p import parse_espeak_word, phonemize
 from lexicon.ipa import IpaPhone
-from lexicon.written_words import WrittenWord, is_unspaced, written_words
+from lexicon.written_words import WrittenWord, espeak_text, is_unspaced, written_words
 
 MAX_SENTENCE_CHARACTERS = 1000  # of text that is read as a whole
 Segments = tuple[IpaPhone, ...]
@@ -29,7 +29,7 @@ def words_by_espeak(text: str, language: str) -> tuple[tuple[WrittenWord, Segmen
 
 def _words_of_sentence(sentence: str, language: str) -> list[tuple[WrittenWord, Segments]]:
     words = written_words(sentence, language)
-    (spoken,) = phonemize([sentence], language)
+    (spoken,) = phonemize([espeak_text(sentence, language)], language)
     whole = [segments for segments in (parse_espeak_word(word, language) for word in spoken) if segments]
     alone = [_alone(word.piece, language) for word in words]
     kept = [at for at, parts in enumerate(alone) if parts or any(map(str.isalnum, words[at].text))]

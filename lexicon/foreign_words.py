@@ -10,9 +10,8 @@ from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from lexicon.errors import BackendError
 from lexicon.g2p import languages
-from lexicon.japanese import has_kanji, load_reader
+from lexicon.japanese import has_kanji, has_reader
 from lexicon.marked_text import Mark, MarkedText, PhoneMark, StyleRun
 from lexicon.scripts import SCRIPTS, blank_given_words, foreign_runs, letter_name, letter_script, run_name, script_name
 from lexicon.text_language import guess_language
@@ -116,7 +115,7 @@ def _divided(text: str, start: int, end: int) -> Iterator[ForeignWords]:
     """Foreign words with their language, by parts where no language reads all of them."""
     words = text[start:end]
     script, spoken = script_name(_script_of(words)), guess_language(unicodedata.normalize("NFKC", words), "")
-    if spoken == "ja" and has_kanji(words) and not _has_reader():
+    if spoken == "ja" and has_kanji(words) and not has_reader():
         starts = [part.start() for part in _KANJI.finditer(words)]
         parts = list(zip(starts, [*starts[1:], len(words)], strict=True))
     elif spoken in languages() and not any(True for _ in foreign_runs(words, spoken)):
@@ -141,14 +140,6 @@ def _scripts(words: str) -> Iterator[tuple[int, int]]:
             start = at
         before = script
     yield start, len(words)
-
-
-def _has_reader() -> bool:
-    try:
-        load_reader()
-    except BackendError:
-        return False
-    return True
 
 
 def _rewritten(text: MarkedText, words: Sequence[ForeignWords]) -> MarkedText:

@@ -16,6 +16,7 @@ from lexicon.normalize import spoken_form
 from lexicon.pauses import MARKS
 from lexicon.pronounce import Word, pronounce
 from lexicon.tones import EVEN, Tone
+from lexicon.written_words import spaced_words
 
 _STEM = "qzx"  # of the placeholders of given words during normalisation; not a word of any language
 
@@ -84,10 +85,11 @@ def words_with_given_phones(written: str, phones: Sequence[PhoneMark], language:
         Their places are characters of `written`; in order, none within another.
     """
     if not phones:
-        return tuple(TextWord(word) for word in spoken_form(written, language).split())
+        return tuple(TextWord(word) for word in spaced_words(spoken_form(written, language), language))
     names = _placeholders(written, len(phones))
     placeholder = re.compile(rf"{_placeholder_stem(written)}[a-z]+")
-    spoken = spoken_form("".join(_pieces_of_phones(written, phones, names)), language).split()
+    normalised = spoken_form("".join(_pieces_of_phones(written, phones, names)), language)
+    spoken = spaced_words(normalised, language)
     marks = dict(zip(names, phones, strict=True))
     words: list[TextWord] = []
     for word in spoken:

@@ -1,21 +1,44 @@
-"""Spoken katakana of Japanese text with Chinese characters, by pyopenjtalk-plus (extra ``[japanese]``).
+"""Accent phrases of Japanese text with their reading in kana, by pyopenjtalk-plus (extra ``[japanese]``).
 
-Texts in kana alone are read by espeak-ng, which cannot read Chinese characters.
+Without the library texts in kana alone are read by their spelling: the particles は and へ at the end of what is
+written between spaces or marks are wa and e.
 """
 
 import functools
 import os
 import re
-from collections.abc import Iterator, Mapping
+import unicodedata
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from lexicon.chunks import split_chunks
-from lexicon.errors import import_of_extra
+from lexicon.errors import BackendError, import_of_extra
 
 _KANJI = re.compile("[㐀-䶿一-鿿豈-﫿々〆〇𠀀-𪛟]")
 _KANA = re.compile("[ァ-ヺー]+")
-_PUNCTUATION = frozenset("。、？！…，．")
+_OF_NUMBERS = frozenset("0123456789０１２３４５６７８９.,．，")
+_MINUS = str.maketrans("−", "-")
+_MARKS = "。、，．！？…!?,;:；："
+# what stands between marks and spaces, with the brackets around it
+_PLAIN = re.compile(rf"[^\s{_MARKS}「」『』（）()・]+")
+_PARTICLE = re.compile(r"(?<=[ぁ-ゖー])[はへ]\Z")
+_PARTICLES = {"は": "わ", "へ": "え"}
+_NO_PARTICLE = frozenset({"はは"})
+# espeak-ng 1.52 says r-a-o for りょ
+_AS_ESPEAK_READS = tuple(
+    (re.compile(f"(?<=[りリ])[{small}]"), large) for small, large in (("ゃャ", "ヤ"), ("ゅュ", "ユ"), ("ょョ", "ヨ"))
+)
 MAX_CHARACTERS = 300  # per call; the library rejects texts of about 8,000 bytes
+
+
+@dataclass(frozen=True, slots=True)
+class JapanesePhrase:
+    """Half-open range of characters of an accent phrase, and its kana; several readings of a number are one phrase."""
+
+    start: int
+    end: int
+    kana: str
 
 
 def has_kanji(text: str) -> bool:
@@ -35,18 +58,126 @@ def load_reader() -> Any:
     return pyopenjtalk
 
 
+def has_reader() -> bool:
+    """Whether the library that reads Chinese characters is installed."""
+    try:
+        load_reader()
+    except BackendError:
+        return False
+    return True
+
+
 def to_kana(text: str) -> str:
-    """Spoken form in katakana (particles wa and e, long vowels, numbers), with spaces between accent phrases."""
+    """Spoken form in kana (particles wa and e, long vowels, numbers), with spaces between accent phrases."""
+    pieces, at = list[str](), 0
+    for phrase in japanese_phrases(text):
+        pieces += [_marks_of(text[at : phrase.start]), " ", phrase.kana]
+        at = phrase.end
+    return "".join([*pieces, _marks_of(text[at:])]).strip()
+
+
+def japanese_phrases(text: str) -> tuple[JapanesePhrase, ...]:
+    """Accent phrases of a text in order.
+
+    Raises
+    ------
+    BackendError
+        The text has Chinese characters, and the library that reads them is not installed.
+    """
+    if not has_kanji(text) and not has_reader():
+        return tuple(_plain_phrases(text))
     read = load_reader().run_frontend
-    return " ".join("".join(_kana_pieces(read(chunk))).strip() for chunk in split_chunks(text, MAX_CHARACTERS, "ja"))
+    found, start = list[JapanesePhrase](), 0
+    for chunk in split_chunks(text, MAX_CHARACTERS, "ja"):
+        end = start
+        for piece in chunk.split(" "):  # white space alone is dropped
+            end = text.index(piece, end) + len(piece)
+        found += _phrases(read(chunk), _folded(text[start:end]), start)
+        start = end
+    return tuple(_whole_numbers(found, text))
 
 
-def _kana_pieces(words: list[Mapping[str, Any]]) -> Iterator[str]:
-    """Pieces of a sentence; `chain_flag` 1 joins a word to the phrase before it."""
-    for number, word in enumerate(words):
+def as_espeak_reads(kana: str) -> str:
+    """Kana that espeak-ng says as they are spoken."""
+    for pattern, large in _AS_ESPEAK_READS:
+        kana = pattern.sub(large, kana)
+    return kana
+
+
+def _marks_of(text: str) -> str:
+    return "".join(sign for sign in text if sign in _MARKS)
+
+
+def _plain_phrases(text: str) -> Iterator[JapanesePhrase]:
+    for part in _PLAIN.finditer(text):
+        word = part.group()
+        kana = word if word in _NO_PARTICLE else _PARTICLE.sub(lambda found: _PARTICLES[found.group()], word)
+        yield JapanesePhrase(part.start(), part.end(), kana)
+
+
+def _folded(text: str) -> tuple[str, list[int]]:
+    """A text in canonical characters, and for each of them the index of the character that it is of, and the end."""
+    parts = [unicodedata.normalize("NFKC", character).translate(_MINUS) for character in text]
+    return "".join(parts), [at for at, part in enumerate(parts) for _ in part] + [len(text)]
+
+
+def _phrases(
+    words: Sequence[Mapping[str, Any]], letters: tuple[str, list[int]], start: int
+) -> Iterator[JapanesePhrase]:
+    """Phrases of the words of a reader; `chain_flag` 1 joins a word to the phrase before it."""
+    found: list[JapanesePhrase] = []
+    for word, (first, last) in zip(words, _spans(words, letters), strict=True):
         # the library marks devoiced vowels by ’, and writes the particle ヲ, which is spoken オ
-        written, spoken = str(word["string"]), str(word["pron"]).replace("’", "").replace("ヲ", "オ")
+        spoken = str(word["pron"]).replace("’", "").replace("ヲ", "オ")
         if not _KANA.fullmatch(spoken):
-            yield written if written in _PUNCTUATION else f" {written} " if written.isalnum() else " "
+            continue
+        is_same = bool(found) and start + first < found[-1].end
+        if found and (is_same or word["chain_flag"] == 1):
+            space = " " * (word["chain_flag"] != 1)
+            before = found.pop()
+            found.append(JapanesePhrase(before.start, start + last, before.kana + space + spoken))
         else:
-            yield spoken if number == 0 or word["chain_flag"] == 1 else f" {spoken}"
+            found.append(JapanesePhrase(start + first, start + last, spoken))
+    return iter(found)
+
+
+def _whole_numbers(phrases: Sequence[JapanesePhrase], text: str) -> Iterator[JapanesePhrase]:
+    """Phrases of which none begins within a number (3.|5ドル)."""
+    whole: JapanesePhrase | None = None
+    for phrase in phrases:
+        is_inside = whole is not None and whole.end == phrase.start and text[phrase.start].isdigit()
+        if whole is not None and is_inside and text[whole.end - 1] in _OF_NUMBERS:
+            whole = JapanesePhrase(whole.start, phrase.end, f"{whole.kana} {phrase.kana}")
+            continue
+        if whole is not None:
+            yield whole
+        whole = phrase
+    if whole is not None:
+        yield whole
+
+
+def _spans(words: Sequence[Mapping[str, Any]], letters: tuple[str, list[int]]) -> list[tuple[int, int]]:
+    """Range of each word in the text; the words of a number (十, 四) share the range of its digits."""
+    text, places = letters
+    spans: list[tuple[int, int]] = []
+    at = n_waiting = 0
+    for word in words:
+        written = unicodedata.normalize("NFKC", str(word["string"])).translate(_MINUS)
+        place = text.find(written, at, at + len(written) + MAX_CHARACTERS)
+        gap = text[at:place]
+        is_number = n_waiting > 0 and any(map(str.isdigit, gap))
+        if place < 0 or not (is_number or not any(map(str.isalnum, gap))):
+            n_waiting += 1
+            spans.append((at, at))
+            continue
+        first = _after_space(text, at, place)
+        spans[len(spans) - n_waiting :] = [(first, place)] * n_waiting
+        at, n_waiting = place + len(written), 0
+        spans.append((place, at))
+    first = _after_space(text, at, len(text))
+    spans[len(spans) - n_waiting :] = [(first, len(text.rstrip()))] * n_waiting
+    return [(places[first], places[max(last - 1, first)] + (last > first)) for first, last in spans]
+
+
+def _after_space(text: str, first: int, last: int) -> int:
+    return last - len(text[first:last].lstrip())

@@ -14,7 +14,6 @@ from lexicon import written_forms as readings
 from lexicon.canonical import canonical_text, signs_before_vowels
 from lexicon.capitals import sentence_case
 from lexicon.german_dates import read_german_dates
-from lexicon.japanese import has_kanji, to_kana
 from lexicon.number_words import MAX_CARDINAL_DIGITS
 from lexicon.pauses import MARKS
 from lexicon.scripts import name_foreign_letters, name_letters_in_words
@@ -243,20 +242,12 @@ def normalize(text: str, language: str = "en-us") -> str:
 def spoken_form(text: str, language: str) -> str:
     """Spoken form of a text.
 
-    English is normalised, days of German dates are written as words, Japanese with Chinese characters is converted to
-    kana, Arabic and Hebrew get vowels where a model of them is installed, and single letters of other writing systems
-    are replaced by their names. A word of more than 100 letters is
-    divided, and the digits of a longer number than English names are separated.
-
-    Raises
-    ------
-    BackendError
-        The text is Japanese with Chinese characters, and the library that reads them is not installed.
+    English is normalised, days of German dates are written as words, Arabic and Hebrew get vowels where a model of them
+    is installed, and single letters of other writing systems are replaced by their names. A word of more than 100
+    letters is divided, and the digits of a longer number than English names are separated.
     """
     if language.startswith("en"):
         return _LONG_WORD.sub(r"\g<0> ", normalize(text))
-    if language == "ja" and has_kanji(text):
-        text = to_kana(text)
     if language.partition("-")[0] == "de":
         text = read_german_dates(text)
     text = name_foreign_letters(text.translate(_AS_ESPEAK_READS), language)

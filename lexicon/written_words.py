@@ -1,10 +1,15 @@
-"""Words of a text as they are written, in languages that espeak-ng reads: 3,5 and € and aujourd'hui are one each."""
+"""Words of a text as they are written, in languages that espeak-ng reads: 3,5 and € and aujourd'hui are one each.
+
+Where espeak-ng is given another spelling than the written one (kana of Japanese), each word has both.
+"""
 
 import re
 import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
+from lexicon.japanese import as_espeak_reads, japanese_phrases, to_kana
 from lexicon.pauses import MARK_OF_SIGN, PAUSES_S
 from lexicon.sentence_ends import ends_sentence
 
@@ -16,13 +21,13 @@ _UNSPACED = frozenset({"cmn", "yue", "hak"})
 _CHARACTER = r"[\u3400-\u9fff\uf900-\ufaff\U00020000-\U0003ffff]"
 _CHARACTERS = re.compile(rf"{_CHARACTER}|(?:(?!{_CHARACTER}).)+")
 _SPOKEN_SIGNS = frozenset("%‰&@#§")  # punctuation of Unicode with a name that is spoken
-_MARK_OF_SIGN = {**MARK_OF_SIGN, "(": ",", ")": ","}
+_MARK_OF_SIGN = {**MARK_OF_SIGN, **dict.fromkeys("()（）", ",")}
 _STRENGTH = " " + "".join(PAUSES_S)  # from none
 
 
 @dataclass(frozen=True, slots=True)
 class WrittenWord:
-    """A word, the text between spaces of which it is a part, and the strongest mark after it (or none)."""
+    """A word, what espeak-ng reads of it (with the signs around it), and the strongest mark after it (or none)."""
 
     text: str
     piece: str
@@ -34,8 +39,36 @@ def is_unspaced(language: str) -> bool:
     return language.partition("-")[0] in _UNSPACED
 
 
+def espeak_text(text: str, language: str) -> str:
+    """What espeak-ng reads of a text: Japanese in kana, other languages as they are.
+
+    Raises
+    ------
+    BackendError
+        The text is Japanese with Chinese characters, and the library that reads them is not installed.
+    """
+    return as_espeak_reads(to_kana(text)) if language == "ja" else text
+
+
+def spaced_words(text: str, language: str) -> list[str]:
+    """A text as it is written, divided at its spaces, and in Japanese into accent phrases."""
+    if language != "ja":
+        return text.split()
+    starts = [phrase.start for phrase in japanese_phrases(text)[1:]]
+    pieces = (text[first:last] for first, last in pairwise([0, *starts, len(text)]))
+    return ["".join(piece.split()) for piece in pieces if piece.strip()]
+
+
 def written_words(text: str, language: str) -> tuple[WrittenWord, ...]:
-    """Words of a text in order; signs that are spoken (€, %) are words, punctuation is none."""
+    """Words of a text in order; signs that are spoken (€, %) are words, punctuation is none.
+
+    Raises
+    ------
+    BackendError
+        As `espeak_text`.
+    """
+    if language == "ja":
+        return tuple(_japanese_words(text))
     found: list[WrittenWord] = []
     for start, piece in _pieces(text, language):
         first, last = _span_of_word(piece)
@@ -46,6 +79,17 @@ def written_words(text: str, language: str) -> tuple[WrittenWord, ...]:
             mark = _mark(text, start + last, start + len(piece), language)
             found.append(WrittenWord(piece[first:last], piece, mark))
     return tuple(found)
+
+
+def _japanese_words(text: str) -> Iterator[WrittenWord]:
+    """Accent phrases of a text."""
+    phrases = japanese_phrases(text)
+    for phrase, following in zip(phrases, [*phrases[1:], None], strict=False):
+        end = len(text) if following is None else following.start
+        written = text[phrase.start : phrase.end]
+        first, last = _span_of_word(written)
+        mark = _mark(text, phrase.start + last, end, "ja")
+        yield WrittenWord(written[first:last] or written, as_espeak_reads(phrase.kana), mark)
 
 
 def _pieces(text: str, language: str) -> Iterator[tuple[int, str]]:

@@ -82,10 +82,18 @@ def test_other_languages_emphasise_common_and_long_words() -> None:
     assert emphasised("Das ist *sehr* gut.", "de") == [("sehr", 1.0)]
 
 
-def test_in_writing_without_spaces_asterisks_are_left_out() -> None:
+@pytest.mark.needs("pyopenjtalk")
+def test_japanese_emphasises_accent_phrases() -> None:
     assert emphasised("これは*とても*いい。", "ja") == [("とても", 1.0)]
     (sentence,) = split_sentences(parse_marks("これは*とても*いい。", "ja"), "ja")
     assert sentence.utterances[0].source == "これはとてもいい。"
+    assert [word.text for word in sentence.utterances[0].words if word.tone.emphasis] == ["とても"]
+
+
+def test_in_writing_without_spaces_asterisks_are_left_out() -> None:
+    assert emphasised("这*很*好。", "cmn") == [("很", 1.0)]
+    (sentence,) = split_sentences(parse_marks("这*很*好。", "cmn"), "cmn")
+    assert sentence.utterances[0].source == "这很好。"
     assert not any(word.tone.emphasis for word in sentence.utterances[0].words)
 
 

@@ -4,11 +4,14 @@ import re
 import sys
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from lexicon import japanese
 from lexicon.errors import BackendError
 from lexicon.pronounce import pronounce
 from lexicon.scripts import check_script
+from lexicon.written_words import written_words
 from tests.lexicon.japanese_readings import READINGS
 from tts2face.sound.voice_pool import load_voice
 
@@ -37,9 +40,48 @@ def test_long_texts_are_read_piece_by_piece() -> None:
     assert reading("今日" * 5000).count("キョー") > 4000
 
 
-def test_texts_in_kana_are_passed_to_espeak_unchanged() -> None:
-    assert not japanese.has_kanji("こんにちは、カタカナ。 abc 3")
-    assert pronounce("きょうは", "ja").words[0].text == "きょうは"
+@JAPANESE
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("お母さんは料理が 上手です！", "お母さんは|料理が|上手です!"),
+        ("価格は3.5ドルと1,500円。", "価格は|3.5ドルと|1,500円."),
+        ("１４時３０分に2人、来た。", "１４時|３０分に|2人,|来た."),
+        ("「東京」へ（明日）行く…", "東京|へ,|明日,|行く…"),
+        ("10枚と十枚\n次の日", "10枚と|十枚|次の日"),
+        ("ｶﾀｶﾅと😀絵文字", "ｶﾀｶﾅと|絵文字"),
+    ],
+)
+def test_words_are_accent_phrases_as_they_are_written(text: str, words: str) -> None:
+    assert "|".join(word.text + word.mark for word in written_words(text, "ja")) == words
+
+
+@JAPANESE
+@given(st.text("東京は3.5本へりょABｱ 、。😀\n-％", max_size=40))
+def test_phrases_are_ranges_of_the_text_in_order(text: str) -> None:
+    at = 0
+    for phrase in japanese.japanese_phrases(text):
+        assert at <= phrase.start < phrase.end <= len(text)
+        at = phrase.end
+
+
+@JAPANESE
+def test_kana_are_read_as_sentences_too() -> None:
+    assert reading("わたしは がっこうへ いきます。") == "ワタシワガッコーエイキマス"
+    assert reading("100000えん") == "ジューマンエン"
+
+
+def test_kana_without_the_reader_have_their_particles(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(japanese, "has_reader", lambda: False)
+    assert japanese.to_kana("わたしは がっこうへ いきます。では、はは は はを みがく。") == (
+        "わたしわ がっこうえ いきます。 でわ、 はは は はを みがく。"
+    )
+
+
+@pytest.mark.parametrize(("written", "phones"), [("りょうり", "ɽijoɯɽi"), ("リャマ", "ɽijama"), ("りゅう", "ɽijɯɯ")])
+def test_espeak_says_no_vowel_before_a_small_y(written: str, phones: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(japanese, "has_reader", lambda: False)
+    assert "".join(pronounce(written, "ja").phones) == phones
 
 
 @JAPANESE

@@ -29,6 +29,7 @@ from lexicon.phones import PHONES, nearest_phones, phone_distance
 from lexicon.pronounce import Word, has_dictionary
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan, enforce_increasing
 from lexicon.vowels import without_vowels
+from lexicon.written_words import espeak_text, spaced_words
 from tts2face.sound.voice import (
     PronunciationMap,
     SpeechInput,
@@ -191,9 +192,10 @@ class EspeakVoice:
         words = [_SpokenWord(word.text, word.phones) for word in spoken]
         if isinstance(content, str):
             plain = _without_brackets(spoken_form(content, self._language))
-            if not any(map(self._look_up, plain.split())):
-                return plain, words
-            content = [SpokenWord(word, ()) for word in plain.split()]
+            pieces = spaced_words(plain, self._language)
+            if not any(map(self._look_up, pieces)):
+                return espeak_text(plain, self._language), words
+            content = [SpokenWord(word, ()) for word in pieces]
         written = [word if word.segments else self._pronounce(word) for word in content]
         return " ".join(map(_word_mnemonic, written)), words
 
@@ -203,7 +205,10 @@ class EspeakVoice:
     def _pronounce(self, word: SpokenWord) -> SpokenWord:
         """A word with its phones in the user's dictionary, or without phones."""
         text = "".join(_without_brackets(word.text).split())
-        return SpokenWord(text, self._look_up(text) or (), word.after)
+        own = self._look_up(text)
+        return (
+            SpokenWord(text, own, word.after) if own else SpokenWord(espeak_text(text, self._language), (), word.after)
+        )
 
     def _phoneme_events(self, header: Mapping[str, Any], sound: NDArray[np.float32]) -> list[_PhonemeEvent]:
         found: list[_PhonemeEvent] = []
