@@ -22,12 +22,17 @@ _LANGUAGE_SWITCH = re.compile(r"\([a-z0-9-]+\)")  # espeak-ng marks foreign word
 _TONE_LANGUAGES = frozenset({"cmn", "hak", "yue", "vi", "th", "my", "shn"})
 _TONE_SPELLINGS = (
     (re.compile(r"ɜ(?!ː)|[0-9]|-"), ""),
-    (re.compile(r"ts\.?h"), "tsh"),
     (re.compile(r"ts\."), "ʈʂ"),
     (re.compile(r"s\."), "ʂ"),
     (re.compile(r"(?<=[ptkqscɕʂ])h"), "ʰ"),
     (re.compile(r"nɡ"), "ŋ"),
 )
+# Vowels that espeak-ng 1.52 writes as others of their language: unrounded ones as y (мы, mưa, noite) and o (个), and
+# Turkish ü as ø, where ö is œ.
+_VOWEL_SPELLINGS = MappingProxyType({
+    "cmn": (re.compile("o-"), "ɤ"), "vi": (re.compile("y"), "ɯ"), "ru": (re.compile("y"), "ɨ"),
+    "pt-br": (re.compile("y"), "i"), "tr": (re.compile("ø"), "y"),
+})  # fmt: skip
 _SPELLINGS = (
     (re.compile(r"r\."), "ɽ"),
     (re.compile(r"sx"), "ɧ"),  # Swedish sju
@@ -125,6 +130,9 @@ def parse_espeak_word(written: str, language: str) -> tuple[IpaPhone, ...]:
     InputError
         It contains a letter that is not a phone of the table.
     """
+    if language in _VOWEL_SPELLINGS:
+        pattern, vowel = _VOWEL_SPELLINGS[language]
+        written = pattern.sub(vowel, written)
     is_tonal = language.partition("-")[0] in _TONE_LANGUAGES
     for pattern, ipa in (*_TONE_SPELLINGS, *_SPELLINGS) if is_tonal else _SPELLINGS:
         written = pattern.sub(ipa, written)

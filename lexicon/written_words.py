@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from lexicon.japanese import as_espeak_reads, japanese_phrases, to_kana
+from lexicon.mandarin import espeak_characters
 from lexicon.pauses import MARK_OF_SIGN, PAUSES_S
 from lexicon.sentence_ends import ends_sentence
 
@@ -17,6 +18,7 @@ _CONTEXT_BEFORE, _CONTEXT_AFTER = 24, 40  # characters by which `ends_sentence` 
 # digits in groups of three with spaces between are one number: 12 000 zł
 _PIECE = re.compile(r"[^\s\w]*\d{1,3}(?: \d{3})+(?!\d)\S*|\S+")
 # Chinese is written without spaces, and espeak-ng reads it character by character
+_MANDARIN = "cmn"
 _UNSPACED = frozenset({"cmn", "yue", "hak"})
 _CHARACTER = r"[\u3400-\u9fff\uf900-\ufaff\U00020000-\U0003ffff]"
 _CHARACTERS = re.compile(rf"{_CHARACTER}|(?:(?!{_CHARACTER}).)+")
@@ -40,14 +42,16 @@ def is_unspaced(language: str) -> bool:
 
 
 def espeak_text(text: str, language: str) -> str:
-    """What espeak-ng reads of a text: Japanese in kana, other languages as they are.
+    """What espeak-ng reads of a text: Japanese in kana, Mandarin in characters of the reading that is wanted.
 
     Raises
     ------
     BackendError
         The text is Japanese with Chinese characters, and the library that reads them is not installed.
     """
-    return as_espeak_reads(to_kana(text)) if language == "ja" else text
+    if language == "ja":
+        return as_espeak_reads(to_kana(text))
+    return "".join(espeak_characters(text)) if language == _MANDARIN else text
 
 
 def spaced_words(text: str, language: str) -> list[str]:
@@ -70,6 +74,7 @@ def written_words(text: str, language: str) -> tuple[WrittenWord, ...]:
     if language == "ja":
         return tuple(_japanese_words(text))
     found: list[WrittenWord] = []
+    characters = espeak_characters(text) if language == _MANDARIN else text
     for start, piece in _pieces(text, language):
         first, last = _span_of_word(piece)
         if found and (mark := _mark(text, start, start + first, language)):  # the dash, French "?", a bracket
@@ -77,7 +82,8 @@ def written_words(text: str, language: str) -> tuple[WrittenWord, ...]:
             found[-1] = replace(found[-1], mark=strongest)
         if first < last:
             mark = _mark(text, start + last, start + len(piece), language)
-            found.append(WrittenWord(piece[first:last], piece, mark))
+            read = "".join(characters[start : start + len(piece)])
+            found.append(WrittenWord(piece[first:last], read, mark))
     return tuple(found)
 
 

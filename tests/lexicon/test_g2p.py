@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from lexicon.errors import InputError
-from lexicon.g2p import check_language, languages, parse_espeak_word, phonemize
+from lexicon.g2p import check_language, languages, parse_espeak_word, phonemize, segments_by_rules
 from lexicon.scripts import check_script
 
 SENTENCES = {
@@ -149,3 +149,15 @@ def test_threads_get_their_own_answers() -> None:
 def test_english_words_within_tone_languages_keep_their_vowel(text: str, language: str) -> None:
     (words,) = phonemize([text], language)
     assert "ɜ" in {segment.phone for segment in parse_espeak_word(words[-1], language)}
+
+
+@pytest.mark.parametrize(
+    ("text", "language", "phones"),
+    [
+        ("个", "cmn", "kɤ"), ("车", "cmn", "ʈʂɤ"), ("我", "cmn", "wo"), ("mưa", "vi", "mɯə"), ("tôi", "vi", "toj"),
+        ("мы", "ru", "mɨ"), ("noite", "pt-br", "noɪtʃi"), ("gün", "tr", "ɟyn"), ("göl", "tr", "ɟœl"),
+    ],
+)  # fmt: skip
+def test_rounded_vowels_are_those_of_the_language(text: str, language: str, phones: str) -> None:
+    (segments,) = segments_by_rules([text], language)
+    assert "".join(segment.phone for segment in segments) == phones
