@@ -6,7 +6,7 @@ with its degrees or without. ``[look left]`` is short for ``[look at left]``.
 
 import re
 
-from lexicon.gesture_names import DIRECTIONS, GESTURES, gesture_name
+from lexicon.gesture_names import DIRECTIONS, GESTURES, SIDES, gesture_name
 from lexicon.marked_text import GestureMark
 
 FIRST_WORDS = tuple(dict.fromkeys([*(name.partition("_")[0] for name in GESTURES)]))
@@ -46,6 +46,8 @@ def _parse_rest(name: str, rest: str, at: int) -> GestureMark | None:
         if not part["direction"]:
             found |= {key: float(part[key]) for key in ("seconds", "size") if part[key]}
             continue
+        if GESTURES[name].directions == "side" and (part["degrees"] or part["direction"].casefold() not in SIDES):
+            return None
         usual = DIRECTIONS[part["direction"].casefold()]
         for key, degrees in zip(("down_deg", "left_deg"), usual, strict=True):
             given = float(part["degrees"]) if part["degrees"] else abs(degrees)

@@ -37,7 +37,7 @@ GESTURES: Mapping[str, GestureName] = MappingProxyType({
     "laugh": GestureName("a laugh without sound: mouth, cheeks, lids and head"),
     "sigh": GestureName("a deep breath: head and lids rise and sink"),
     "surprise": GestureName("the brows rise, the lids open wide, the jaw drops a little"),
-    "think": GestureName("the eyes go up and aside, the brows together"),
+    "think": GestureName("the eyes go up and aside, the brows together", "any"),
     "listen": GestureName("the head tilts and nods a little, the eyes on the viewer"),
 })  # fmt: skip
 

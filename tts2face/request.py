@@ -314,7 +314,7 @@ class Request:
         "Expressions to add (sad, happy, afraid, angry, surprised) with weights and times in seconds: "
         "happy=0.6@1.2-3.4,sad=0.3; or video: the smile of the person in the video of --audio (extra capture).",
     )
-    timeline: Path | None = option(None, "JSON file with styles, expressions, nods and gains over time.")
+    timeline: Path | None = option(None, "JSON file with styles, expressions, gestures and gains over time.")
     pitch: bool = option(False, "Gestures follow the pitch of the voice in addition to its loudness.")
     gaze: str = option(
         CONVERSATION,

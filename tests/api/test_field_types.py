@@ -26,14 +26,13 @@ from corpus_tools.training.network_audio_map import NetworkMapOptions
 from lexicon.errors import InputError
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.gestures.elements import (
-    BrowRaise,
     ChannelEdit,
     ExpressionCurve,
     ExpressionSpan,
     Gains,
     GazeTarget,
+    Gesture,
     ListeningSpan,
-    Nod,
     StrengthCurve,
     StyleSpan,
 )
@@ -63,8 +62,8 @@ MADE: tuple[Any, ...] = (
     SubtitleOptions(), ServiceSettings(), Performance(take=Path("a.mp4")), StreamFormat("mp3", Picture()),
     SynthesisOptions(), FieldOptions(), ExcludedToken("a", 0.0), SentenceEdges("a", 0, ("a",), (0.0, 0.1)),
     StyleMix("neutral"), Reference(KEPT, project=Project()),
-    StyleSpan("head", "sad", 0.0), ExpressionSpan("happy", 0.5), GazeTarget(0.0, 0.0), ListeningSpan(), Nod(0.0),
-    BrowRaise(0.0), StrengthCurve("head", ((0.0, 1.0),)), ExpressionCurve("happy", ((0.0, 1.0),)),
+    StyleSpan("head", "sad", 0.0), ExpressionSpan("happy", 0.5), GazeTarget(0.0, 0.0), ListeningSpan(), Gesture(0.0),
+    StrengthCurve("head", ((0.0, 1.0),)), ExpressionCurve("happy", ((0.0, 1.0),)),
     ChannelEdit("jawOpen", ((0.0, 1.0),)), Gains(),
     WordSpan("a", 0, 1), SPEECH, Clip(Trajectory(["a"], np.zeros((3, 1)), 30.0), resting_head(3, 30.0), SPEECH),
     RunOptions(), MarkerOptions(), StyleSource(recordings=Path("a")), LookChoices(), StudyOptions(), MoodOptions(),

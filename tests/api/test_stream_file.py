@@ -24,7 +24,7 @@ TEXT = (
 )
 SMALL = tts2face.Picture(size="64x64", supersampling=1)
 BEYOND = [
-    {"nods": [{"time": 50}]}, {"brow_raises": [{"time": 50}]}, {"listens": [{"start": 50}]},
+    {"nods": [{"time": 50}]}, {"gestures": [{"time": 50, "name": "wink"}]}, {"listens": [{"start": 50}]},
     {"gaze": [{"down_deg": 1, "left_deg": 1, "start": 50}]},
     {"expressions": [{"expression": "happy", "weight": 0.5, "start": 0.5, "end": 50}]},
     {"spans": [{"feature": "head", "style": "neutral", "start": 50}]},

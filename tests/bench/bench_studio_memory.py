@@ -93,7 +93,9 @@ def open_project(client: httpx.Client, text: str, voice: str) -> tuple[float, in
     edit = {"kind": "request", "options": {"voice": voice}}
     client.post(f"/projects/{number}/edits", json={"edit": edit}).raise_for_status()
     fetch(client, number)
-    client.post(f"/projects/{number}/edits", json={"edit": {"kind": "nod", "time": 2.0, "size": 1.0}})
+    client.post(
+        f"/projects/{number}/edits", json={"edit": {"kind": "gesture", "name": "nod", "time": 2.0, "size": 1.0}}
+    )
     return fetch(client, number)
 
 

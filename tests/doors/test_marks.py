@@ -43,7 +43,7 @@ def test_marks_come_with_their_words_on_the_whole_clip_s_clock(fps: float, ready
     text = "One two. [style:head=annoyed]Three [nod]four. Five. Six [pause 0.7]seven[/style] eight. [nod]Nine."
     found = pieces(text, ready, fps=fps)
     at = words(found)
-    nods = [nod.time for piece in found for nod in piece.timeline.nods]
+    nods = [nod.time for piece in found for nod in piece.timeline.gestures]
     np.testing.assert_allclose(nods, [at["four"], at["Nine"]], atol=1e-3)
     spans = [span for piece in found for span in piece.timeline.spans]
     assert all(isinstance(span, StyleSpan) and span.feature == "head" for span in spans)
@@ -138,7 +138,7 @@ def test_a_recording_s_words_carry_marks(ready: Session, takes: Path) -> None:
         ready.stream(Request(audio=film, text="bin [style:head=annoyed]blue at F[/style] two [nod]now", fps=60.0))
     )
     at = words(found)
-    assert [nod.time for piece in found for nod in piece.timeline.nods] == pytest.approx([at["now"]])
+    assert [nod.time for piece in found for nod in piece.timeline.gestures] == pytest.approx([at["now"]])
     spans = [span for piece in found for span in piece.timeline.spans]
     assert spans[0].start == pytest.approx(at["blue"])
     assert at["F"] < spans[-1].end <= at["two"] + 1e-6

@@ -5,7 +5,7 @@ import pytest
 
 from lexicon.errors import InputError
 from tts2face.gestures import prosody, stream
-from tts2face.gestures.elements import ExpressionSpan, Gains, Nod, StyleSpan
+from tts2face.gestures.elements import ExpressionSpan, Gains, Gesture, StyleSpan
 from tts2face.gestures.field import FieldOptions
 from tts2face.gestures.noise import NoiseStream, blink_closure, blinks_per_second, perlin_noise
 from tts2face.gestures.stream import GestureFields, GestureStream, style_median
@@ -123,7 +123,9 @@ def test_a_span_begins_and_ends_without_a_pop(fields):
 def test_expressions_nods_and_gains(fields):
     plain = _made(fields)
     timeline = Timeline(
-        expressions=(ExpressionSpan("sad", 0.6, 2.0, 4.0),), nods=(Nod(1.0, 1.0),), gains=Gains({"gaze": 0.5})
+        expressions=(ExpressionSpan("sad", 0.6, 2.0, 4.0),),
+        gestures=(Gesture(1.0, size=1.0),),
+        gains=Gains({"gaze": 0.5}),
     )
     made = _made(fields, timeline)
     added = made["expression"] - plain["expression"]

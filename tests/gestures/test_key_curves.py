@@ -9,13 +9,12 @@ from hypothesis import strategies as st
 
 from lexicon.errors import DataError, InputError
 from tts2face.gestures.elements import (
-    BrowRaise,
     ChannelEdit,
     ExpressionCurve,
     ExpressionSpan,
     GazeTarget,
+    Gesture,
     ListeningSpan,
-    Nod,
     StrengthCurve,
     StyleSpan,
     interpolate_keys,
@@ -38,8 +37,7 @@ WHOLE = Timeline(
     style={"head": "wild"},
     spans=(StyleSpan("brows", "wild", 1.0, 2.0),),
     expressions=(ExpressionSpan("happy", 0.5, 1.0, 2.0),),
-    nods=(Nod(0.5, 1.5),),
-    brow_raises=(BrowRaise(1.0, 0.5),),
+    gestures=(Gesture(0.5, size=1.5),),
     listens=(ListeningSpan(0.5, 1.0, reacts=False), ListeningSpan(2.0)),
     gaze=(GazeTarget(-5.0, 20.0, 1.0, 2.0), GazeTarget(0.0, 0.0, 2.0, np.inf)),
     strengths=(StrengthCurve("head", ((0.0, 0.0), (2.0, 1.5))),),
@@ -83,7 +81,7 @@ def test_strength_scales_one_feature_over_time(palette: Palette) -> None:
 
 def test_brows_rise_by_their_size_and_return(palette: Palette) -> None:
     plain = gestures(palette, Timeline())
-    raised = gestures(palette, Timeline(brow_raises=(BrowRaise(1.0, 0.5),)))
+    raised = gestures(palette, Timeline(gestures=(Gesture(1.0, "brows_up", 0.5),)))
     height = (raised["brows"] - plain["brows"]) @ palette.brow_lift
     np.testing.assert_allclose(height[35:42], 2.0, atol=1e-4)
     np.testing.assert_allclose(height[[0, 30, 54, 89]], 0.0, atol=1e-4)

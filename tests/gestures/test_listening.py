@@ -11,7 +11,7 @@ import pytest
 from corpus_tools.studies.gestures.blinks import find_blinks
 from lexicon.errors import InputError
 from tests.world import World
-from tts2face.gestures.elements import ListeningSpan, Nod
+from tts2face.gestures.elements import Gesture, ListeningSpan
 from tts2face.gestures.listening import (
     LASTS_S,
     LEAST_GAP_S,
@@ -46,22 +46,22 @@ def test_responses_at_intervals_are_as_many_as_look_natural_and_the_same_in_piec
 def test_a_response_nods_or_raises_the_brows() -> None:
     times = np.arange(0, 4000, 10.0).tolist()
     made = responses(times, 3)
-    nodded = {round(nod.time / 10) for nod in made.nods}
-    raised = {round(one.time / 10) for one in made.brow_raises}
+    nodded = {round(one.time / 10) for one in made.gestures if one.name == "nod"}
+    raised = {round(one.time / 10) for one in made.gestures if one.name == "brows_up"}
     assert nodded | raised == set(range(400))
     assert len(nodded) / 400 == pytest.approx(0.75, abs=0.06)
     assert 0.3 < len(raised) / 400 < 0.7
-    assert responses(times[5:7], 3).nods == tuple(nod for nod in made.nods if 45 < nod.time < 65)
+    assert responses(times[5:7], 3).gestures == tuple(nod for nod in made.gestures if 45 < nod.time < 65)
 
 
 def test_spans_respond_where_they_hold_and_react() -> None:
     spans = (ListeningSpan(0.0, 100.0), ListeningSpan(200.0, 300.0, reacts=False))
-    found = with_responses(Timeline(listens=spans, nods=(Nod(250.0),)), 0.0, 400.0, 1)
-    own = [nod.time for nod in found.nods if nod.time != 250.0]
+    found = with_responses(Timeline(listens=spans, gestures=(Gesture(250.0),)), 0.0, 400.0, 1)
+    own = [nod.time for nod in found.gestures if nod.time != 250.0]
     assert own
     assert max(own) < 100.0 + LASTS_S
-    assert len(found.nods) == len(own) + 1
-    plain = Timeline(nods=(Nod(250.0),))
+    assert len(found.gestures) == len(own) + 1
+    plain = Timeline(gestures=(Gesture(250.0),))
     assert with_responses(plain, 0.0, 400.0, 1) is plain
 
 
@@ -162,11 +162,11 @@ def test_the_sound_of_a_partner_gives_the_responses_of_a_request(tmp_path: Path)
         file.writeframes(pcm_bytes(sound.samples))
     heard = prepare(Request(listen=10.0, partner=path)).listening
     assert [span.reacts for span in heard.listens] == [False]
-    begins = {one.time for one in (*heard.nods, *heard.brow_raises)}
+    begins = {one.time for one in heard.gestures}
     cues = [time for time in cue_times(sound) if time < 10.0]
     assert cues
     assert all(min(abs(time - cue) for time in begins) < 0.05 for cue in cues)
     alone = prepare(Request(listen=10.0)).listening
-    assert ([span.reacts for span in alone.listens], alone.nods) == ([True], ())
+    assert ([span.reacts for span in alone.listens], alone.gestures) == ([True], ())
     with pytest.raises(InputError, match=r"there is no recording nowhere\.wav"):
         prepare(Request(listen=10.0, partner=Path("nowhere.wav")))

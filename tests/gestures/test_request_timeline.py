@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.gestures.elements import ExpressionSpan, Nod
+from tts2face.gestures.elements import ExpressionSpan, Gesture
 from tts2face.models.palette import FEATURES
 from tts2face.request import Request
 from tts2face.session.prepared import build_request_timeline
@@ -27,7 +27,7 @@ def test_flags_win_over_the_file(tmp_path: Path) -> None:
     )
     assert timeline.style == {**dict.fromkeys(FEATURES, "calm"), "head": "delighted"}
     assert timeline.gains.factors == {"head": 1.5, "jaw": 0.5}
-    assert timeline.nods == (Nod(1.0),)
+    assert timeline.gestures == (Gesture(1.0),)
     assert timeline.expressions == (
         ExpressionSpan("happy", 1.0, 0.0, 2.0),
         ExpressionSpan("happy", 0.5, 2.0, 3.0),
@@ -37,7 +37,7 @@ def test_flags_win_over_the_file(tmp_path: Path) -> None:
 
 def test_a_request_without_gestures_has_an_empty_timeline() -> None:
     timeline = build_request_timeline(Request(text="Hi."))
-    assert (timeline.style, timeline.spans, timeline.expressions, timeline.nods) == ({}, (), (), ())
+    assert (timeline.style, timeline.spans, timeline.expressions, timeline.gestures) == ({}, (), (), ())
 
 
 @pytest.mark.parametrize(

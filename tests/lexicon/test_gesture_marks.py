@@ -21,7 +21,7 @@ from lexicon.text_marks import parse_marks
         ("look-away", {"name": "look_away"}),
         ("LOOK AWAY down 1.5s", {"name": "look_away", "down_deg": 12.0, "seconds": 1.5}),
         ("wink right", {"name": "wink", "left_deg": -15.0}),
-        ("tilt left 10", {"name": "tilt", "left_deg": 10.0}),
+        ("tilt left", {"name": "tilt", "left_deg": 15.0}),
         ("look left", {"name": "look_at", "left_deg": 15.0}),
         ("look", {"name": "look_at"}),
         ("look at right 20, up 5, 2 s", {"name": "look_at", "left_deg": -20.0, "down_deg": -5.0, "seconds": 2.0}),
@@ -34,7 +34,18 @@ def test_gestures_are_marks(written: str, mark: dict) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["[smiling]", "[think about it]", "[listen to me]", "[brows]", "[look 5 times]", "[sighs]", "[surprised]"]
+    "text",
+    [
+        "[smiling]",
+        "[think about it]",
+        "[listen to me]",
+        "[brows]",
+        "[look 5 times]",
+        "[sighs]",
+        "[surprised]",
+        "[wink up]",
+        "[tilt left 20]",
+    ],
 )
 def test_other_words_in_brackets_are_text(text: str) -> None:
     assert parse_marks(f"so {text} here") == MarkedText(f"so {text} here")

@@ -14,7 +14,7 @@ from lexicon.sentences import Sentence, index_by_letters, split_sentences
 from lexicon.sequence import SILENCE
 from lexicon.text_marks import parse_marks
 from tests.tones import LEAD_S, LEVEL, PHONE_S, RATE_HZ, TRAIL_S, LetterVoice
-from tts2face.gestures.elements import Nod, StyleSpan
+from tts2face.gestures.elements import Gesture, StyleSpan
 from tts2face.request import Request
 from tts2face.session.joining import join_utterances, silent_speech, trim_silence
 from tts2face.session.prepared import check_marks, marked_styles, prepare
@@ -62,7 +62,7 @@ def test_without_marks_the_speech_of_the_voice_is_unchanged() -> None:
     plain = LetterVoice().speak("hello there.")
     assert answer.speech.waveform.samples.tobytes() == plain.waveform.samples.tobytes()
     assert answer.speech.phones.edges.tobytes() == plain.phones.edges.tobytes()
-    assert (answer.timeline.spans, answer.timeline.nods, answer.marks) == ((), (), ())
+    assert (answer.timeline.spans, answer.timeline.gestures, answer.marks) == ((), (), ())
     assert voice.said == [("hello there.", 1.0)]
 
 
@@ -109,7 +109,7 @@ def test_pauses_without_words_are_kept() -> None:
 def test_nods_and_names_come_with_the_onset_of_their_word() -> None:
     answer = one("one [nod]two three[nod 0.5] four[nod].")
     at = words(answer)
-    assert answer.timeline.nods == (Nod(at["two"][0]), Nod(at["four"][0], 0.5), Nod(at["four"][1]))
+    assert answer.timeline.gestures == (Gesture(at["two"][0]), Gesture(at["four"][0], size=0.5), Gesture(at["four"][1]))
     named = one('<speak>one <mark name="x"/>two <break time="1s"/><mark name="y"/>three</speak>')
     at = words(named)
     assert named.marks == (MarkTime("x", at["two"][0]), MarkTime("y", pytest.approx(at["three"][0])))
@@ -118,17 +118,17 @@ def test_nods_and_names_come_with_the_onset_of_their_word() -> None:
 
 def test_a_mark_within_a_word_counts_for_it() -> None:
     answer = one("one tw[nod]o three")
-    assert answer.timeline.nods == (Nod(words(answer)["two"][0]),)
+    assert answer.timeline.gestures == (Gesture(words(answer)["two"][0]),)
 
 
 def test_words_of_numbers_are_counted_as_pronounced() -> None:
     answer = one("it is 25 [nod]times.")
-    assert answer.timeline.nods == (Nod(words(answer)["times"][0]),)
+    assert answer.timeline.gestures == (Gesture(words(answer)["times"][0]),)
 
 
 def test_a_voice_that_counts_words_differently_is_followed_by_letters() -> None:
     answer = one("well-known men-at-arms [nod]fought well-fed", LetterVoice(splits=True))
-    assert answer.timeline.nods == (Nod(words(answer)["fought"][0]),)
+    assert answer.timeline.gestures == (Gesture(words(answer)["fought"][0]),)
 
 
 def test_styles_hold_over_their_words_and_the_inner_one_counts() -> None:
@@ -156,7 +156,7 @@ def test_the_styles_of_a_text_are_known_beforehand() -> None:
 
 
 def test_nods_at_one_place_are_one() -> None:
-    assert one("one [nod 0.5][nod] [nod 0.3]two").timeline.nods == (Nod(LEAD_S + 3 * PHONE_S),)
+    assert one("one [nod 0.5][nod] [nod 0.3]two").timeline.gestures == (Gesture(LEAD_S + 3 * PHONE_S),)
 
 
 def test_speed_and_loudness() -> None:
@@ -191,7 +191,7 @@ def test_emphasis_is_louder_with_a_nod() -> None:
     start, end = words(answer)["two"]
     loud = answer.speech.waveform.samples[round((start + 0.05) * RATE_HZ) : round((end - 0.05) * RATE_HZ)]
     np.testing.assert_allclose(loud, 10 ** (3 / 20) * LEVEL, rtol=1e-5)
-    assert answer.timeline.nods == (Nod(start),)
+    assert answer.timeline.gestures == (Gesture(start),)
 
 
 def test_spans_use_their_own_voice_at_the_sample_rate_of_the_first() -> None:
@@ -254,7 +254,7 @@ def test_times_of_marks_increase_and_lie_in_the_sound(texts: list, data: st.Data
     kinds = [data.draw(st.sampled_from(["", "[nod]", "[pause 0.3]", "[pause 1][nod 0.5]"])) for _ in texts]
     text = " ".join(kind + word for kind, word in zip(kinds, texts, strict=True))
     for answer in synthesise_sentences(f"[style:head=a]{text}[/style]", LetterVoice(splits)):
-        nods = [nod.time for nod in answer.timeline.nods]
+        nods = [nod.time for nod in answer.timeline.gestures]
         assert nods == sorted(nods)
         assert all(0 <= time < answer.speech.phones.end for time in nods)
         onsets = [answer.speech.phones.edges[word.first] for word in answer.speech.words]
@@ -299,7 +299,7 @@ def test_real_voices_pause_and_nod_at_the_marks(name: str) -> None:
     answer = one("We were away [pause 0.4] a year ago, [nod]but Bob may move.", load_voice(name, "en-us"))
     at = words(answer)
     assert at["a"][0] - at["away"][1] == pytest.approx(0.4, abs=0.002)
-    assert [nod.time for nod in answer.timeline.nods] == [at["but"][0]]
+    assert [nod.time for nod in answer.timeline.gestures] == [at["but"][0]]
     samples, rate = answer.speech.waveform.samples, answer.speech.waveform.rate
     gap = samples[round((at["away"][1] + 0.19) * rate) : round((at["a"][0] - 0.19) * rate)]
     assert np.abs(gap).max() < 0.01
@@ -307,7 +307,7 @@ def test_real_voices_pause_and_nod_at_the_marks(name: str) -> None:
 
 def test_words_of_a_language_without_spaces_are_found_by_letters() -> None:
     answer = one("こんにちは、[nod]せかい。", load_voice("espeak", "ja"), language="ja")
-    (nod,) = answer.timeline.nods
+    (nod,) = answer.timeline.gestures
     assert 0.3 * answer.speech.phones.end < nod.time < 0.9 * answer.speech.phones.end
 
 
@@ -315,7 +315,7 @@ def test_in_a_recording_marks_come_with_their_words() -> None:
     text = parse_marks("one [style:head=calm]two[/style] [nod]three")
     speech = LetterVoice().speak(text.text)
     timeline, _ = resolve_recording_marks(text, speech.phones, speech.words, "en-us")
-    assert timeline.nods[0].time == pytest.approx(LEAD_S + 6 * PHONE_S)
+    assert timeline.gestures[0].time == pytest.approx(LEAD_S + 6 * PHONE_S)
     assert [(span.start, span.end) for span in timeline.spans] == [
         pytest.approx((LEAD_S + 3 * PHONE_S, LEAD_S + 6 * PHONE_S))
     ]

@@ -96,7 +96,7 @@ def test_silent_features_are_the_muted_and_those_that_are_not_solo(whole: Projec
         ({"picture": {"size": "9"}}, "picture: "),
         (
             {"timeline": {"nods": [{"time": -1}]}},
-            r"wrong\.json, timeline, nods\[0\]: a nod needs a time of 0 s or more",
+            r"wrong\.json, timeline, nods\[0\]: a gesture needs a time of 0 s or more",
         ),
         ({"pronunciations": {"two": "XX"}}, "pronunciations of untitled, line 1"),
         ({"pronunciations": {"two words": "T UW1"}}, "a pronunciation is for one word, not for 'two words'"),

@@ -8,7 +8,7 @@ import pytest
 
 from lexicon.sequence import SILENCE
 from tests.tones import LetterVoice
-from tts2face.gestures.elements import Nod
+from tts2face.gestures.elements import Gesture
 from tts2face.gestures.timeline import Timeline
 from tts2face.request import Idle, Listening, Request
 from tts2face.session.joining import END_S
@@ -152,9 +152,9 @@ def test_parts_without_an_end_do_not_drift(fps: float, n_frames: int) -> None:
 
 @pytest.mark.parametrize("fps", [20.0, 23.976, 24.0, 25.0, 30.0, 60.0])
 def test_a_nod_in_the_last_part_of_a_frame_comes_with_the_next_piece(fps: float) -> None:
-    nods = [Nod(at / 100) for at in range(5, 2500, 3)]
-    prepared = replace(prepare(Request(source=Listening(25.0), fps=fps)), listening=Timeline(nods=tuple(nods)))
+    nods = [Gesture(at / 100) for at in range(5, 2500, 3)]
+    prepared = replace(prepare(Request(source=Listening(25.0), fps=fps)), listening=Timeline(gestures=tuple(nods)))
     pieces = list(spoken_pieces(prepared, SpeechModels(lambda *_: LetterVoice())))
     assert len(pieces) > 2
-    found = [nod.time for piece in pieces for nod in piece.timeline.nods]
+    found = [nod.time for piece in pieces for nod in piece.timeline.gestures]
     assert found == pytest.approx([nod.time for nod in nods], abs=1e-9)

@@ -6,6 +6,7 @@ from lexicon.sequence import PhoneSequence
 from tts2face.face.breathing import Breath, Breathing, part_lips
 from tts2face.face.hair_swing import HairSwing, Swing
 from tts2face.face.pupils import Dilation, Pupils
+from tts2face.numeric.arrays import FloatArray
 from tts2face.types import Trajectory
 
 
@@ -22,11 +23,17 @@ class Body:
         self._dilation: Dilation | None = None
 
     def move(
-        self, face: Trajectory, head: Trajectory, phones: PhoneSequence, turns: Sequence[float] = ()
+        self,
+        face: Trajectory,
+        head: Trajectory,
+        phones: PhoneSequence,
+        turns: Sequence[float] = (),
+        breath: FloatArray | None = None,
     ) -> Trajectory:
         """Motion (T, K) of the next piece with these, from that of the face and the head (T, 6).
 
         Before `turns`, seconds of the piece at which speech begins after listening, the lips part for the breath.
+        `breath` (T,) are shares of a full breath that gestures hold.
         """
         if not len(face):
             return face
@@ -34,7 +41,7 @@ class Body:
         if self._hair is not None:
             face, self._swing = self._hair.apply(face, head, self._swing)
         if self._breathing is not None:
-            face, self._breath = self._breathing.apply(face, phones, self._seed, self._breath)
+            face, self._breath = self._breathing.apply(face, phones, self._seed, self._breath, breath)
         if self._pupils is not None:
             face, self._dilation = self._pupils.apply(face, phones, self._seed, self._dilation)
         return face

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.numeric.arrays import FloatArray
 from tts2face.types import Trajectory
 
 BREATH_SHAPE = "breath"
@@ -53,9 +54,14 @@ class Breathing:
         return cls(channels.index(BREATH_SHAPE)) if BREATH_SHAPE in channels else None
 
     def apply(
-        self, face: Trajectory, phones: PhoneSequence, seed: int, before: Breath | None
+        self,
+        face: Trajectory,
+        phones: PhoneSequence,
+        seed: int,
+        before: Breath | None,
+        least: FloatArray | None = None,
     ) -> tuple[Trajectory, Breath]:
-        """Motion (T, K) that breathes with the phones of its piece, after `before`."""
+        """Motion (T, K) that breathes with the phones of its piece, after `before`; `least` (T,) holds a breath."""
         now = before or Breath()
         starts, step = phrase_starts(phones), 1.0 / face.fps
         weights = face.values.copy()
@@ -64,6 +70,8 @@ class Breathing:
             ahead = [start - time for start in starts if 0 < start - time <= IN_S]
             now = _next(now, min(ahead, default=0.0), step, seed)
             weights[frame, self.column] = now.level
+        if least is not None:
+            weights[:, self.column] = np.maximum(weights[:, self.column], least)
         return replace(face, values=weights), now
 
 

@@ -17,13 +17,13 @@ from lexicon.errors import InputError
 from tts2face.face.expressions import GAZE_SHAPES, add_expression_shapes
 from tts2face.face.eyelids import EyelidModel, build_eyelid_model
 from tts2face.face.landmarks import axis_scales, landmark_positions, procrustes_rotation, scatter_landmarks
-from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES, LipConstraints, build_lip_constraints
+from tts2face.face.lip_constraints import MIDDLE_PAIR, SPEECH_SHAPE_PREFIXES, LipConstraints, build_lip_constraints
 from tts2face.face.mood_targets import mood_weights, with_corner_shape
 from tts2face.face.shape_transfer import SCALE_LIMITS, append_shapes, spread_landmark_motion
 from tts2face.face.stand_in import stand_in, with_channels_of
 from tts2face.models.face import Face
 from tts2face.models.landmarks import LID_RINGS, LIP_LANDMARKS, N_MESH_LANDMARKS
-from tts2face.models.palette import FEATURES, FIXED_CHANNELS, REGION_FEATURES, FaceRegion, Palette
+from tts2face.models.palette import EYE_CHANNELS, FEATURES, FIXED_CHANNELS, REGION_FEATURES, FaceRegion, Palette
 from tts2face.numeric.arrays import Float32Array, FloatArray, ordered_product
 from tts2face.processes.shared import shared
 from tts2face.types import HEAD_CHANNELS, Trajectory
@@ -41,6 +41,10 @@ FIT_LANDMARKS = (33, 133, 362, 263, 168, 6, 2)
 SMILES = ("mouthSmile", "cheekSquint")  # shapes whose sides differ a little in a person's smile
 SMILE_UNEVENNESS = (0.03, 0.08)  # sides of smiles differ by 6 to 16 %: posed symmetry is seen as a mask
 DEFAULT_GAZE_TURN = 0.4  # rad per weight of a gaze shape on a face whose eyes are part of its shapes
+
+JAW_SHAPE, SQUINT_SHAPES = "jawOpen", ("cheekSquintLeft", "cheekSquintRight")
+# Channels that only gestures with names have: mm by which the lips part, and weights of the squints of both cheeks.
+MOUTH_CHANNELS: Mapping[str, tuple[str, ...]] = MappingProxyType({"mouth": ("gap",), "squint": EYE_CHANNELS})
 
 NO_GAINS: Mapping[str, float] = MappingProxyType({})
 
@@ -95,7 +99,8 @@ class GestureFace:
         speech : (T, n_speech_shapes)
             Weights of the shapes of the given face, as `tts2face.lips.retargeting.Retargeter` returns them.
         gestures
-            (T, k) values of each feature of the palette, in its units; missing features are at rest.
+            (T, k) values of each feature of the palette, in its units, and of `MOUTH_CHANNELS`; missing ones are at
+            rest.
         gains
             Factors on the motion of features, and on the speech motion of ``jaw`` and ``lips``; closed lips stay
             closed.
@@ -112,7 +117,7 @@ class GestureFace:
         spoken = np.zeros((len(speech), len(self.face.shape_names)))
         spoken[:, : self.n_speech_shapes] = speech.values
         features = {name: gains.get(name, 1.0) * values.astype(np.float64) for name, values in gestures.items()}
-        spoken = self._scale_speech(spoken, gains)
+        spoken = self._open_mouth(self._scale_speech(spoken, gains), features)
         added = self._gesture_weights(spoken, features, self._uneven_expressions(unevenness))
         shares = features.get("blink", np.zeros((len(speech), 2)))
         added = self.lids.close(spoken + added, shares) - spoken
@@ -132,6 +137,19 @@ class GestureFace:
             for name, prefix in zip(SPEECH_GAINS, SPEECH_SHAPE_PREFIXES, strict=True)
         )
         return self.mouth.amplify(speech, jaw, lips)
+
+    def _open_mouth(self, speech: FloatArray, features: Mapping[str, FloatArray]) -> FloatArray:
+        """Speech weights (T, K) with a jaw that opens the lips by the mm of ``mouth``, within its limit."""
+        if "mouth" not in features:
+            return speech
+        column = self.face.shape_names.index(JAW_SHAPE)
+        opened = float(self.mouth.gaps[MIDDLE_PAIR, column])
+        if opened <= 0.0:
+            return speech
+        parted = speech.copy()
+        highest = np.maximum(float(self.face.limits[column, 1]), speech[:, column])
+        parted[:, column] = np.minimum(speech[:, column] + features["mouth"][:, 0] / opened, highest)
+        return parted
 
     def _uneven_expressions(self, unevenness: float) -> FloatArray:
         """Shape weights (5, K) of the expressions, of which smiles differ between the sides."""
@@ -155,6 +173,8 @@ class GestureFace:
             # shapes of gaze have one direction each: down, up, left, right
             turned = np.stack([np.maximum(down, 0), np.maximum(-down, 0), np.maximum(left, 0), np.maximum(-left, 0)])
             added += ordered_product(turned.T, self.gaze)
+        for side, name in enumerate(SQUINT_SHAPES if "squint" in features else ()):
+            added[:, self.face.shape_names.index(name)] += features["squint"][:, side]
         others = np.setdiff1d(np.arange(speech.shape[1]), self.mouth.moving)
         low, high = self.face.limits[others].T.astype(np.float64)
         added[:, others] = np.clip(speech[:, others] + added[:, others], low, high) - speech[:, others]
@@ -186,7 +206,8 @@ def check_gestures(
     gestures: Mapping[str, Float32Array], gains: Mapping[str, float], n_frames: int, regions: Mapping[str, int]
 ) -> None:
     """Check gestures and gains against the frames and the palette; `regions` holds the number of modes per region."""
-    widths = {name: len(channels) for name, channels in FIXED_CHANNELS.items()} | dict(regions)
+    widths = {name: len(channels) for name, channels in {**FIXED_CHANNELS, **MOUTH_CHANNELS}.items()}
+    widths |= regions
     for name, values in gestures.items():
         if name not in widths:
             raise InputError(f"there is no feature {name!r}; give {', '.join(FEATURES)}")

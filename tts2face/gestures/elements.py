@@ -1,4 +1,4 @@
-"""Elements of a timeline: styles, expressions, gaze, nods and curves.
+"""Elements of a timeline: styles, expressions, gaze, gestures and curves.
 
 Times are seconds on the clock of the whole clip; spans are half open. Between keys a curve eases from one value to the
 next, with zero slope at each; before the first key and after the last one it is constant.
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lexicon.errors import InputError
-from lexicon.marked_text import GESTURE_SIZE_LIMITS
+from lexicon.marked_text import GESTURE_DEG_LIMITS, check_gesture
 from lexicon.values.checks import check_limits
 from lexicon.values.fields import check_fields
 from tts2face.models.palette import EXPRESSIONS, FEATURES
@@ -24,7 +24,7 @@ from tts2face.numeric.arrays import FloatArray, smoothstep
 EXPRESSION_WEIGHT_LIMITS = (-0.5, 1.5)  # -e to 1 + e with e = 0.5, the middle of what Ju and Lee 2008 (section 4) allow
 GAIN_LIMITS = (0.0, 3.0)  # beyond three times as far, lids and brows of any face are at their limits
 GAIN_NAMES = (*FEATURES, "jaw", "lips")
-GAZE_LIMITS_DEG = (-35.0, 35.0)  # farther, people turn the head (Stahl 1999, Experimental Brain Research 126)
+GAZE_LIMITS_DEG = GESTURE_DEG_LIMITS
 CHANNEL_OFFSET_LIMITS = (-1000.0, 1000.0)  # weights lie within 2; the head's position is in millimetres
 MAX_KEYS = 100_000  # of one curve: a key at each frame of half an hour
 Keys = tuple[Annotated[tuple[float, float], "[seconds, value]"], ...]
@@ -183,33 +183,30 @@ class ListeningSpan:
 
 
 @dataclass(frozen=True, slots=True)
-class Nod:
-    """A nod that starts at `time` seconds; size 1 is 6 degrees."""
+class Gesture:
+    """A gesture of `lexicon.gesture_names.GESTURES` that begins at `time` seconds; a nod of size 1 is 6 degrees.
+
+    Parameters
+    ----------
+    seconds
+        Its duration; None is its usual one.
+    down_deg, left_deg
+        Its direction, as of `GazeTarget`; None is its usual one. Of a wink or a tilt, left or right is its side.
+    """
 
     time: float
+    name: str = "nod"
     size: float = 1.0
+    seconds: float | None = None
+    down_deg: float | None = None
+    left_deg: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse times before the clip and sizes out of range."""
+        """Refuse times before the clip, unknown names, and values out of range."""
         check_fields(self)
+        check_gesture(self)
         if not 0.0 <= self.time < math.inf:
-            raise InputError(f"a nod needs a time of 0 s or more, not {self.time:g}")
-        check_limits("the size of a nod", self.size, GESTURE_SIZE_LIMITS)
-
-
-@dataclass(frozen=True, slots=True)
-class BrowRaise:
-    """Brows that go up at `time` seconds and down again; size 1 is 4 mm."""
-
-    time: float
-    size: float = 1.0
-
-    def __post_init__(self) -> None:
-        """Refuse times before the clip and sizes out of range."""
-        check_fields(self)
-        if not 0.0 <= self.time < math.inf:
-            raise InputError(f"a brow raise needs a time of 0 s or more, not {self.time:g}")
-        check_limits("the size of a brow raise", self.size, GESTURE_SIZE_LIMITS)
+            raise InputError(f"a gesture needs a time of 0 s or more, not {self.time:g}")
 
 
 @dataclass(frozen=True, slots=True)

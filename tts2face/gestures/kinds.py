@@ -9,13 +9,12 @@ from typing import Any, Literal
 
 from lexicon.errors import InputError
 from tts2face.gestures.elements import (
-    BrowRaise,
     ChannelEdit,
     ExpressionCurve,
     ExpressionSpan,
     GazeTarget,
+    Gesture,
     ListeningSpan,
-    Nod,
     StrengthCurve,
     StyleSpan,
 )
@@ -135,7 +134,8 @@ class ElementKind:
                 raise BeyondClipError(
                     what, duration, "shorten it" if element.start < duration else "let it begin earlier"
                 )
-            raise BeyondClipError(f"the {self.noun} at {element.time:g} s", duration, "move it")
+            what = f"the {self.lane(element).replace('_', ' ')} at {element.time:g} s"
+            raise BeyondClipError(what, duration, "move it")
 
     def latest_s(self, element: Any) -> float:
         """Second that a clip must go beyond to hold an element; below 0 for a curve, which any clip holds."""
@@ -153,8 +153,7 @@ KINDS: Mapping[str, ElementKind] = MappingProxyType({
         ElementKind("expressions", ExpressionSpan, "span", "expression"),
         ElementKind("gaze", GazeTarget, "span", "", "the gaze"),
         ElementKind("listens", ListeningSpan, "span", "", "listening"),
-        ElementKind("nods", Nod, "instant", "", "nod"),
-        ElementKind("brow_raises", BrowRaise, "instant", "", "brow raise"),
+        ElementKind("gestures", Gesture, "instant", "name", "gesture"),
         ElementKind("strengths", StrengthCurve, "curve", "feature"),
         ElementKind("curves", ExpressionCurve, "curve", "expression"),
         ElementKind("edits", ChannelEdit, "curve", "channel"),

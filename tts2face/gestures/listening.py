@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.gestures.elements import BrowRaise, ListeningSpan, Nod
+from tts2face.gestures.elements import Gesture, ListeningSpan
 from tts2face.gestures.prosody import PAUSE_DB, prosody_features, speech_intensity
 from tts2face.gestures.timeline import Timeline
 from tts2face.types import Waveform
@@ -43,19 +43,19 @@ KEPT_S, LOOK_S = 5.0, 0.4  # of arriving sound in which cues are looked for (20 
 
 def responses(times: Sequence[float], seed: int) -> Timeline:
     """Nods and brow raises of responses that begin at times in seconds of the clip; each depends on its time alone."""
-    nods, raises = list[Nod](), list[BrowRaise]()
+    found = list[Gesture]()
     for time in times:
         # by the time alone, so that pieces of .2 s agree with a whole clip (decision 189)
         draws = np.random.default_rng((seed, round(time * 1000))).random(5)
         has_nod = draws[0] < NOD_SHARE
         if has_nod:
             size = float(np.interp(draws[1], (0.0, 1.0), NOD_SIZES))
-            nods.append(Nod(time, size))
+            found.append(Gesture(time, "nod", size))
             if draws[2] < SECOND_NOD:
-                nods.append(Nod(time + SECOND_S, SECOND_SIZE * size))
+                found.append(Gesture(time + SECOND_S, "nod", SECOND_SIZE * size))
         if not has_nod or draws[3] < RAISE_SHARE:
-            raises.append(BrowRaise(time, float(np.interp(draws[4], (0.0, 1.0), RAISE_SIZES))))
-    return Timeline(nods=tuple(nods), brow_raises=tuple(raises))
+            found.append(Gesture(time, "brows_up", float(np.interp(draws[4], (0.0, 1.0), RAISE_SIZES))))
+    return Timeline(gestures=tuple(found))
 
 
 def with_responses(timeline: Timeline, start: float, end: float, seed: int) -> Timeline:

@@ -26,6 +26,7 @@ from tts2face.gestures.field import (
 )
 from tts2face.gestures.gaze import GazeProcess, HeadFollower
 from tts2face.gestures.head_presentation import HeadPresentation, slow_scales
+from tts2face.gestures.movements import channel_values, head_turn, pair_values, timed
 from tts2face.gestures.phrase_motion import PhraseMotion
 from tts2face.gestures.presentation import (
     CHANGING,
@@ -217,12 +218,28 @@ class GestureFields:
             values = values + timeline.expression_weights(times).astype(np.float32)
         elif feature == "gaze":
             values = timeline.apply_gaze(times, values).astype(np.float32)
-        elif feature == "head":
-            values[:, 0] += timeline.nod_pitch(times).astype(np.float32)
-        elif feature == "brows" and timeline.brow_raises:
-            lift = self.palette.brow_lift
-            values = values + np.outer(timeline.brow_height(times), lift / (lift @ lift)).astype(np.float32)
+        elif timeline.gestures:
+            values = self._with_gestures(feature, values, times, timeline)
         return values
+
+    def _with_gestures(
+        self, feature: str, values: Float32Array, times: NDArray[np.float64], timeline: Timeline
+    ) -> Float32Array:
+        """Values (T, k) of lids, head and brows with the gestures of a timeline; others as they are."""
+        moving, added = timed(timeline.gestures, times), np.zeros(values.shape)
+        if feature == "head":
+            added[:, :3] = head_turn(moving, times)
+        elif feature == "blink":
+            # a lid that is shut already shuts no further
+            shut = pair_values(moving, "lid", times).clip(0.0, 1.0)
+            return np.asarray(np.maximum(values, shut), np.float32)
+        elif feature == "brows":
+            lift = self.palette.brow_lift
+            added += np.outer(channel_values(moving, "brows_up", times), lift / (lift @ lift))
+            added += np.outer(channel_values(moving, "brows_together", times), self.palette.brow_gathering)
+        else:
+            return values
+        return np.asarray(values + added, np.float32)
 
     @property
     def features(self) -> tuple[str, ...]:
@@ -262,7 +279,7 @@ class GestureStream:
         sound
             Sound of these frames.
         timeline
-            Styles, expressions, nods and gains, in seconds of the whole clip; all of them are applied.
+            Styles, expressions, gestures and gains, in seconds of the whole clip; all of them are applied.
         plan
             What is said in these frames, in seconds of them.
         """

@@ -1,4 +1,4 @@
-"""The timeline of a clip: styles of each feature over time, expressions, nods and gains.
+"""The timeline of a clip: styles of each feature over time, expressions, gestures and gains.
 
 Times are seconds on the clock of the whole clip; spans are half open. Styles, gains and expressions are written as
 ``brows=annoyed,head=delighted``, ``happy=0.6@1.2-3.4``.
@@ -18,14 +18,13 @@ from lexicon.errors import InputError
 from lexicon.values.fields import check_fields
 from tts2face.gestures.elements import (
     GAIN_NAMES,
-    BrowRaise,
     ChannelEdit,
     ExpressionCurve,
     ExpressionSpan,
     Gains,
     GazeTarget,
+    Gesture,
     ListeningSpan,
-    Nod,
     StrengthCurve,
     StyleSpan,
     check_feature,
@@ -34,6 +33,7 @@ from tts2face.gestures.elements import (
     span_weights,
 )
 from tts2face.gestures.kinds import KINDS, ElementKind
+from tts2face.gestures.movements import channel_values, gesture_end, timed, turned_gaze
 from tts2face.models.palette import EXPRESSIONS, FEATURES, Palette
 from tts2face.numeric.arrays import FloatArray
 
@@ -41,14 +41,6 @@ BLEND_S = 0.3  # transition between two styles; as long as a blink
 # Of an expression: a smile's onset takes about as long whatever the occasion (Schmidt, Cohn and Tian 2003, Biological
 # Psychology 65); faster changes within speech appear as discontinuities.
 ONSET_S = 0.6
-# A nod: down within 0.18 s, back with a slight overshoot, and to rest. About 2 Hz, the ordinary head movements of
-# speakers (1.8-3.7 Hz: Hadar et al. 1983, Human Movement Science 2); seconds, and shares of NOD_RAD.
-NOD_KEYS = ((0.0, 0.0), (0.18, 1.0), (0.42, -0.1), (0.55, 0.0))
-NOD_RAD = math.radians(6.0)  # of a nod of size 1; radians, as a head moves with a stressed word
-# A flash of the brows: up, held, down; seconds, and shares of BROW_RAISE_MM (Ekman 1979, About brows).
-BROW_RAISE_KEYS = ((0.0, 0.0), (0.15, 1.0), (0.4, 1.0), (0.8, 0.0))
-# of a raise of size 1
-BROW_RAISE_MM = 4.0
 LISTENING_HOLD_S = 0.1  # after a span: gestures of a piece are drawn two frames ahead, before the next span is known
 SACCADE_S = 0.06  # transition to a gaze target; saccades of 10 degrees take 50 ms (Bahill et al. 1975)
 
@@ -63,8 +55,8 @@ class Timeline:
         Style of each feature outside its spans; features without an entry use the default style.
     spans, expressions
         Spans, sorted by time; those of one feature or expression may be adjacent but not overlap.
-    nods, brow_raises
-        Nods and raises of the brows, sorted by time.
+    gestures
+        Named gestures, sorted by time.
     gains
         Factors of the motion of features.
     gaze
@@ -87,8 +79,7 @@ class Timeline:
     style: Mapping[str, str] = field(default_factory=dict)
     spans: tuple[StyleSpan, ...] = ()
     expressions: tuple[ExpressionSpan, ...] = ()
-    nods: tuple[Nod, ...] = ()
-    brow_raises: tuple[BrowRaise, ...] = ()
+    gestures: tuple[Gesture, ...] = ()
     gains: Gains = field(default_factory=Gains)
     gaze: tuple[GazeTarget, ...] = ()
     listens: tuple[ListeningSpan, ...] = ()
@@ -158,6 +149,9 @@ class Timeline:
             weights[:, column] += span.weight * span_weights(seconds, span.start, span.end, ONSET_S)
         for curve in self.curves:
             weights[:, EXPRESSIONS.index(curve.expression)] += interpolate_keys(seconds, curve.keys)
+        moving = timed(self.gestures, seconds)
+        for column, expression in enumerate(EXPRESSIONS):
+            weights[:, column] += channel_values(moving, expression, seconds)
         return weights
 
     def strength(self, feature: str, times: ArrayLike) -> FloatArray:
@@ -169,12 +163,16 @@ class Timeline:
         return np.full(len(seconds), gain)
 
     def apply_gaze(self, times: ArrayLike, gaze: NDArray[np.floating]) -> FloatArray:
-        """(T, 2) gaze at T times, in radians down and left of the scene, moved to the targets within `SACCADE_S`."""
+        """(T, 2) gaze at T times, in radians down and left of the scene, moved to the targets within `SACCADE_S`.
+
+        Gestures that look somewhere have their direction whatever the targets.
+        """
         moved = np.array(gaze, np.float64)
         for target in self.gaze:
             share = span_weights(times, target.start, target.end, SACCADE_S)[:, None]
             moved += share * (np.radians([target.down_deg, target.left_deg]) - gaze)
-        return moved
+        seconds = np.atleast_1d(np.asarray(times, np.float64))
+        return turned_gaze(timed(self.gestures, seconds), seconds, moved)
 
     def is_listening(self, times: ArrayLike) -> NDArray[np.bool_]:
         """(T,) whether the face listens at T times, or did within `LISTENING_HOLD_S` before."""
@@ -183,25 +181,6 @@ class Timeline:
         for span in self.listens:
             found |= (span.start <= seconds) & (seconds < span.end + LISTENING_HOLD_S)
         return found
-
-    def nod_pitch(self, times: ArrayLike) -> FloatArray:
-        """Radians (T,) by which nods turn the head down at T times; of overlapping nods the deeper one applies."""
-        seconds = np.atleast_1d(np.asarray(times, np.float64))
-        down, up = np.zeros(len(seconds)), np.zeros(len(seconds))
-        for nod in self.nods:
-            pitch = nod.size * NOD_RAD * interpolate_keys(seconds - nod.time, NOD_KEYS)
-            # overlapping nods are not added: a sum would be a bow
-            down, up = np.maximum(down, pitch), np.minimum(up, pitch)
-        return down + up
-
-    def brow_height(self, times: ArrayLike) -> FloatArray:
-        """Millimetres (T,) by which raises lift the brows at T times; of overlapping ones the higher one applies."""
-        seconds = np.atleast_1d(np.asarray(times, np.float64))
-        height = np.zeros(len(seconds))
-        for raised in self.brow_raises:
-            curve = raised.size * BROW_RAISE_MM * interpolate_keys(seconds - raised.time, BROW_RAISE_KEYS)
-            height = np.maximum(height, curve)
-        return height
 
     def merge(self, later: "Timeline") -> "Timeline":
         """Merge with another timeline, which takes precedence where both overlap."""
@@ -219,6 +198,11 @@ class Timeline:
     def restrict(self, start: float, end: float) -> "Timeline":
         """The elements within [start, end), with spans cut to this range and whole curves; times are unchanged."""
         return self._changed(lambda kind, elements: kind.restricted(elements, start, end))
+
+    def lasting(self, second: float) -> "Timeline":
+        """The elements that still have an effect after a second of the clip; spans are cut to it."""
+        kept = tuple(gesture for gesture in self.gestures if gesture_end(gesture) > second)
+        return replace(self.restrict(second, math.inf), gestures=kept)
 
     def _changed(self, change: Callable[[ElementKind, Sequence[Any]], tuple[Any, ...]]) -> "Timeline":
         """The same timeline with other elements of each kind."""
@@ -248,7 +232,7 @@ class Timeline:
         Raises
         ------
         InputError
-            A span or nod lies behind the end.
+            A span or gesture lies behind the end.
         """
         for name, kind in KINDS.items():
             kind.check_duration(getattr(self, name), duration)

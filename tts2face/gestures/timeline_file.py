@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import fields, make_dataclass
 from itertools import chain
 from pathlib import Path
-from types import GenericAlias
+from types import GenericAlias, MappingProxyType
 from typing import Any
 
 from lexicon.errors import InputError
@@ -13,14 +13,16 @@ from lexicon.values.checks import format_value
 from lexicon.values.files import read_text
 from lexicon.values.json_text import LARGEST_JSON_BYTES, parse_json
 from lexicon.values.records import checked, errors_at
-from tts2face.gestures.elements import Gains, StyleSpan, check_feature
+from tts2face.gestures.elements import Gains, Gesture, StyleSpan, check_feature
 from tts2face.gestures.kinds import KINDS
 from tts2face.gestures.timeline import ALL_FEATURES, Timeline, expand_feature, parse_style
 from tts2face.models.palette import FEATURES
 
 PARTS = tuple(part.name for part in fields(Timeline))
-_Written: Any = make_dataclass("_Written", [(part, Any, None) for part in PARTS])
+EARLIER = MappingProxyType({"nods": "nod", "brow_raises": "brows_up"})  # parts of earlier files: gestures of one name
+_Written: Any = make_dataclass("_Written", [(part, Any, None) for part in (*PARTS, *EARLIER)])
 _Span = make_dataclass("_Span", [("feature", str), ("style", str), ("start", float), ("end", float, math.inf)])
+_INSTANTS: Any = GenericAlias(tuple, (make_dataclass("_Instant", [("time", float), ("size", float, 1.0)]), ...))
 _SPANS: Any = GenericAlias(tuple, (_Span, ...))
 
 
@@ -50,6 +52,9 @@ def parse_timeline_object(data: Any, name: str = "timeline") -> Timeline:
     """A timeline from its object of JSON; errors as `read_timeline`."""
     parts = {part: content for part, content in vars(checked(_Written, data, name)).items() if content is not None}
     made: dict[str, Any] = {part: _parse_part(part, parts[part], f"{name}, {part}") for part in parts}
+    earlier = [element for part in EARLIER if part in made for element in made.pop(part)]
+    if earlier:
+        made["gestures"] = (*made.get("gestures", ()), *earlier)
     with errors_at(name):
         return Timeline(**made)
 
@@ -67,7 +72,7 @@ def _element_json(element: Any) -> dict[str, Any]:
     parts = {field.name: getattr(element, field.name) for field in fields(element)}
     if "keys" in parts:
         parts["keys"] = [list(pair) for pair in parts["keys"]]
-    return {name: part for name, part in parts.items() if part != math.inf}
+    return {name: part for name, part in parts.items() if part is not None and part != math.inf}
 
 
 def _parse_part(part: str, content: Any, place: str) -> Any:
@@ -77,6 +82,9 @@ def _parse_part(part: str, content: Any, place: str) -> Any:
         return tuple(
             chain(*(_spans_of(written, f"{place}[{at}]") for at, written in enumerate(checked(_SPANS, content, place))))
         )
+    if part in EARLIER:
+        instants = checked(_INSTANTS, content, place)
+        return tuple(_earlier(one, EARLIER[part], f"{place}[{at}]") for at, one in enumerate(instants))
     if part in KINDS:
         elements: Any = GenericAlias(tuple, (KINDS[part].record, ...))
         return checked(elements, content, place)
@@ -85,6 +93,12 @@ def _parse_part(part: str, content: Any, place: str) -> Any:
     factors = checked(dict[str, float], content, place)
     with errors_at(place):
         return Gains(factors)
+
+
+def _earlier(written: Any, name: str, place: str) -> Gesture:
+    """A nod or a raise of the brows of an earlier file."""
+    with errors_at(place):
+        return Gesture(written.time, name, written.size)
 
 
 def _spans_of(written: StyleSpan, place: str) -> list[StyleSpan]:

@@ -30,6 +30,8 @@ EYE_CHANNELS = ("left", "right")  # of the speaker
 FIXED_CHANNELS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {"expression": EXPRESSIONS, "blink": EYE_CHANNELS, "gaze": ("pitch", "yaw"), "head": HEAD_CHANNELS}
 )
+GATHERED_DOWN = -0.6  # mm down of brows that come together by one (corrugator; Ekman and Friesen 1978, AU 4)
+LEAST_GATHERING = 0.1  # share of that movement which the modes must have
 REGION_FEATURES = ("brows", "cheeks")
 MEASURED_STYLE = "measured"  # the recorded motion from which the default style is derived, unchanged
 FEATURES = ("expression", "brows", "blink", "cheeks", "gaze", "head")
@@ -227,6 +229,20 @@ class Palette:
     def brow_lift(self) -> NDArray[np.float64]:
         """(k,) mean height in mm of the brows' landmarks for one unit of each of their modes."""
         return np.asarray(self.regions["brows"].modes[:, :, 1].mean(axis=1), np.float64)
+
+    @property
+    def brow_gathering(self) -> NDArray[np.float64]:
+        """(k,) values of the modes of the brows that move their inner ends by a mm to the middle, and down."""
+        region = self.regions["brows"]
+        modes, sides = region.modes.astype(np.float64), np.sign(self.neutral[region.landmarks, 0].astype(np.float64))
+        away = np.abs(self.neutral[region.landmarks, 0].astype(np.float64))
+        share = np.interp(away / max(float(away.max()), 1e-6), (0.25, 0.65), (1.0, 0.0))  # inner ends in full
+        wanted = share[:, None] * np.stack([-sides, np.full(len(away), GATHERED_DOWN), np.zeros(len(away))], axis=1)
+        values = np.einsum("kla,la->k", modes, wanted)
+        inward = -(sides * np.einsum("k,kl->l", values, modes[:, :, 0]))[share == 1.0]
+        reached = float(inward.mean()) if len(inward) else 0.0
+        # a palette whose brows never came together has no such movement
+        return np.asarray(values / reached if reached > LEAST_GATHERING else 0.0 * values, np.float64)
 
     def require(self, name: str) -> str:
         """Return the name of an existing style.

@@ -20,6 +20,7 @@ from tts2face.gestures.elements import interpolate_keys
 from tts2face.gestures.gaze import microsaccades
 from tts2face.gestures.kinds import KINDS
 from tts2face.gestures.listening import with_responses
+from tts2face.gestures.movements import timed
 from tts2face.gestures.noise import NoiseStream
 from tts2face.gestures.speech_plan import NO_PLAN, SpeechPlan, plan_speech
 from tts2face.gestures.stream import GestureFields, GestureStream, GestureValues
@@ -28,13 +29,14 @@ from tts2face.models.palette import Palette
 from tts2face.request import FIELDS, OPTIONS, SOURCE_OPTIONS
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.edits import ChannelEdits
+from tts2face.session.gesture_mouth import breath_of_gestures, mouth_gestures
 from tts2face.session.prepared import PreparedRequest, marked_styles
 from tts2face.session.speech_stream import Piece
 from tts2face.storage.memory import NO_MEMORY, ResultMemory
 from tts2face.types import Clip, Waveform, YieldTurn, keep_on
 
 DEFAULT_STYLE = "neutral"
-REACH_S = 2.0  # s around a piece within which elements of the timeline affect it: nods last .6 s, fades .6 s
+REACH_S = 2.0  # s around a piece within which elements of the timeline but gestures affect it: fades last .6 s
 TURN_REACH_S = 0.6  # before a phrase within which the face listened, where a turn begins
 STATE_BYTES = 200_000  # of a stream between two pieces
 POLL_S = 0.005  # between turns of other requests, while gestures are drawn
@@ -138,6 +140,7 @@ class GestureLayer:
             self._yield_turn()
         history, timeline, (gestures, stream) = drawn.result()
         seed = self._requested.seeds.get("expression", self._seed)
+        gestures = {**gestures, **mouth_gestures(timeline, self._now.seconds + lips.times, piece.speech.phones)}
         moved = self._memory.recall(
             lambda: (history, lips.values.tobytes()),
             lambda: self._face.add_gestures(
@@ -149,8 +152,8 @@ class GestureLayer:
         return replace(piece, clip=Clip(moved.face, moved.head, piece.speech), drawn=None)
 
     def _marked(self, piece: Piece) -> Timeline:
-        """Gestures of the marks of a piece, and of those before it: a nod of the last piece lasts half a second."""
-        return self._now.marked.restrict(self._now.seconds - 1.0, np.inf).merge(piece.timeline)
+        """Gestures of the marks of a piece, and of those before it that still last."""
+        return self._now.marked.lasting(self._now.seconds - 1.0).merge(piece.timeline)
 
     def _recall(self, piece: Piece) -> tuple[bytes, Timeline, Drawn]:
         """Gestures of a piece with their key, after those before it, and the timelines of request and marks."""
@@ -169,7 +172,9 @@ class GestureLayer:
 
     def key(self, times: NDArray[np.float64], sound: Waveform, timeline: Timeline, plan: SpeechPlan = NO_PLAN) -> bytes:
         """Digest of everything on which the gestures of a piece, after those before it, depend."""
-        here = replace(timeline.restrict(times[0] - REACH_S, times[-1] + REACH_S), edits=())  # a later step
+        here = timeline.restrict(times[0] - REACH_S, times[-1] + REACH_S)
+        moving = tuple(one.gesture for one in timed(timeline.gestures, times))
+        here = replace(here, gestures=moving, edits=())  # edits are a later step
         elements = [
             (name, kind.lane(part), interpolate_keys(times, part.keys).tobytes()) if kind.shape == "curve" else part
             for name, kind in KINDS.items()
@@ -194,14 +199,17 @@ class GestureLayer:
     def body(self, piece: Piece) -> Piece:
         """The piece with hair, shoulders and pupils that follow its motion; the next piece continues from it."""
         self._now, clip = self._next, piece.clip
-        moved = self._body.move(clip.motion, clip.head, clip.speech.phones, self._turns(piece))
+        timeline = self._requested.merge(self._now.marked)
+        times = self._now.seconds - clip.motion.duration + clip.motion.times
+        breath = breath_of_gestures(timeline, times)
+        moved = self._body.move(clip.motion, clip.head, clip.speech.phones, self._turns(piece, timeline), breath)
         return replace(piece, clip=replace(clip, motion=moved))
 
-    def _turns(self, piece: Piece) -> list[float]:
+    def _turns(self, piece: Piece, timeline: Timeline) -> list[float]:
         """Seconds of a piece at which speech begins after the face has listened."""
         starts = phrase_starts(piece.speech.phones)
         before = np.array(starts) + self._now.seconds - piece.clip.motion.duration - TURN_REACH_S
-        listened = self._requested.merge(self._now.marked).is_listening(before)
+        listened = timeline.is_listening(before)
         return [start for start, was_listening in zip(starts, listened.tolist(), strict=True) if was_listening]
 
     def finish(self) -> None:
@@ -210,7 +218,7 @@ class GestureLayer:
         Raises
         ------
         InputError
-            A span or nod of the request begins after the end.
+            A span or gesture of the request begins after the end.
         """
         self._requested.check_duration(self._now.seconds)
 

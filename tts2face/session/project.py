@@ -39,7 +39,7 @@ class Project:
     models, picture
         Talker, face, hair and palette by name or path; drawing options.
     timeline
-        Styles, expressions, nods, gaze, strengths and corrections over time.
+        Styles, expressions, gestures, gaze, strengths and corrections over time.
     pronunciations
         Written words with ARPABET names or IPA between slashes, as in a dictionary; they precede the request's.
     edges

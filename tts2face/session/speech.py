@@ -15,7 +15,7 @@ from lexicon.pauses import PAUSES_S, last_mark
 from lexicon.sentence_length import n_letters
 from lexicon.sentences import Phrase, Sentence, index_by_letters
 from lexicon.sequence import PhoneSequence, WordSpan
-from tts2face.gestures.elements import Nod, StyleSpan, span_weights
+from tts2face.gestures.elements import Gesture, StyleSpan, span_weights
 from tts2face.gestures.timeline import Timeline
 from tts2face.numeric.arrays import FloatArray
 from tts2face.request import Request
@@ -301,10 +301,13 @@ def resolve_marks(
         previous_end = max(end, previous_end)
         if start < end:
             spans += [StyleSpan(feature, style, start, end) for feature, style in innermost_styles(run.styles).items()]
-    gestures = [mark for mark in marks if isinstance(mark, GestureMark)]
-    nods = tuple(Nod(times.onset(mark.at), mark.size) for mark in gestures if mark.name == "nod")
+    gestures = tuple(
+        Gesture(times.onset(mark.at), mark.name, mark.size, mark.seconds, mark.down_deg, mark.left_deg)
+        for mark in marks
+        if isinstance(mark, GestureMark)
+    )
     names = tuple(MarkTime(mark.name, times.onset(mark.at)) for mark in marks if isinstance(mark, NameMark))
-    return Timeline(spans=tuple(spans), nods=nods), names
+    return Timeline(spans=tuple(spans), gestures=gestures), names
 
 
 def resolve_recording_marks(

@@ -28,8 +28,8 @@ from tts2face.types import Clip
 
 TEXT = "We were away a year ago, but Bob may move five big maps."
 PLACES = {  # of edits that add an element, in a timeline's JSON
-    "paint": "spans", "nod": "nods", "gaze": "gaze", "listen": "listens", "strength": "strengths", "curve": "curves",
-    "channel": "edits",
+    "paint": "spans", "gesture": "gestures", "gaze": "gaze", "listen": "listens", "strength": "strengths",
+    "curve": "curves", "channel": "edits",
 }  # fmt: skip
 STYLES = [
     {"name": "measured", "color": "#7f8a99"},

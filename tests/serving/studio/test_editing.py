@@ -9,7 +9,7 @@ import pytest
 
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence
-from tts2face.gestures.elements import GazeTarget, ListeningSpan, Nod, StyleSpan
+from tts2face.gestures.elements import GazeTarget, Gesture, ListeningSpan, StyleSpan
 from tts2face.gestures.kinds import KINDS
 from tts2face.lips.options import ExcludedToken
 from tts2face.models.palette import FEATURES
@@ -74,19 +74,29 @@ def test_a_curve_is_replaced_and_removed(edit: dict[str, Any], part: str) -> Non
 def test_nods_and_gaze_are_placed_replaced_and_removed() -> None:
     project = edited(
         PROJECT,
-        {"kind": "nod", "time": 1.0, "size": 1.0}, {"kind": "nod", "time": 1.02, "size": 0.5},
+        {"kind": "gesture", "name": "nod", "time": 1.0, "size": 1.0},
+        {"kind": "gesture", "name": "nod", "time": 1.02, "size": 0.5},
         {"kind": "gaze", "start": 0, "end": 2, "down_deg": 5, "left_deg": -10},
         {"kind": "listen", "start": -1, "end": 2}, {"kind": "listen", "start": 1, "end": 3},
     )  # fmt: skip
-    assert project.timeline.nods == (Nod(1.02, 0.5),)
+    assert project.timeline.gestures == (Gesture(1.02, size=0.5),)
     assert project.timeline.gaze == (GazeTarget(5, -10, 0, 2),)
     assert project.timeline.listens == (ListeningSpan(0, 1), ListeningSpan(1, 3))
-    removed = ({"kind": "remove_nod", "time": 1.03}, {"kind": "remove_gaze", "time": 0.5})
+    removed = ({"kind": "remove_gesture", "time": 1.03, "name": "nod"}, {"kind": "remove_gaze", "time": 0.5})
     empty = edited(project, *removed, *({"kind": "remove_listen", "time": time} for time in (0.5, 2))).timeline
-    assert (empty.nods, empty.gaze, empty.listens) == ((), (), ())
-    for kind in ("nod", "gaze", "listen"):
+    assert (empty.gestures, empty.gaze, empty.listens) == ((), (), ())
+    for kind in ("gesture", "gaze", "listen"):
         with pytest.raises(InputError, match=r"at 5.00 s; click on one"):
-            edited(project, {"kind": f"remove_{kind}", "time": 5})
+            edited(project, {"kind": f"remove_{kind}", "time": 5, "name": "nod"})
+
+
+def test_gestures_of_other_names_stay() -> None:
+    look = {"kind": "gesture", "name": "look_away", "time": 1.01, "size": 1, "seconds": 2, "left_deg": -20.0}
+    project = edited(PROJECT, {"kind": "gesture", "name": "nod", "time": 1.0, "size": 1}, look)
+    assert project.timeline.gestures == (Gesture(1.0), Gesture(1.01, "look_away", 1.0, 2.0, None, -20.0))
+    assert (
+        edited(project, {"kind": "remove_gesture", "name": "nod", "time": 1}).timeline.gestures[0].name == "look_away"
+    )
 
 
 def test_lanes_are_muted_solo_and_seeded() -> None:
@@ -177,7 +187,9 @@ def test_options_change_alone() -> None:
         ({"kind": "mute", "feature": "head", "on": 1}, "on of the edit mute must be true or false"),
         ({"kind": "strength", "feature": "head", "keys": [[0, "a"]]}, "keys must be a list of"),
         ({"kind": "strength", "feature": "head", "keys": [[0, 9]]}, "the strength of head"),
-        ({"kind": "nod", "time": math.nan, "size": 1}, "time of the edit nod must be a number"),
+        ({"kind": "gesture", "name": "nod", "time": math.nan, "size": 1}, "time of the edit gesture must be a number"),
+        ({"kind": "gesture", "name": "wave", "time": 1, "size": 1}, "there is no gesture 'wave'; choose nod"),
+        ({"kind": "gesture", "name": "nod", "time": 1, "size": 1, "seconds": "2"}, "seconds of the edit gesture must"),
         ({"kind": "request", "options": {"speed": 2}}, "there is no option 'speed'"),
         ({"kind": "request", "options": {"rate": "fast"}}, "rate must be a number"),
         ({"kind": "request", "options": {"rate": 9}}, "rate"),
@@ -193,7 +205,7 @@ def test_wrong_edits_are_refused_with_their_reason(edit: dict[str, Any], reason:
 
 def test_every_kind_of_edit_is_tested() -> None:
     assert set(EDITS) == {
-        "paint", "erase", "curve", "strength", "channel", "nod", "remove_nod", "gaze", "remove_gaze", "listen",
+        "paint", "erase", "curve", "strength", "channel", "gesture", "remove_gesture", "gaze", "remove_gaze", "listen",
         "remove_listen", "mute", "solo", "seed", "edge", "reset_edges", "pronounce", "exclude", "request", "models",
         "picture", "name",
     }  # fmt: skip

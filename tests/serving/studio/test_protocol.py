@@ -16,7 +16,7 @@ def test_the_module_is_that_of_the_tables() -> None:
 
 def test_components_make_edits_of_the_module_only() -> None:
     made = {name: set(re.findall(r"\bEDITS\.(\w+)", text)) for name, text in COMPONENTS.items()}
-    assert {"paint", "erase", "nod", "edge"} <= set().union(*made.values())
+    assert {"paint", "erase", "gesture", "edge"} <= set().union(*made.values())
     assert {name: found - set(EDITS) for name, found in made.items() if found - set(EDITS)} == {}
     by_hand = re.compile(r'(?<!#)emit\((?:"edit", )?\{')
     assert [name for name, text in COMPONENTS.items() if by_hand.search(text)] == []

@@ -17,7 +17,7 @@ from typing import Any
 from lexicon.errors import InputError
 from lexicon.sequence import PhoneSequence
 from lexicon.values.checks import check_type, is_number
-from tts2face.gestures.elements import Nod, StyleSpan, check_feature
+from tts2face.gestures.elements import Gesture, StyleSpan, check_feature
 from tts2face.gestures.kinds import KINDS, ElementKind
 from tts2face.gestures.timeline import Timeline, expand_feature
 from tts2face.lips.options import ExcludedToken
@@ -28,11 +28,12 @@ from tts2face.session.named_models import Models
 from tts2face.session.project import Project
 
 MIN_PHONE_S = 0.01  # shortest phone that dragging an edge leaves: a frame of the alignment
-NEAR_S = 0.05  # within which a nod is the one at a time
+NEAR_S = 0.05  # within which a gesture is the one at a time
 Edit = Mapping[str, Any]
 Sentences = Mapping[tuple[str, int], PhoneSequence]  # phones of each sentence by its text and occurrence
 Change = Callable[[Project, Edit, Sentences], Project]
 _SPAN = {"start": float, "end": float}
+_USUAL = float | None  # of a field that may be missing, or null: its usual value
 _TIME = {"time": float}
 _LANE = {"feature": str, "on": bool}
 _SENTENCE = {"text": str, "occurrence": int}
@@ -60,8 +61,10 @@ def apply(project: Project, edit: Edit, sentences: Sentences | None = None) -> P
     return EDITS[kind].change(project, given, sentences or {})
 
 
-def _checked(kind: str, name: str, wanted: type, edit: Edit) -> Any:
+def _checked(kind: str, name: str, wanted: Any, edit: Edit) -> Any:
     """Value of a field; a missing or empty ``end`` is the end of the clip."""
+    if wanted == _USUAL:
+        return None if edit.get(name) is None else check_type(f"{name} of the edit {kind}", edit[name], float)
     if name == "end" and edit.get(name) is None:
         return math.inf
     if name not in edit:
@@ -99,18 +102,24 @@ def _curve(kind: ElementKind, project: Project, given: Edit, _: Sentences) -> Pr
     return _timed(project, **{kind.name: (*kept, *made)})
 
 
-def _nod(project: Project, given: Edit, _: Sentences) -> Project:
-    others = tuple(nod for nod in project.timeline.nods if abs(nod.time - given["time"]) >= NEAR_S)
-    return _timed(project, nods=(*others, Nod(given["time"], given["size"])))
+def _gesture(project: Project, given: Edit, _: Sentences) -> Project:
+    """Add a gesture, which replaces one of its name beside it."""
+    made = Gesture(**given)
+    return _timed(project, gestures=(*_without_gesture(project, made.time, made.name), made))
 
 
-def _remove_nod(project: Project, given: Edit, _: Sentences) -> Project:
-    nods = project.timeline.nods
-    near = min(nods, key=lambda nod: abs(nod.time - given["time"]), default=None)
-    # a page knows times to the pixel
-    if near is None or abs(near.time - given["time"]) > NEAR_S:
-        raise InputError(f"there is no nod at {given['time']:.2f} s; click on one")
-    return _timed(project, nods=tuple(nod for nod in nods if nod is not near))
+def _remove_gesture(project: Project, given: Edit, _: Sentences) -> Project:
+    kept = _without_gesture(project, given["time"], given["name"])
+    if len(kept) == len(project.timeline.gestures):
+        raise InputError(f"there is no {given['name'][:40]} at {given['time']:.2f} s; click on one")
+    return _timed(project, gestures=kept)
+
+
+def _without_gesture(project: Project, time: float, name: str) -> tuple[Gesture, ...]:
+    """Gestures but the nearest one of a name within `NEAR_S`: a page knows times to the pixel."""
+    near = [one for one in project.timeline.gestures if one.name == name and abs(one.time - time) < NEAR_S]
+    gone = min(near, key=lambda one: abs(one.time - time), default=None)
+    return tuple(one for one in project.timeline.gestures if one is not gone)
 
 
 def _place(kind: ElementKind, project: Project, given: Edit, _: Sentences) -> Project:
@@ -231,7 +240,7 @@ class EditKind:
         Kind of the elements of the timeline (`KINDS`) that it adds or removes; a curve is set as a whole.
     """
 
-    fields: Mapping[str, type]
+    fields: Mapping[str, Any]
     change: Change
     adds: str = ""
     removes: str = ""
@@ -244,8 +253,12 @@ EDITS: Mapping[str, EditKind] = {
         edit: EditKind({KINDS[name].owner: str, "keys": list}, partial(_curve, KINDS[name]), adds=name)
         for edit, name in (("curve", "curves"), ("strength", "strengths"), ("channel", "edits"))
     },
-    "nod": EditKind({"time": float, "size": float}, _nod, adds="nods"),
-    "remove_nod": EditKind(_TIME, _remove_nod, removes="nods"),
+    "gesture": EditKind(
+        {"time": float, "name": str, "size": float, "seconds": _USUAL, "down_deg": _USUAL, "left_deg": _USUAL},
+        _gesture,
+        adds="gestures",
+    ),
+    "remove_gesture": EditKind({**_TIME, "name": str}, _remove_gesture, removes="gestures"),
     "gaze": EditKind({**_SPAN, "down_deg": float, "left_deg": float}, partial(_place, _GAZE), adds="gaze"),
     "remove_gaze": EditKind(_TIME, partial(_remove_span, _GAZE, "gaze target"), removes="gaze"),
     "listen": EditKind(_SPAN, partial(_place, _LISTENS), adds="listens"),

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from lexicon.gesture_names import DIRECTIONS, GESTURES
 from lexicon.marked_text import GESTURE_SIZE_LIMITS
 from tts2face.gestures.elements import CHANNEL_OFFSET_LIMITS, EXPRESSION_WEIGHT_LIMITS, GAIN_LIMITS, GAZE_LIMITS_DEG
 from tts2face.gestures.kinds import KINDS
@@ -15,9 +16,9 @@ from tts2face.serving.studio.editing import EDITS, MIN_PHONE_S
 from tts2face.types import HEAD_CHANNELS
 
 MODULE = Path(__file__).parent / "components" / "protocol.js"
-LIMITS = {  # of the values of elements: of keys, of both angles of the gaze, of the size of a nod
+LIMITS = {  # of the values of elements: of keys, of both angles of the gaze, of the size of a gesture
     "strengths": GAIN_LIMITS, "curves": EXPRESSION_WEIGHT_LIMITS, "edits": CHANNEL_OFFSET_LIMITS,
-    "gaze": GAZE_LIMITS_DEG, "nods": GESTURE_SIZE_LIMITS,
+    "gaze": GAZE_LIMITS_DEG, "gestures": GESTURE_SIZE_LIMITS,
 }  # fmt: skip
 HEAD = """// Edits and elements of a timeline as the server has them, made of its tables by
 // `python -m tts2face.serving.studio.protocol`: change those, and run it again.
@@ -30,9 +31,11 @@ def protocol_module() -> str:
         "FEATURES": FEATURES,
         "EXPRESSIONS": EXPRESSIONS,
         "HEAD_CHANNELS": HEAD_CHANNELS,
+        "GESTURES": {name: gesture.directions for name, gesture in GESTURES.items()},
+        "DIRECTIONS": DIRECTIONS,
         "LEAST_PHONE_S": MIN_PHONE_S,
     }
-    constants = "".join(f"export const {name} = {json.dumps(value)};\n" for name, value in names.items())
+    constants = "".join(f"export const {name} = {json.dumps(value, default=dict)};\n" for name, value in names.items())
     kinds = "".join(f"  {name}: {_object(_element_kind(name))},\n" for name in KINDS)
     edits = "".join(f"  {name}: {_maker(name)},\n" for name in EDITS)
     return (

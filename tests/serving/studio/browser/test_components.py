@@ -196,13 +196,13 @@ def test_keys_paint_and_erase_the_selection(page):
 
 def test_double_click_adds_key_points_nods_gaze_targets_and_listening(page):
     page.browser.double_click(*page.at("curve", 1.2, 0.3))
-    page.browser.double_click(*page.at("nods", 2.0))
+    page.browser.double_click(*page.at("gestures", 2.0))
     page.browser.double_click(*page.at("targets", 2.5))
     page.browser.double_click(*page.at("listens", 1.0))
     page.browser.double_click(*page.at("channel", 2.0, 0.2))
     curve, nod, gaze, listen, channel = page.edits(5)
     assert (curve["kind"], curve["expression"], len(curve["keys"])) == ("curve", "happy", 3)
-    assert (nod["kind"], nod["size"]) == ("nod", 1)
+    assert (nod["kind"], nod["name"], nod["size"]) == ("gesture", "nod", 1)
     assert (gaze["kind"], gaze["down_deg"], gaze["left_deg"]) == ("gaze", 0, 0)
     assert (listen["kind"], listen["end"] - listen["start"]) == ("listen", pytest.approx(1.0))
     assert (channel["kind"], channel["channel"]) == ("channel", "jawOpen")

@@ -89,7 +89,7 @@ def test_stale_edges_are_dropped_with_a_note_and_undo_brings_them_back(
 
 def test_a_shorter_text_cuts_the_timeline(studio: httpx.Client, number: str) -> None:
     edit(studio, number, {"kind": "paint", "feature": "head", "style": "delighted", "start": 0.5, "end": 3.0})
-    edit(studio, number, {"kind": "nod", "time": 2.8, "size": 1})
+    edit(studio, number, {"kind": "gesture", "name": "nod", "time": 2.8, "size": 1})
     preview(studio, number)
     edit(studio, number, {"kind": "request", "options": {"text": "Bob may move."}})
     header, *_ = preview(studio, number)
@@ -97,7 +97,7 @@ def test_a_shorter_text_cuts_the_timeline(studio: httpx.Client, number: str) -> 
     assert any("what the timeline had behind was cut" in note for note in header["notes"])
     timeline = studio.get(f"/api/projects/{number}/project.json").json()["timeline"]
     assert 0.0 <= timeline["spans"][0]["end"] - header["duration"] < 1 / header["fps"]  # the end of its last frame
-    assert "nods" not in timeline
+    assert "gestures" not in timeline
 
 
 def test_what_is_wrong_is_said_and_the_last_clip_stays(studio: httpx.Client, number: str) -> None:
@@ -234,7 +234,10 @@ def test_a_killed_server_loses_nothing_older_than_a_second_and_makes_its_files_l
         with httpx.Client(base_url=f"{running.url}/studio", timeout=60.0) as client:
             number = client.post("/api/projects", json={"text": TEXT}).json()["id"]
             for at in range(12):
-                assert edit(client, number, {"kind": "nod", "time": 0.2 * at, "size": 1.0}).status_code == 200
+                assert (
+                    edit(client, number, {"kind": "gesture", "name": "nod", "time": 0.2 * at, "size": 1.0}).status_code
+                    == 200
+                )
                 time.sleep(0.1)
             picture = {"kind": "picture", "options": {"size": "64x64", "quality": "draft"}}
             assert edit(client, number, picture).status_code == 200
@@ -254,7 +257,7 @@ def test_a_killed_server_loses_nothing_older_than_a_second_and_makes_its_files_l
             made = {one["id"] for one in client.get(address).json()}
         folder = project_file(Path(running.data.name), number).parent / "renders"
         assert {path.suffix for path in folder.iterdir()} == {".mp4"}
-    assert len(kept.timeline.nods) == len(back["timeline"]["nods"]) == 12
+    assert len(kept.timeline.gestures) == len(back["timeline"]["gestures"]) == 12
     assert (undone["n_undo"], undone["n_redo"]) == (12, 1)
     assert made == set(wanted)
     assert len(done) < len(wanted)  # otherwise the second server had nothing to make

@@ -4,6 +4,8 @@
 export const FEATURES = ["expression", "brows", "blink", "cheeks", "gaze", "head"];
 export const EXPRESSIONS = ["sad", "happy", "afraid", "angry", "surprised"];
 export const HEAD_CHANNELS = ["pitch", "yaw", "roll", "x", "y", "z"];
+export const GESTURES = {"nod": "none", "shake": "none", "tilt": "side", "look_away": "any", "look_at": "any", "wink": "side", "blink": "none", "brows_up": "none", "brows_together": "none", "smile": "none", "frown": "none", "laugh": "none", "sigh": "none", "surprise": "none", "think": "any", "listen": "none"};
+export const DIRECTIONS = {"left": [0.0, 15.0], "right": [0.0, -15.0], "up": [-12.0, 0.0], "down": [12.0, 0.0]};
 export const LEAST_PHONE_S = 0.01;
 
 /** Elements: shape, field that names a lane, edits that add and remove one, limits of values. */
@@ -12,8 +14,7 @@ export const KINDS = {
   expressions: { shape: "span", owner: "expression", add: null, remove: null },
   gaze: { shape: "span", owner: "", add: "gaze", remove: "remove_gaze", limits: [-35.0, 35.0] },
   listens: { shape: "span", owner: "", add: "listen", remove: "remove_listen" },
-  nods: { shape: "instant", owner: "", add: "nod", remove: "remove_nod", limits: [0.1, 2.0] },
-  brow_raises: { shape: "instant", owner: "", add: null, remove: null },
+  gestures: { shape: "instant", owner: "name", add: "gesture", remove: "remove_gesture", limits: [0.1, 2.0] },
   strengths: { shape: "curve", owner: "feature", add: "strength", remove: null, limits: [0.0, 3.0] },
   curves: { shape: "curve", owner: "expression", add: "curve", remove: null, limits: [-0.5, 1.5] },
   edits: { shape: "curve", owner: "channel", add: "channel", remove: null, limits: [-1000.0, 1000.0] },
@@ -26,8 +27,8 @@ export const EDITS = {
   curve: ({ expression, keys }) => ({ kind: "curve", expression, keys }),
   strength: ({ feature, keys }) => ({ kind: "strength", feature, keys }),
   channel: ({ channel, keys }) => ({ kind: "channel", channel, keys }),
-  nod: ({ time, size }) => ({ kind: "nod", time, size }),
-  remove_nod: ({ time }) => ({ kind: "remove_nod", time }),
+  gesture: ({ time, name, size, seconds, down_deg, left_deg }) => ({ kind: "gesture", time, name, size, seconds, down_deg, left_deg }),
+  remove_gesture: ({ time, name }) => ({ kind: "remove_gesture", time, name }),
   gaze: ({ start, end, down_deg, left_deg }) => ({ kind: "gaze", start, end, down_deg, left_deg }),
   remove_gaze: ({ time }) => ({ kind: "remove_gaze", time }),
   listen: ({ start, end }) => ({ kind: "listen", start, end }),

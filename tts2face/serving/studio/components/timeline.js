@@ -1,4 +1,4 @@
-// The timeline: sound, words, phones, painted styles, key points, nods, gaze targets and curves over time.
+// The timeline: sound, words, phones, painted styles, key points, gestures, gaze targets and curves over time.
 
 import { clock } from "tts2face-studio/clock.js";
 import { comparison, loadPreview, preview } from "tts2face-studio/preview.js";

@@ -1,7 +1,7 @@
 // Drawing of the timeline; only what is visible is drawn.
 
 import { SPAN_ROWS, channelRange, columnOf, frameValue, valueY } from "./timeline_values.js";
-import { curveValue, firstAfter, formatTime } from "./timeline_view.js";
+import { curveValue, firstAfter, formatTime, gestureLabel } from "./timeline_view.js";
 
 const FONT = "12px system-ui, sans-serif";
 const TICKS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 30, 60, 120];
@@ -69,7 +69,7 @@ export class Painter {
       words: () => this.#labels(row, this.state.preview.words),
       phones: () => this.#labels(row, this.state.phones),
       curve: () => this.#expressions(row),
-      nods: () => this.#nods(row),
+      gestures: () => this.#gestures(row),
       targets: () => this.#spans(row),
       listens: () => this.#spans(row),
       channel: () => this.#channel(row),
@@ -207,22 +207,15 @@ export class Painter {
     this.#text(text, 6, row.y + row.height / 2, this.state.view.width);
   }
 
-  #nods(row) {
+  #gestures(row) {
     const { model, view, colors } = this.state, { context: c } = this;
-    if (!model.nods.length) this.#hint(row, "Double-click to add a nod");
-    for (const { time, size } of model.nods) {
-      const x = view.x(time), depth = 4 + 4 * Math.min(size, 2);
-      if (x < -80 || x > view.width + 10) continue;
-      c.strokeStyle = colors.accent;
-      c.lineWidth = 2;
-      c.beginPath();
-      c.moveTo(x, row.y + 6);
-      c.lineTo(x + 0.18 * view.scale, row.y + 6 + depth);
-      c.lineTo(x + 0.42 * view.scale, row.y + 5);
-      c.lineTo(x + 0.55 * view.scale, row.y + 6);
-      c.stroke();
+    if (!model.gestures.length) this.#hint(row, "Double-click to add a gesture");
+    for (const { time, name, size } of model.gestures) {
+      const x = view.x(time);
+      if (x < -120 || x > view.width + 10) continue;
       c.fillStyle = colors.accent;
-      c.fillRect(x - 2, row.y + 3, 4, row.height - 8);
+      c.fillRect(x - 2, row.y + 3, 2 + 2 * Math.min(size, 2), row.height - 6);
+      this.#text(gestureLabel(name), x + 8, row.y + row.height / 2, 110);
     }
   }
 

@@ -1,15 +1,15 @@
 // Forms in which the values of an element are typed.
 
 import { clock } from "./clock.js";
-import { EDITS, KINDS } from "./protocol.js";
+import { DIRECTIONS, EDITS, GESTURES, KINDS } from "./protocol.js";
 import { SPAN_ROWS } from "./timeline_values.js";
-import { rounded } from "./timeline_view.js";
+import { gestureLabel, rounded } from "./timeline_view.js";
 
 const number = (name, label, value, low, high, step) => ({ name, label, value: rounded(value), low, high, step });
 
 /** Open the form of an element; words and phones have none. */
 export function openEditor(host, row, item) {
-  const forms = { span: openSpan, nod: openNod, gaze: openElement, listen: openElement, key: openKey };
+  const forms = { span: openSpan, gesture: openGesture, gaze: openElement, listen: openElement, key: openKey };
   clock.pause();
   forms[item.kind]?.(host, row, item);
 }
@@ -32,10 +32,31 @@ function openSpan(host, row, item) {
   host.component.openEditor(`Style on ${row.label}`, fields, apply, () => host.remove(row, item));
 }
 
-function openNod(host, row, item) {
-  const { time, size } = item.nod;
-  const fields = [number("time", "Time in seconds", time, 0, host.state.view.duration, 0.01), number("size", "Size (1 is 6°)", size, ...KINDS.nods.limits, 0.1)];
-  host.component.openEditor("Nod", fields, (values) => host.replaceNod(item.nod, values.time, values.size), () => host.remove(row, item));
+function openGesture(host, row, item) {
+  const { time, name, size, seconds } = item.gesture;
+  const fields = [
+    { name: "name", label: "Gesture", value: name, options: Object.keys(GESTURES) },
+    number("time", "Time in seconds", time, 0, host.state.view.duration, 0.01),
+    number("size", "Size (1 is usual)", size, ...KINDS.gestures.limits, 0.1),
+    number("seconds", "Duration in seconds (0 is usual)", seconds ?? 0, 0, 30, 0.1),
+    { name: "direction", label: "Direction", value: directionOf(item.gesture), options: ["usual", ...Object.keys(DIRECTIONS)] },
+  ];
+  const apply = ({ direction, ...values }) => {
+    const sides = GESTURES[values.name], [down, left] = DIRECTIONS[direction] ?? [null, null];
+    if (down !== null && (sides === "none" || (sides === "side" && left === 0))) {
+      return host.component.say(`The gesture ${gestureLabel(values.name)} has no direction ${direction}; choose usual.`);
+    }
+    const kept = direction === directionOf(item.gesture) ? item.gesture : { down_deg: down || null, left_deg: left || null };
+    return host.replaceGesture(item.gesture, { ...values, seconds: values.seconds || null, down_deg: kept.down_deg ?? null, left_deg: kept.left_deg ?? null });
+  };
+  host.component.openEditor("Gesture", fields, apply, () => host.remove(row, item));
+}
+
+/** The nearest direction of the form. */
+function directionOf({ down_deg: down, left_deg: left }) {
+  if (!down && !left) return "usual";
+  if (Math.abs(left ?? 0) >= Math.abs(down ?? 0)) return left > 0 ? "left" : "right";
+  return down > 0 ? "down" : "up";
 }
 
 function openElement(host, row, item) {

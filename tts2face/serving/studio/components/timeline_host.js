@@ -269,15 +269,15 @@ export class TimelineHost {
   remove(row, item) {
     const { state } = this;
     if (item.kind === "span") this.emit(EDITS.erase({ feature: row.feature, start: item.begin, end: Math.min(item.end, state.view.duration) }));
-    else if (item.kind === "nod") this.emit(EDITS.remove_nod({ time: item.nod.time }));
+    else if (item.kind === "gesture") this.emit(EDITS.remove_gesture(item.gesture));
     else if (SPAN_ROWS[row.id]) this.emit(EDITS[KINDS[SPAN_ROWS[row.id].list].remove]({ time: item.begin }));
     else if (item.kind === "key") this.emit(state.model.removeKey(state.model.curveOf(row, state.chosen), item.number));
   }
 
-  replaceNod(nod, time, size) {
-    const [low, high] = KINDS.nods.limits;
-    this.emit(EDITS.remove_nod({ time: nod.time }));
-    this.emit(EDITS.nod({ time, size: rounded(Math.min(Math.max(size, low), high)) }));
+  replaceGesture(gesture, changed) {
+    const [low, high] = KINDS.gestures.limits, made = { ...gesture, ...changed };
+    this.emit(EDITS.remove_gesture(gesture));
+    this.emit(EDITS.gesture({ ...made, size: rounded(Math.min(Math.max(made.size, low), high)) }));
   }
 
   moveEdge(index, time) {

@@ -2,7 +2,7 @@
 
 import { KINDS } from "./protocol.js";
 import { SPAN_ROWS, columnOf, frameValue } from "./timeline_values.js";
-import { curveValue, firstAfter } from "./timeline_view.js";
+import { curveValue, firstAfter, gestureLabel } from "./timeline_view.js";
 
 const HIT_PX = 6;
 
@@ -12,7 +12,7 @@ export function rowItems(row, state) {
   const make = {
     words: () => preview.words.map(([text, begin, end, , isDoubtful], index) => ({ kind: "word", begin, end, index, name: text, label: `${isDoubtful ? "doubtful " : ""}word ${text}` })),
     phones: () => state.phones.map((phone, index) => ({ kind: "phone", begin: phone[1], end: phone[2], index, name: phone[0], label: `phone ${phone[0]}` })),
-    nods: () => model.nods.map((nod) => ({ kind: "nod", begin: nod.time, end: nod.time, nod, label: `nod of size ${nod.size}` })),
+    gestures: () => model.gestures.map((one) => ({ kind: "gesture", begin: one.time, end: one.time, gesture: one, label: `${gestureLabel(one.name)} of size ${one.size}` })),
     curve: () => keyItems(row, state, chosen.expression),
     channel: () => keyItems(row, state, chosen.channel),
   }[row.id];

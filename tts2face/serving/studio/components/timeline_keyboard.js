@@ -105,7 +105,7 @@ function enter(state, host) {
     host.open(row, item);
     return;
   }
-  if (row.id === "nods") host.emit(EDITS.nod({ time, size: 1 }));
+  if (row.id === "gestures") host.emit(EDITS.gesture({ time, name: "nod", size: 1, seconds: null, down_deg: null, left_deg: null }));
   else if (SPAN_ROWS[row.id]) {
     const { kind, made } = SPAN_ROWS[row.id];
     const [start, end] = state.range ?? [time, Math.min(time + 1, state.view.duration)];
@@ -129,7 +129,7 @@ function remove(state, host) {
   if (item) host.remove(row, item);
 }
 
-/** Alt and an arrow: move a phone's first edge, a key or a nod by 10 ms, or change the value of a key. */
+/** Alt and an arrow: move a phone's first edge, a key or a gesture by 10 ms, or change the value of a key. */
 function adjust(key, state, host) {
   const { row, item } = state.cursor;
   if (!item) return true;
@@ -140,6 +140,9 @@ function adjust(key, state, host) {
     const curve = state.model.curveOf(row, state.chosen), [time, value] = curve.keys[item.number];
     host.emit(state.model.moveKey(curve, item.number, time + sideways, value + upwards * (VALUE_STEPS[row.id] ?? 0.1)));
     host.focus(row, rowItems(row, state).find((one) => one.kind === "key" && one.number === item.number) ?? null);
-  } else if (item.kind === "nod") host.replaceNod(item.nod, rounded(Math.max(item.nod.time + sideways, 0)), item.nod.size + 0.1 * upwards);
+  } else if (item.kind === "gesture") {
+    const { time, size } = item.gesture;
+    host.replaceGesture(item.gesture, { time: rounded(Math.max(time + sideways, 0)), size: size + 0.1 * upwards });
+  }
   return true;
 }

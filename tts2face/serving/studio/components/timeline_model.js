@@ -80,7 +80,7 @@ export class TimelineModel {
     if (name === "spans") this.#paint(edit, kind === add ? edit.style : null);
     else if (shape === "curve") setKeys(this[name], edit[owner], edit.keys);
     else if (kind === add) this[name] = (shape === "span" ? placed : inserted)(this[name], element);
-    else this[name] = (shape === "span" ? without : withoutNear)(this[name], edit.time);
+    else this[name] = shape === "span" ? without(this[name], edit.time) : withoutNear(this[name], edit);
   }
 
   strengthAt(feature, time) {
@@ -120,8 +120,8 @@ function inserted(instants, instant) {
   return [...instants, instant].sort((a, b) => a.time - b.time);
 }
 
-function withoutNear(instants, time) {
-  return instants.filter((instant) => Math.abs(instant.time - time) > 1e-6);
+function withoutNear(instants, { time, name }) {
+  return instants.filter((instant) => instant.name !== name || Math.abs(instant.time - time) > 1e-6);
 }
 
 function without(spans, time) {
@@ -146,8 +146,8 @@ export function describeEdit(edit) {
     paint: `painted ${edit.style} on ${edit.feature}${span}`,
     erase: `erased ${edit.feature}${span}`,
     edge: `moved a phone edge to ${edit.time} seconds of its sentence`,
-    nod: `nod at ${edit.time} seconds`,
-    remove_nod: "removed a nod",
+    gesture: `${edit.name} at ${edit.time} seconds`,
+    remove_gesture: `removed a ${edit.name}`,
     gaze: `gaze target${span}`,
     remove_gaze: "removed a gaze target",
     listen: `the face listens${span}`,

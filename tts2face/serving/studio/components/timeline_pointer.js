@@ -53,7 +53,7 @@ export class PointerTools {
     const key = hitKey(row, this.state, x, y, (value) => this.valueY(row, value));
     if (key) return this.key(row, key);
     if (row.feature) return this.state.brush.tool === "select" ? this.resize(row, x) : this.paint(row, x, event);
-    if (row.id === "nods") return this.nod(row, x) ?? this.choose(row, x);
+    if (row.id === "gestures") return this.gesture(row, x) ?? this.choose(row, x);
     return this.choose(row, x);
   }
 
@@ -213,20 +213,19 @@ export class PointerTools {
     };
   }
 
-  nod(row, x) {
-    const { state } = this, nod = state.model.nods.find((one) => Math.abs(state.view.x(one.time) - x) <= 8);
-    if (!nod) return null;
-    const first = nod.time;
+  gesture(row, x) {
+    const { state } = this, gesture = state.model.gestures.find((one) => Math.abs(state.view.x(one.time) - x) <= 8);
+    if (!gesture) return null;
+    const first = gesture.time;
     return {
-      move: (place, _, event) => (nod.time = rounded(this.time(place, event))),
+      move: (place, _, event) => (gesture.time = rounded(this.time(place, event))),
       end: (_, moved) => {
-        const { time, size } = nod;
-        nod.time = first;
+        const { time } = gesture;
+        gesture.time = first;
         if (!moved) return this.choose(row, state.view.x(first));
-        this.host.emit(EDITS.remove_nod({ time: first }));
-        return this.host.emit(EDITS.nod({ time, size }));
+        return this.host.replaceGesture(gesture, { time });
       },
-      cancel: () => (nod.time = first),
+      cancel: () => (gesture.time = first),
     };
   }
 
@@ -237,7 +236,7 @@ export class PointerTools {
     const curve = state.model.curveOf(row, state.chosen);
     const onKey = curve && hitKey(row, state, x, y, (value) => this.valueY(row, value));
     if (onKey || (item && !curve)) this.host.open(row, item);
-    else if (row.id === "nods") this.host.emit(EDITS.nod({ time: rounded(time), size: 1 }));
+    else if (row.id === "gestures") this.host.emit(EDITS.gesture({ time: rounded(time), name: "nod", size: 1, seconds: null, down_deg: null, left_deg: null }));
     else if (SPAN_ROWS[row.id]) {
       const end = rounded(Math.min(time + NEW_S, state.view.duration)), { kind, made } = SPAN_ROWS[row.id];
       this.host.emit(EDITS[kind]({ start: rounded(time), end, ...made }));

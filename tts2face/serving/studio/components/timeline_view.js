@@ -8,6 +8,9 @@ export const FEATURE_LABELS = {
   cheeks: "Cheeks, nose",
   head: "Head",
 };
+/** Name of a gesture as people read it. */
+export const gestureLabel = (name) => name.replaceAll("_", " ");
+
 const MAX_SCALE = 2000; // pixels per second
 const SNAP_PX = 7;
 
@@ -20,7 +23,7 @@ export function layoutRows(features) {
     { id: "phones", label: "Phones", height: 22 },
     ...features.map((feature) => ({ id: `lane:${feature}`, feature, label: FEATURE_LABELS[feature] ?? feature, height: 27 })),
     { id: "curve", label: "Expression keys", height: 44 },
-    { id: "nods", label: "Nods", height: 22 },
+    { id: "gestures", label: "Gestures", height: 22 },
     { id: "targets", label: "Gaze targets", height: 22 },
     { id: "listens", label: "Listening", height: 22 },
     { id: "channel", label: "Channel", height: 72 },
