@@ -7,17 +7,18 @@ apostrophes and hyphens inside them, and sentence punctuation; normalisation is 
 import functools
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import replace
 
 from lexicon import form_readers as forms
 from lexicon import written_forms as readings
 from lexicon.canonical import canonical_text, signs_before_vowels
 from lexicon.capitals import sentence_case
-from lexicon.german_dates import read_german_dates
+from lexicon.locales.reading import read_forms
 from lexicon.number_words import MAX_CARDINAL_DIGITS
 from lexicon.pauses import MARKS
 from lexicon.scripts import name_foreign_letters, name_letters_in_words
 from lexicon.vowels import add_vowels
+from lexicon.written_forms import WrittenForm
 
 _FULL_MONTH = "|".join(readings.MONTHS)
 _MONTH = rf"(?:{_FULL_MONTH}|(?:Jan|Feb|Mar|Apr|Jun|Jul|Aug|Sept?|Oct|Nov|Dec)\b\.?)"
@@ -43,14 +44,6 @@ _LONG_WORD = re.compile(r"[^\W\d_\u0900-\U0010ffff]{100}(?=[^\W\d_\u0900-\U0010f
 # espeak-ng reads aujourd’hui in English, and 12 345 with a narrow space as two numbers
 _AS_ESPEAK_READS = str.maketrans({"’": "'", "ʼ": "'", "\u00a0": " ", "\u202f": " ", "\u2009": " "})
 _LONG_NUMBER = re.compile(rf"[0-9]{{{MAX_CARDINAL_DIGITS + 1},}}")
-
-
-@dataclass(frozen=True, slots=True)
-class WrittenForm:
-    """A written form and its words; a punctuation mark is kept."""
-
-    source: str
-    spoken: str
 
 
 def _unit_pattern() -> str:
@@ -239,17 +232,28 @@ def normalize(text: str, language: str = "en-us") -> str:
     return join_words([token.spoken for token in split_tokens(_MULTIPLIED.sub(" × ", text))])
 
 
-def spoken_form(text: str, language: str) -> str:
-    """Spoken form of a text.
+def spoken_forms(text: str, language: str) -> list[WrittenForm]:
+    """Parts of a text that is not English, with their spoken forms, which a voice of the language reads.
 
-    English is normalised, days of German dates are written as words, Arabic and Hebrew get vowels where a model of them
-    is installed, and single letters of other writing systems are replaced by their names. A word of more than 100
-    letters is divided, and the digits of a longer number than English names are separated.
+    Numbers, dates, abbreviations and signs of a language with a table (`lexicon.locales`) become words. Single letters
+    of other writing systems are replaced by their names; a word of more than 100 letters is divided, as are the digits
+    of a longer number than English names.
+    """
+    return [replace(form, spoken=_readable(form.spoken, language)) for form in read_forms(text, language)]
+
+
+def _readable(spoken: str, language: str) -> str:
+    text = name_foreign_letters(spoken.translate(_AS_ESPEAK_READS), language)
+    text = _LONG_NUMBER.sub(lambda number: " ".join(number.group()), text)
+    return _LONG_WORD.sub(r"\g<0> ", text)
+
+
+def spoken_form(text: str, language: str) -> str:
+    """Spoken form of a text: English is normalised; of other languages see `spoken_forms`.
+
+    Arabic and Hebrew get vowels where a model of them is installed.
     """
     if language.startswith("en"):
         return _LONG_WORD.sub(r"\g<0> ", normalize(text))
-    if language.partition("-")[0] == "de":
-        text = read_german_dates(text)
-    text = name_foreign_letters(text.translate(_AS_ESPEAK_READS), language)
-    text = _LONG_NUMBER.sub(lambda number: " ".join(number.group()), text)
-    return signs_before_vowels(add_vowels(_LONG_WORD.sub(r"\g<0> ", text), language))
+    text = "".join(form.spoken for form in spoken_forms(text, language))
+    return signs_before_vowels(add_vowels(text, language))

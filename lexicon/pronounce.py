@@ -17,10 +17,11 @@ from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.homographs import homograph_segments, is_homograph
 from lexicon.ipa import IpaPhone
 from lexicon.languages import language_code
-from lexicon.normalize import split_tokens, spoken_form
+from lexicon.normalize import split_tokens, spoken_form, spoken_forms
 from lexicon.pauses import MARKS, PAUSES_S
 from lexicon.phones import PHONES, ipa_to_arpabet
 from lexicon.scripts import check_script
+from lexicon.sources import sources_of
 from lexicon.tones import EVEN, Tone
 from lexicon.unlisted_words import read_unlisted_words
 from lexicon.vowels import without_vowels
@@ -133,6 +134,10 @@ def _words_by_espeak(text: str, language: str) -> list[_WordDraft]:
         (without_vowels(word.text, language), word.mark, own) for word, own in words_by_espeak(spoken, language)
     ]  # as they are written
     words = [_WordDraft(written, written, mark, own) for written, mark, own in found]
+    if not language.startswith("en"):
+        sources = sources_of([word.text for word in words], spoken_forms(text, language))
+        for word, (_, source) in zip(words, sources or (), strict=False):
+            word.source = source
     if language.partition("-")[0] == "en":
         normalised = _split_words((token.source, token.spoken) for token in split_tokens(text))
         if len(normalised) == len(words):

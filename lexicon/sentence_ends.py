@@ -19,6 +19,7 @@ from importlib import resources
 from types import MappingProxyType
 
 from lexicon import written_forms as readings
+from lexicon.locales.tables import find_locale
 
 _WORD = re.compile(r"""[^\s("'“‘«„\[]*\Z""")
 _FIRST_WORD = re.compile(r"""["'“‘«(\[]*([^\W\d_]{1,40})""")
@@ -52,17 +53,30 @@ def _rule_table() -> dict[str, dict[str, _StopRule]]:
 
 
 @functools.cache
+def _rules(language: str) -> dict[str, _StopRule]:
+    """Rules of a language by abbreviation: of its rows, of all languages without rows, and of its own table."""
+    table = _rule_table()
+    own = dict(table.get(language, table["*"]))
+    locale = find_locale(language)
+    for written, row in locale.rows("abbreviation").items() if locale else ():
+        if written.endswith(".") and not {"end", "after"} & row.details.keys():
+            last = written[:-1].rpartition(" ")[2]
+            own.setdefault(last, _StopRule("number" if "number" in row.details else "never"))
+    return own
+
+
+@functools.cache
 def abbreviations(language: str) -> frozenset[str]:
     """Abbreviations of a language that end with a full stop, without it."""
-    table = _rule_table().get(_primary(language), _rule_table()["*"])
-    return frozenset(written for written in table if written not in ("*", "#"))
+    return frozenset(written for written in _rules(_primary(language)) if written not in ("*", "#"))
 
 
 @functools.cache
 def _titles(language: str) -> dict[str, _StopRule]:
     """Rules of abbreviations that end no sentence, by their capitals: MR. SMITH in a text of small letters."""
-    table = _rule_table().get(language, _rule_table()["*"])
-    return {written.upper(): stop for written, stop in table.items() if stop.rule == "never" and len(written) > 1}
+    return {
+        written.upper(): stop for written, stop in _rules(language).items() if stop.rule == "never" and len(written) > 1
+    }
 
 
 @functools.cache
@@ -86,6 +100,8 @@ def ends_sentence(before: str, after: str, language: str) -> bool:
         The text before the full stop, and after the space that follows it; the last 24 and the first 40 characters
         suffice.
     """
+    if after[:1].islower() and not after[:1].isascii():  # т. е. половина
+        return False
     word = _last_word(before)
     stop = _find_rule(word, language)
     if stop is None:
@@ -110,7 +126,7 @@ def _last_word(before: str) -> str:
 
 
 def _find_rule(word: str, language: str) -> _StopRule | None:
-    table = _rule_table().get(_primary(language), _rule_table()["*"])
+    table = _rules(_primary(language))
     found = table.get(word) or (table.get("#") if _ORDINAL.fullmatch(word) else None)
     return found or (_titles(_primary(language)).get(word) if word.isupper() else None)
 

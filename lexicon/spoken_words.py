@@ -10,9 +10,10 @@ from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.given_phones import pronounce_words
 from lexicon.languages import language_code
 from lexicon.marked_text import MarkedText
-from lexicon.normalize import split_tokens
+from lexicon.normalize import split_tokens, spoken_forms
 from lexicon.pronounce import NOTHING, Pronunciation, Word, pronounce
 from lexicon.sentences import Phrase, split_sentences
+from lexicon.sources import sources_of
 from lexicon.text_marks import is_ssml, parse_marks
 
 
@@ -55,7 +56,9 @@ def pronounce_phrase(phrase: Phrase, language: str, dictionary: Dictionary | Non
 def _with_sources(words: Sequence[Word], written: str, language: str) -> tuple[Word, ...]:
     """Words with the written forms ($5) of which they are parts, where these are known."""
     if not language.startswith("en"):
-        return tuple(words)
+        found = sources_of([word.text for word in words], spoken_forms(written, language))
+        pairs = zip(words, found or (), strict=False)
+        return tuple(replace(word, source=source) for word, (_, source) in pairs) or tuple(words)
     sources = [
         token.source.strip(" .,;:!?—…") or piece
         for token in split_tokens(written)

@@ -5,6 +5,7 @@ The functions take the parts of a written form and return words without digits o
 
 import functools
 import re
+from dataclasses import dataclass
 from importlib import resources
 
 from lexicon.number_words import (
@@ -44,6 +45,14 @@ _ADDRESS_SIGNS = {
     "=": "equals", "&": "and", "#": "hash", "+": "plus", "~": "tilde", "%": "percent",
 }  # fmt: skip
 _SPELLED_ENDINGS = re.compile("uk|us|de|fr|eu|io|ai|tv|ca|ch|at|au|nz|jp|cn|ru|es|nl|se|pl|be|dk|fi|ie|br|mx|kr")
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenForm:
+    """A written form and its words; a punctuation mark is kept."""
+
+    source: str
+    spoken: str
 
 
 @functools.cache

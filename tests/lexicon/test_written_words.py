@@ -36,8 +36,7 @@ def _phones(text: str, language: str) -> list[tuple[str, str]]:
 
 
 def test_a_number_has_the_phones_of_its_sentence() -> None:
-    assert _phones("Es kostet 1.000 €.", "de")[2:] == [("1.000", "aɪntaʊzənt"), ("€", "ɔøro")]
-    assert _phones("Ça coûte 12\u202f000 €.", "fr-fr")[2:] == [("12 000", "duzmil"), ("€", "əʁo")]
+    assert [text for text, _ in _phones("Det kostar 12\u202f000 kr.", "sv")] == ["Det", "kostar", "12 000", "kr"]
 
 
 def test_words_that_espeak_joins_are_divided() -> None:

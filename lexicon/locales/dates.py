@@ -1,0 +1,129 @@
+"""Readers of dates, times and years."""
+
+from lexicon.locales.nouns import noun_form
+from lexicon.locales.numbers import Amount, Grammar, cardinal, digits, ordinal, year
+from lexicon.locales.place import Place
+from lexicon.locales.tables import Locale, Row
+
+_DAYS, _MONTHS = 31, 12
+
+
+def read_numeric_date(place: Place) -> str | None:
+    """3/5/2024, 3.5.2024 and 2024-05-03 as a day of a month; None for other numbers."""
+    match, locale = place.match, place.locale
+    day, month, written = int(match["day"]), int(match["month"]), match["year"]
+    if not (1 <= day <= _DAYS and 1 <= month <= _MONTHS):
+        return None
+    return _date(place, day, locale.rows("month")[str(month)].spoken, written)
+
+
+def read_short_date(place: Place) -> str | None:
+    """5/3 and 5.3. without a year, behind a word that dates have before them."""
+    if place.before.lower() not in place.locale.words("date_before"):
+        return None
+    day, month = int(place.match["day"]), int(place.match["month"])
+    if not (1 <= day <= _DAYS and 1 <= month <= _MONTHS):
+        return None
+    return _date(place, day, place.locale.rows("month")[str(month)].spoken, "")
+
+
+def read_named_date(place: Place) -> str | None:
+    """Day and name of a month, perhaps with a year."""
+    day = int(place.match["day"])
+    if not 1 <= day <= _DAYS:
+        return None
+    return _date(place, day, _month_name(place.locale, place.match["month"]), place.match["year"] or "")
+
+
+def read_month_year(place: Place) -> str | None:
+    """Name of a month with a year."""
+    name = _month_name(place.locale, place.match["month"])
+    written = _year(place, place.match["year"])
+    return place.locale.setting("month_year", "{month} {year}").format(month=name, year=written)
+
+
+def _month_name(locale: Locale, written: str) -> str:
+    for row in locale.rows("month").values():
+        if written.lower() == row.spoken.lower() or written.lower().removesuffix(".") in row.details:
+            return row.spoken
+    return written
+
+
+def month_names(locale: Locale) -> list[str]:
+    """Written names of months, the longest first."""
+    names = [name for row in locale.rows("month").values() for name in (row.spoken, *row.details)]
+    return sorted({*names, *(name[:1].upper() + name[1:] for name in names)}, key=len, reverse=True)
+
+
+def _date(place: Place, day: int, month: str, written: str) -> str:
+    locale = place.locale
+    said = _day(place, day)
+    if not written:
+        return locale.setting("date_short", "{day} {month}").format(day=said, month=month)
+    return locale.setting("date", "{day} {month} {year}").format(day=said, month=month, year=_year(place, written))
+
+
+def _day(place: Place, day: int) -> str:
+    locale = place.locale
+    if day == 1 and locale.setting("first_day"):
+        return locale.setting("first_day")
+    gender = locale.setting("day_gender")
+    if locale.setting("day") != "ordinal":
+        return cardinal(locale, day, Grammar(gender))
+    return ordinal(locale, day, Grammar(gender, place.grammar("ordinal").case or locale.setting("day_case")))
+
+
+def _year(place: Place, written: str) -> str:
+    """Words of a year in a date, with the word for year that is written behind it."""
+    locale, number = place.locale, int(written)
+    if len(written) == 2:
+        number += 2000 if number < 50 else 1900
+    said = year(locale, number, Grammar(locale.setting("year_gender"), locale.setting("year_case")))
+    return f"{said} {locale.setting('year_word')}" if place.match.groupdict().get("yearword") else said
+
+
+def read_year(place: Place) -> str | None:
+    """A year with the word for it, which says its case: в 2024 году, w 2024 r."""
+    locale = place.locale
+    row = locale.rows("year_word")[place.match["word"]]
+    case = row.details.get(place.before.lower()) or row.details.get("case", "")
+    grammar = Grammar(row.details.get("gender", ""), case)
+    word = row.details.get(f"word {case}") or row.spoken
+    n = int(place.match["number"])
+    return f"{year(locale, n, grammar)} {word}"
+
+
+def read_time(place: Place) -> str | None:
+    """Hours and minutes, with the word for hours that is written, perhaps behind them; None for other numbers."""
+    locale, match = place.locale, place.match
+    hour, minute = int(match["hour"]), int(match["minute"] or 0)
+    is_dotted = match["sign"] == "."
+    if hour > 24 or minute > 59 or (is_dotted and not (match["word"] or _is_after_time_word(place))):
+        return None
+    if match["minute"] and len(match["minute"]) != 2:
+        return None
+    said = time_words(locale, hour, minute, place.grammar("hour").case)
+    if match["second"]:
+        said = f"{said} {locale.setting('and')} {cardinal(locale, int(match['second']))} {locale.setting('seconds')}"
+    is_named = match["word"] or match["sign"] == "h"
+    if is_named and locale.setting("hour_word") and locale.setting("hour_word") not in said:
+        said = f"{said} {locale.setting('hour_word')}"
+    return said + (match.groupdict().get("tail") or "")
+
+
+def _is_after_time_word(place: Place) -> bool:
+    return place.before.lower() in place.locale.words("time_before")
+
+
+def time_words(locale: Locale, hour: int, minute: int, case: str = "") -> str:
+    """Words of a time of day by the template of the language."""
+    grammar = Grammar(locale.setting("hour_gender"), case)
+    said = ordinal(locale, hour, grammar) if locale.setting("hour") == "ordinal" else cardinal(locale, hour, grammar)
+    unit = locale.rows("unit").get("h", Row("", {}))
+    hours = noun_form(locale, unit, Amount("", str(hour)), case)
+    if not minute:
+        return locale.setting("time_full", "{h}").format(h=said, hours=hours)
+    minutes = cardinal(locale, minute, Grammar(locale.setting("minute_gender")))
+    if minute < 10 and locale.setting("minute_zero"):
+        minutes = f"{digits(locale, '0')} {minutes}"
+    return locale.setting("time", "{h} {m}").format(h=said, hours=hours, m=minutes)

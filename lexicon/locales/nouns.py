@@ -1,0 +1,104 @@
+"""Nouns behind numbers: their gender, their plural category, and the case that a number requires."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from lexicon.locales.numbers import Amount, Grammar, is_round_million, number
+from lexicon.locales.tables import Locale, Row
+
+_VOWELS = "aeiouyéèêàâîôûh"
+
+
+def _one_or_other(amount: Amount) -> int:
+    return 0 if amount.is_one else 1
+
+
+def _below_two(amount: Amount) -> int:
+    return 0 if len(amount.whole) < 9 and int(amount.whole or 0) < 2 else 1
+
+
+def _never(_: Amount) -> int:
+    return 0
+
+
+def _polish(amount: Amount) -> int:
+    """Categories one, few, many, other (1 kilometr, 2 kilometry, 5 kilometrów, 1,5 kilometra)."""
+    if amount.decimals:
+        return 3
+    if amount.is_one:
+        return 0
+    return 1 if _ends_with_few(amount.whole) else 2
+
+
+def _russian(amount: Amount) -> int:
+    """Categories one, few, many, other (21 километр, 2 километра, 5 километров, 1,5 километра)."""
+    if amount.decimals:
+        return 3
+    last = int(amount.whole[-2:] or 0)
+    if last % 10 == 1 and last != 11:
+        return 0
+    return 1 if _ends_with_few(amount.whole) else 2
+
+
+def _ends_with_few(digits: str) -> bool:
+    last = int(digits[-2:] or 0)
+    return last % 10 in {2, 3, 4} and last not in {12, 13, 14}
+
+
+def _arabic(amount: Amount) -> int:
+    """Categories one, two, few, many, other (كيلومتر، كيلومتران، كيلومترات، كيلومترا، كيلومتر)."""
+    last = int(amount.whole[-2:] or 0)
+    if amount.decimals or (last < 3 and len(amount.whole) > 2):
+        return 4
+    return last - 1 if last in {1, 2} else 2 if 3 <= last <= 10 else 3 if last > 10 else 4
+
+
+# CLDR, plural rules; the number of forms of a noun is that of the categories
+PLURALS: Mapping[str, Callable[[Amount], int]] = MappingProxyType({
+    "one": _one_or_other, "below_two": _below_two, "never": _never, "polish": _polish, "russian": _russian,
+    "arabic": _arabic,
+})  # fmt: skip
+
+
+def noun_form(locale: Locale, row: Row, amount: Amount, case: str = "") -> str:
+    """Form of a noun behind a number, in the case that is required where the table has it."""
+    forms = row.forms
+    category = PLURALS[locale.setting("plural", "one")](amount)
+    if case and case in row.details:
+        own = row.details[case].split("|")
+        return own[min(category, 1, len(own) - 1)]
+    if case == "genitive" and len(forms) == 4:  # few is the genitive singular in Russian, other in Polish
+        return forms[2] if category else forms[3]
+    return forms[min(category, len(forms) - 1)]
+
+
+def gender_of(locale: Locale, word: str) -> str:
+    """Gender of a noun by its ending; empty where the language does not tell."""
+    small = word.lower().split(" ")[0]
+    rows = locale.rows("gender")
+    whole = rows.get("^" + small)
+    if whole is not None:
+        return whole.spoken
+    for length in range(min(len(small), 7), 0, -1):
+        row = rows.get(small[-length:])
+        if row is not None:
+            return row.spoken
+    return ""
+
+
+def count(locale: Locale, amount: Amount, row: Row, case: str = "") -> str:
+    """A number with its noun: trois kilomètres, un million de kilomètres, yüzde yirmi."""
+    said = number(locale, amount, Grammar(row.details.get("gender") or gender_of(locale, row.forms[0]), case))
+    noun = noun_form(locale, row, amount, case)
+    if "{}" in noun:
+        return noun.format(said)
+    return behind(locale, said, noun, links=is_round_million(amount))
+
+
+def behind(locale: Locale, said: str, noun: str, *, links: bool) -> str:
+    """A noun behind the words of a number, joined by de in Romance languages where the number is itself a noun."""
+    link = locale.setting("of_million") if links else ""
+    if link == "de" and locale.setting("elision") and noun[:1].lower() in _VOWELS:
+        return f"{said} d'{noun}"
+    join = locale.setting("join", " ")
+    return join.join(part for part in (said, link, noun) if part)

@@ -1,0 +1,81 @@
+"""Read a text of a language with a table: its written forms with their words, so that only words reach espeak-ng."""
+
+import re
+import unicodedata
+
+from lexicon.locales.place import Place
+from lexicon.locales.scanner import PLACE, scanner
+from lexicon.locales.tables import Locale, find_locale
+from lexicon.written_forms import WrittenForm
+
+# one character for one, so that the written form of each word stays known
+_PLAIN = {0xA0: " ", 0x202F: " ", 0x2009: " ", 0x2007: " ", 0x2212: "-", 0x2010: "-", 0x2011: "-", 0x2044: "/",
+          0xFF05: "%", 0x2019: "'", 0x2BC: "'"}  # fmt: skip
+_LAST_WORD = re.compile(r"[^\W\d_]+\Z")
+
+
+class _PlainCharacters(dict[int, str]):
+    """Digits of all writing systems as ASCII ones, and one kind of space, minus and apostrophe."""
+
+    def __missing__(self, code: int) -> str:
+        letter = chr(code)
+        is_digit = code > 127 and unicodedata.category(letter) == "Nd"
+        self[code] = plain = str(unicodedata.digit(letter)) if is_digit else letter
+        return plain
+
+
+_CHARACTERS = _PlainCharacters(_PLAIN)
+
+
+def has_table(language: str) -> bool:
+    """Whether the numbers, abbreviations and signs of a language are read by its table."""
+    return find_locale(language) is not None
+
+
+def read_forms(text: str, language: str) -> list[WrittenForm]:
+    """Parts of a text with their spoken forms; written forms without blanks, and what is between them as it is.
+
+    The sources, joined, are the text.
+    """
+    locale = find_locale(language)
+    if locale is None:
+        return [WrittenForm(text, text)]
+    plain = text.translate(_CHARACTERS)
+    found: list[WrittenForm] = []
+    at = done = 0
+    said = ""
+    join = locale.setting("join", " ")
+    while place := PLACE.search(plain, at):
+        match, spoken = _read(locale, plain, place, said)
+        if match is None or spoken is None:
+            at, said = place.end(), ""
+            continue
+        if done < match.start():
+            found.append(WrittenForm(text[done : match.start()], plain[done : match.start()]))
+        at = done = match.end()
+        is_joined = found and found[-1].spoken[-1:].isalnum() and spoken[:1].isalnum()
+        is_followed = plain[at : at + 1].isalnum() and spoken[-1:].isalnum()
+        found.append(WrittenForm(text[match.start() : at], join * bool(is_joined) + spoken + join * is_followed))
+        last = _LAST_WORD.search(spoken.rstrip())
+        said = last.group() if last else ""
+    if done < len(text):
+        found.append(WrittenForm(text[done:], plain[done:]))
+    return found
+
+
+def read(text: str, language: str) -> str:
+    """Spoken form of a text."""
+    return "".join(form.spoken for form in read_forms(text, language))
+
+
+def _read(locale: Locale, text: str, place: re.Match[str], said: str) -> tuple[re.Match[str] | None, str | None]:
+    """The first form at a place that its reader reads."""
+    for form in scanner(locale).at(place, text):
+        match = form.pattern.match(text, place.start())
+        if match and match.end() > match.start():
+            found = Place(locale, text, match, said)
+            spoken = form.reader(found)
+            if spoken is not None:
+                ends = match.group().endswith(".") and spoken[-1:].isalnum() and found.is_last
+                return match, f"{spoken}." if ends else spoken
+    return None, None

@@ -1,0 +1,244 @@
+"""Written forms of a language: their patterns, in the order in which they are tried, and their readers.
+
+Each pattern is bounded and is tried at one place, so that a scan is linear in the length of a text.
+"""
+
+import functools
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+from lexicon.locales import counted, dates, words
+from lexicon.locales.place import Reader, amount_pattern
+from lexicon.locales.tables import Locale, alternatives
+
+LETTER = r"[^\W\d_\u00b2\u00b3\u00b9\u00bc-\u00be\u2070-\u209f\u2150-\u218b]"
+PLACE = re.compile(rf"(?P<number>[0-9\u00bc-\u00be\u2150-\u215e])|(?P<word>{LETTER}+)|[^\w\s]|\S")
+_LEADING_LETTERS = re.compile(rf"{LETTER}*")
+_LABEL = r"[A-Za-z0-9][A-Za-z0-9-]{0,62}"
+_TLD = (
+    r"(?:com|org|net|edu|gov|io|ai|app|dev|info|eu|de|fr|es|it|pt|br|nl|be|pl|ru|tr|gr|at|ch|uk|us|mx|cn|jp|kr|in|vn)"
+)
+_ADDRESS = (
+    rf"[\w.+-]{{1,64}}@{_LABEL}(?:\.{_LABEL}){{1,5}}(?!\w)|(?:https?://|www\.)[^\s,;!]{{0,400}}[^\s,;!.:?)]"
+    rf"|{_LABEL}(?:\.{_LABEL}){{0,3}}\.{_TLD}\b(?!\.\w)(?:/[^\s,;!]{{0,400}}[^\s,;!.:?)])?"
+)
+_ROMAN = rf"(?P<roman>[IVXLCDM]{{1,15}})(?P<suffix>{{suffix}}\.?)?(?!{LETTER}|['’-]{LETTER}|[0-9])"
+_PART = re.compile("‹([a-z ]+)›")
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """A written form."""
+
+    pattern: re.Pattern[str]
+    reader: Reader
+
+
+@dataclass(frozen=True, slots=True)
+class Scanner:
+    """Forms of a language by what they begin with."""
+
+    numbers: tuple[Form, ...]
+    by_word: Mapping[str, tuple[Form, ...]]
+    by_sign: Mapping[str, tuple[Form, ...]]
+    address: Form
+    roman: Form
+    ending: Form
+
+    def at(self, found: re.Match[str], text: str) -> Iterable[Form]:
+        """Forms that may begin at a place, in their order."""
+        sign = found.group()
+        if found["number"]:
+            return self.numbers
+        if found["word"]:
+            return self._of_word(sign, text, found.end())
+        is_before_digit = text[found.end() : found.end() + 2].lstrip(" ")[:1].isdigit()
+        is_behind_word = text[max(found.start() - 1, 0) : found.start()].isalnum()
+        if sign in "+-±" and is_before_digit and not is_behind_word:
+            return (*self.numbers, *self.by_sign.get(sign, ()))
+        return self.by_sign.get(sign, ())
+
+    def _of_word(self, word: str, text: str, end: int) -> Iterator[Form]:
+        following = text[end : end + 1]
+        if following in {"@", ".", ":", "-", "_"} or following.isdigit():
+            yield self.address
+        if following == ".":
+            yield self.ending
+        yield from self.by_word.get(word, ())
+        small = word.lower()
+        if small != word:
+            yield from self.by_word.get(small, ())
+        if word.isupper() or word.rstrip("abcdefghijklmnopqrstuvwxyz").isupper():
+            yield self.roman
+
+
+# Names in angle quotes are parts of `_parts`; a form with a part that the language lacks is left out.
+_NUMBER_FORMS: tuple[tuple[str, Reader], ...] = (
+    (r"(?P<year>[0-9]{4})-(?P<month>[0-9]{2})-(?P<day>[0-9]{2})(?![\w-])", dates.read_numeric_date),
+    (
+        r"(?P<day>[0-9]{1,2})(?P<s>[/.-]) ?(?P<month>[0-9]{1,2})(?P=s) ?(?P<year>[0-9]{4}|[0-9]{2})(?![\w/]|[.,][0-9])"
+        r"‹year word›",
+        dates.read_numeric_date,
+    ),
+    (
+        r"(?P<day>[0-9]{1,2})(?:‹day ending›)? ?‹of›(?P<month>‹months›)(?!‹letter›)\.?"
+        r"(?:,? ‹of›(?P<year>[12][0-9]{3})(?![0-9])‹year word›)?",
+        dates.read_named_date,
+    ),
+    (r"(?P<day>[0-9]{1,2})\.(?P<month>[0-9]{1,2})\.(?! ?[0-9])", dates.read_short_date),
+    (r"(?P<day>[0-9]{1,2})/(?P<month>[0-9]{1,2})(?![0-9/])", dates.read_short_date),
+    (
+        r"\+[0-9]{1,3}(?:[ ./-]?\(?[0-9]{1,5}\)?){2,6}(?!\w)|0[0-9]{1,4}(?:[ ./-][0-9]{2,8}){1,5}(?!\w)"
+        r"|\(?[0-9]{2,3}\) ?[0-9]{2,5}[ -][0-9]{2,5}(?:[ -][0-9]{2,4})?(?!\w)",
+        counted.read_telephone,
+    ),
+    (
+        r"(?P<hour>[0-9]{1,2})(?P<sign>[‹time signs›])(?P<minute>[0-9]{2})(?::(?P<second>[0-9]{2}))?(?![0-9])"
+        r"(?P<word> ?(?:‹time words›)(?!‹letter›))?(?!‹letter›)‹tail›",
+        dates.read_time,
+    ),
+    (
+        r"(?P<hour>[0-9]{1,2}) ?(?P<sign>‹hour sign›) ?(?P<minute>[0-9]{2})?(?!‹letter›|[0-9])(?P<second>(?!))?"
+        r"(?P<word>(?!))?",
+        dates.read_time,
+    ),
+    (r"(?P<number>[12][0-9]{3})(?P<suffix>-?‹letter›{1,3})? ?(?P<word>‹year words›)‹end›", dates.read_year),
+    (r"‹signed›(?: ?(?P<magnitude>‹magnitude›))? ?(?P<currency>‹currency›)‹end›‹tail›", counted.read_money),
+    (r"(?P<amount>‹amount›)(?:[-–](?=[0-9])| – (?=[0-9]))(?!‹amount›[-–][0-9])", counted.read_range),
+    (
+        r"(?:(?P<integer>[0-9]{1,4}) ?)?(?P<vulgar>[\u00bc-\u00be\u2150-\u215e])(?P<top>(?!))?(?P<bottom>(?!))?"
+        r"(?: (?P<noun>‹letter›{1,24}))?",
+        counted.read_fraction,
+    ),
+    (
+        r"(?:(?P<integer>[0-9]{1,4}) )?(?P<top>[0-9]{1,3})/(?P<bottom>[0-9]{1,3})(?![\w/])(?P<vulgar>(?!))?"
+        r"(?: (?P<noun>‹letter›{1,24}))?",
+        counted.read_fraction,
+    ),
+    (
+        r"‹signed›(?: ?(?P<magnitude>‹magnitude›))?(?: ?|-)(?P<unit>‹unit›)(?:/(?P<per>‹unit›))?‹end›‹tail›",
+        counted.read_measure,
+    ),
+    (r"‹signed› ?(?P<magnitude>‹magnitude›)‹end›", counted.read_magnitude),
+    (r"(?P<digits>[0-9]{1,4})(?P<suffix>‹suffix›)(?!\w)", counted.read_suffixed),
+    (r"(?P<digits>[0-9]{1,4})\.(?= ‹letter›)", counted.read_dotted_ordinal),
+    (r"[0-9]{1,4}(?:\.[0-9]{1,4}){2,6}(?!\w)", counted.read_version),
+    (r"[0-9]{1,4}‹other decimal›(?:[0-9]{1,2}|[0-9]{4})(?![0-9.])", counted.read_version),
+    (r"(?P<first>[0-9]{1,3}):(?P<second>[0-9]{1,3})(?![0-9:])", counted.read_score),
+    (r"‹signed›‹tail›", counted.read_number),
+)
+
+
+def _parts(locale: Locale) -> dict[str, str]:
+    """Parts of patterns by name; empty where a language has none of them."""
+    amount, letter = amount_pattern(locale), LETTER
+    of, year_words = locale.setting("date_of"), locale.setting("year_words")
+    named = {name.replace("_", " "): locale.setting(name) for name in ("hour_sign", "time_words", "day_ending")}
+    named |= {kind: alternatives(locale, kind) for kind in ("unit", "magnitude", "currency", "suffix")}
+    return named | {
+        "amount": amount,
+        "signed": rf"(?P<amount>(?:[-+]|± ?)?{amount})",
+        "letter": letter,
+        "end": rf"(?!{letter}|[0-9])",
+        "tail": rf"(?:['’](?P<tail>{letter}{{1,12}}))?" if locale.setting("suffixes") else r"(?P<tail>(?!))?",
+        "months": "|".join(map(re.escape, dates.month_names(locale))),
+        "of": f"(?:(?:{of}) )?" if of else "(?:)",
+        "year word": f"(?P<yearword> ?(?:{year_words}))?" if year_words else "(?:)",
+        "year words": alternatives(locale, "year_word") if locale.rows("year_word") else "",
+        "time signs": re.escape(locale.setting("time_signs", ":.")),
+        "time words": named["time words"] or "(?!)",
+        "day ending": named["day ending"] or r"\.",
+        "other decimal": r"\." if locale.setting("decimal", ",") == "," else "",
+    }
+
+
+def _number_forms(locale: Locale) -> Iterator[Form]:
+    """Forms that begin with a digit, a sign before one, or a fraction."""
+    parts = _parts(locale)
+    for template, reader in _NUMBER_FORMS:
+        names = _PART.findall(template)
+        if all(parts[name] for name in names):
+            yield Form(re.compile(_PART.sub(lambda part: parts[part[1]], template)), reader)
+
+
+@functools.cache
+def scanner(locale: Locale) -> Scanner:
+    """Forms of a language."""
+    numbers = tuple(_number_forms(locale))
+    address = Form(re.compile(_ADDRESS), words.read_address)
+    suffix = alternatives(locale, "suffix")
+    stop = r"(?P<stop>\.(?=,| [^\W\d_A-Z]))?" if locale.setting("roman_stop") else ""
+    roman = Form(re.compile(_ROMAN.replace("{suffix}", suffix) + stop), words.read_roman)
+    endings = locale.rows("ending")
+    ending = Form(
+        re.compile(rf"(?P<stem>{LETTER}{{2,40}}?)(?P<ending>{_any_of(endings) or '(?!)'})"), words.read_ending
+    )
+    return Scanner(numbers, _forms_by_word(locale), _forms_by_sign(locale), address, roman, ending)
+
+
+def _money_before(locale: Locale, currencies: str) -> str:
+    magnitude = alternatives(locale, "magnitude")
+    return (
+        rf"(?P<minus>(?!))?(?P<currency>{currencies}) ?(?P<amount>-?{amount_pattern(locale)})"
+        rf"(?: ?(?P<magnitude>{magnitude})(?!{LETTER}))?(?P<tail>(?!))?"
+    )
+
+
+def _grouped(written: Iterable[str]) -> dict[str, list[str]]:
+    """Written forms by the letters with which they begin, or by their first sign."""
+    found: dict[str, list[str]] = {}
+    for form in written:
+        match = _LEADING_LETTERS.match(form)
+        found.setdefault((match.group() if match else "") or form[0], []).append(form)
+    return found
+
+
+def _any_of(written: Iterable[str]) -> str:
+    return "|".join(map(re.escape, sorted(written, key=len, reverse=True)))
+
+
+def _forms_by_word(locale: Locale) -> dict[str, tuple[Form, ...]]:
+    found: dict[str, list[Form]] = {}
+
+    def add(written: Iterable[str], template: str, reader: Reader, flags: int = 0) -> None:
+        for first, forms in _grouped(written).items():
+            pattern = re.compile(template.replace("{}", _any_of(forms)), flags)
+            found.setdefault(first.lower() if flags else first, []).append(Form(pattern, reader))
+
+    end = rf"(?!{LETTER}|[0-9])"
+    for first, forms in _grouped(locale.rows("currency")).items():
+        pattern = re.compile(_money_before(locale, _any_of(forms)))
+        found.setdefault(first, []).append(Form(pattern, counted.read_money))
+    add(locale.rows("abbreviation"), rf"(?:{{}}){end}", words.read_abbreviation)
+    months = dates.month_names(locale)
+    of = locale.setting("date_of")
+    link = f"(?:(?:{of}) )?" if of else ""
+    add(months, rf"(?P<month>{{}})\.? {link}(?P<year>[12][0-9]{{3}})(?![0-9])", dates.read_month_year)
+    add((word.lower() for word in locale.rows("word")), rf"(?:{{}}){end}(?!-{LETTER})", words.read_word, re.IGNORECASE)
+    add(
+        (unit for unit in locale.rows("unit") if "alone" in locale.rows("unit")[unit].details),
+        rf"(?P<unit>{{}}){end}",
+        words.read_unit_alone,
+    )
+    return {first: tuple(forms) for first, forms in found.items()}
+
+
+def _forms_by_sign(locale: Locale) -> dict[str, tuple[Form, ...]]:
+    found: dict[str, list[Form]] = {}
+    for first, forms in _grouped(locale.rows("currency")).items():
+        if not first.isalpha():
+            pattern = re.compile(_money_before(locale, _any_of(forms)))
+            found.setdefault(first, []).append(Form(pattern, counted.read_money))
+            minus = _money_before(locale, _any_of(forms)).replace("(?P<minus>(?!))?", "(?P<minus>-)", 1)
+            found.setdefault("-", []).append(Form(re.compile(minus), counted.read_money))
+    if locale.setting("percent_first"):
+        percent = rf"(?P<unit>%) ?(?P<amount>{amount_pattern(locale)})(?P<magnitude>(?!))?(?P<per>(?!))?"
+        percent += rf"(?:['’](?P<tail>{LETTER}{{1,12}}))?"
+        found.setdefault("%", []).append(Form(re.compile(percent), counted.read_measure))
+    for first, forms in _grouped(locale.rows("abbreviation")).items():
+        if not first.isalpha():
+            found.setdefault(first, []).append(Form(re.compile(_any_of(forms)), words.read_abbreviation))
+    for first, forms in _grouped(locale.rows("sign")).items():
+        found.setdefault(first, []).append(Form(re.compile(_any_of(forms)), words.read_sign))
+    return {first: tuple(forms) for first, forms in found.items()}

@@ -1,0 +1,111 @@
+"""Tables of languages: nouns of units and currencies, abbreviations, months, grammar of numbers.
+
+Columns are kind, written form, spoken form and details. Several written forms of one row are separated by ``|``, as
+are the forms of a noun by the plural categories of the language (setting ``plural``). Details are ``name=value``
+pairs with semicolons between them, or words.
+
+============ ====================================================================================================
+setting      signs and templates of the language, by the names that `lexicon.locales` reads
+rule         rule set of CLDR by kind, gender and case (``cardinal f genitive``)
+fix          pattern and replacement in words of numbers that CLDR misspells
+ordinal      ordinals that CLDR lacks, in the masculine nominative; ``inflection`` has endings by gender and case
+case         gender or case that a word requires of the number behind it; details: of which kind of number
+gender       endings of nouns, longest first, and whole nouns (with a caret) of a gender
+unit         unit or noun behind a number; ``{}`` is the number where it does not come first
+magnitude    thousand, million and so on behind a number
+currency     currency; details ``cents=`` have its hundredth part
+month        number of a month: its name in dates, and written forms in details
+abbreviation its words; details: ``number`` (before a number only), ``after`` (behind a number), ``name`` (before a
+             capital), ``end`` (may end a sentence), or a case with the form in it
+ending       abbreviation at the end of a word (str.)
+roman        word before or behind a Roman number, and the kind of number that it is (``cardinal``, ``ordinal``)
+ruler        names whose Roman numbers are those of rulers
+sign         sign that is spoken, by its words
+fraction     words of a fraction
+word         word of another language, as the language says it
+letter       name of a letter
+============ ====================================================================================================
+"""
+
+import functools
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import resources
+from types import MappingProxyType
+
+COLUMNS = 4
+_NO_ROWS: Mapping[str, "Row"] = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """Spoken form of a row, and its details by name; a detail without a value has itself."""
+
+    spoken: str
+    details: Mapping[str, str]
+
+    @property
+    def forms(self) -> tuple[str, ...]:
+        """Forms of a noun by plural category."""
+        return tuple(self.spoken.split("|"))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Locale:
+    """Rows of a language by kind and written form."""
+
+    language: str
+    kinds: Mapping[str, Mapping[str, Row]]
+
+    def rows(self, kind: str) -> Mapping[str, Row]:
+        """Rows of a kind by written form."""
+        return self.kinds.get(kind, _NO_ROWS)
+
+    def setting(self, name: str, default: str = "") -> str:
+        """Value of a setting."""
+        row = self.rows("setting").get(name)
+        return default if row is None else row.spoken
+
+    def words(self, name: str) -> frozenset[str]:
+        """Words of a setting that is a list."""
+        return frozenset(self.setting(name).split())
+
+
+@functools.cache
+def find_locale(language: str) -> Locale | None:
+    """Table of a language, with the rows of its variety in place of others; None if it has none."""
+    code = language.lower()
+    primary = code.partition("-")[0]
+    kinds = _read(primary)
+    if kinds is None:
+        return None
+    for name in dict.fromkeys((code.partition("-x-")[0], code)):
+        for kind, rows in (_read(name) or {}).items() if name != primary else ():
+            kinds[kind] = {**kinds.get(kind, {}), **rows}
+    return Locale(language, MappingProxyType({kind: MappingProxyType(rows) for kind, rows in kinds.items()}))
+
+
+def _read(name: str) -> dict[str, dict[str, Row]] | None:
+    path = resources.files("lexicon.locales").joinpath(f"{name}.tsv")
+    if not path.is_file():
+        return None
+    kinds: dict[str, dict[str, Row]] = {}
+    for line in path.read_text(encoding="utf-8").splitlines()[1:]:
+        kind, written, spoken, details = (line.split("\t") + [""] * COLUMNS)[:COLUMNS]
+        row = Row(spoken, MappingProxyType(dict(_detail(part) for part in details.split(";") if part)))
+        for form in [written] if kind == "fix" or len(written) == 1 else written.split("|"):
+            kinds.setdefault(kind, {})[form] = row
+    return kinds
+
+
+def _detail(part: str) -> tuple[str, str]:
+    name, _, value = part.partition("=")
+    return name, value or name
+
+
+@functools.lru_cache(maxsize=256)
+def alternatives(locale: Locale, *kinds: str) -> str:
+    """Pattern of the written forms of some kinds of rows, the longest first; nothing matches if there are none."""
+    forms = sorted({form for kind in kinds for form in locale.rows(kind)}, key=len, reverse=True)
+    return "(?:" + ("|".join(map(re.escape, forms)) or r"(?!)") + ")"

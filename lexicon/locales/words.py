@@ -1,0 +1,173 @@
+"""Readers of abbreviations, Roman numbers, words of other languages, and signs."""
+
+import re
+from collections.abc import Collection
+
+from lexicon.locales.nouns import gender_of, noun_form
+from lexicon.locales.numbers import Amount, Grammar, cardinal, digits, ordinal, whole
+from lexicon.locales.place import Place
+from lexicon.locales.tables import Locale
+from lexicon.number_words import roman_value
+from lexicon.sentence_ends import ends_sentence
+
+_SAFE_ROMAN = frozenset("IVX")  # numbers of other letters are words and sizes (MIX, XL, DVD)
+_CONTEXT = 40
+
+
+def read_abbreviation(place: Place) -> str | None:
+    """Words of an abbreviation where its context is that of the table; a full stop that ends the sentence stays."""
+    written = place.match.group()
+    row = place.locale.rows("abbreviation").get(written)
+    if row is None:
+        return None
+    following = place.text[place.match.end() : place.match.end() + _CONTEXT]
+    if not _is_in_context(place, row.details.keys(), following):
+        return None
+    said = row.details.get(_case(place), row.spoken)
+    if written[:1].isupper() and not place.before and not place.said and said[:1].islower():
+        said = said[:1].upper() + said[1:]
+    is_end = written.endswith(".") and "end" in row.details and _starts_sentence(place, following)
+    return f"{said}." if is_end else said
+
+
+def read_ending(place: Place) -> str:
+    """Word with an abbreviation at its end (Goethestr.)."""
+    return place.match["stem"] + place.locale.rows("ending")[place.match["ending"]].spoken
+
+
+def _is_in_context(place: Place, details: Collection[str], following: str) -> bool:
+    bare = following.lstrip(" ")
+    if "number" in details:
+        return bare[:1].isdigit() or bare[:1] in {"X", "V", "I"}
+    if "name" in details:
+        return bare[:1].isupper()
+    if "after" in details:
+        return place.text[max(place.match.start() - 2, 0) : place.match.start()].strip(" ")[-1:].isalnum()
+    return True
+
+
+def _case(place: Place) -> str:
+    row = place.locale.rows("case").get((place.said or place.before).lower())
+    return row.spoken if row else ""
+
+
+def _starts_sentence(place: Place, following: str) -> bool:
+    before = place.text[max(place.match.start() - 1, 0) : place.match.end() - 1]
+    return (
+        following[:1].isspace()
+        and ends_sentence(before, following.lstrip(), place.locale.language)
+        and (following.lstrip()[:1].isupper())
+    )
+
+
+def read_roman(place: Place) -> str | None:
+    """Roman number by the words around it, else the names of its letters; None for a word."""
+    written, locale = place.match["roman"], place.locale
+    value = roman_value(written)
+    suffix = place.match["suffix"]
+    kinds = locale.rows("roman")
+    if suffix:
+        row = locale.rows("suffix").get(suffix.rstrip("."))
+        if not value or row is None or row.spoken != "ordinal" or not set(written) <= _SAFE_ROMAN:
+            return None
+        return ordinal(locale, value, Grammar(row.details.get("gender", ""), row.details.get("case", "")))
+    before, after = kinds.get(place.before.lower()), kinds.get(f"+{_word_after(place)}")
+    if value and (after or before):
+        return _by_word(place, value, (after or before).spoken, bool(after))  # type: ignore[union-attr]
+    if value and place.before in locale.rows("ruler"):
+        return _ruler(place, value)
+    if value and len(written) > 1 and set(written) <= _SAFE_ROMAN and "XXX" not in written:
+        return cardinal(locale, value)
+    return spelled(locale, written) if len(written) > 1 else None
+
+
+def _word_after(place: Place) -> str:
+    following = place.text[place.match.end() : place.match.end() + _CONTEXT].lstrip(" ")
+    return following.split(" ")[0].rstrip(",;:!?").lower() if following else ""
+
+
+def _by_word(place: Place, value: int, kind: str, is_after: bool) -> str:
+    locale = place.locale
+    if kind != "ordinal":
+        return cardinal(locale, value)
+    word = _word_after(place) if is_after else place.before.lower()
+    gender = locale.rows("roman")[("+" if is_after else "") + word].details
+    case = gender.get("case") or place.grammar("ordinal").case
+    return ordinal(locale, value, Grammar(gender.get("gender") or gender_of(locale, word), case))
+
+
+def _ruler(place: Place, value: int) -> str:
+    locale = place.locale
+    row = locale.rows("ruler").get(place.before)
+    gender = (row.details.get("gender") if row else "") or "m"
+    if value > int(locale.setting("ruler_ordinals", "99")):
+        return cardinal(locale, value)
+    if value == 1 and locale.setting("ruler_first"):
+        return locale.setting("ruler_first")
+    case = "weak" if locale.setting(f"ruler_{gender}") else place.grammar("ruler").case
+    return locale.setting(f"ruler_{gender}", "{}").format(ordinal(locale, value, Grammar(gender, case)))
+
+
+def spelled(locale: Locale, written: str) -> str:
+    """Names of letters; a letter without a name stays."""
+    names = locale.rows("letter")
+    return " ".join(names[letter].spoken if letter in names else letter for letter in written)
+
+
+def read_word(place: Place) -> str | None:
+    """Word of another language as the language says it."""
+    rows = place.locale.rows("word")
+    written = place.match.group()
+    row = rows.get(written) or rows.get(written.lower())
+    return row.spoken if row else None
+
+
+def read_sign(place: Place) -> str | None:
+    """Words of a sign that is spoken, where it stands as its row says; None elsewhere."""
+    row = place.locale.rows("sign")[place.match.group()]
+    before = place.text[max(place.match.start() - 2, 0) : place.match.start()].rstrip(" ")[-1:]
+    after = place.text[place.match.end() : place.match.end() + 2].lstrip(" ")[:1]
+    if "number" in row.details and not (_is_term(after) and (_is_term(before) or row.details.get("number") == "sign")):
+        return None
+    if "math" in row.details and not (_is_term(before) and _is_term(after) and _has_equals(place)):
+        return None
+    if "unit" in row.details and not _stands_between_units(place):
+        return None
+    return row.spoken
+
+
+def _is_term(sign: str) -> bool:
+    return sign.isdigit() or sign in {"(", ")", "√", "π", "%"}
+
+
+def _has_equals(place: Place) -> bool:
+    around = place.text[max(place.match.start() - _CONTEXT, 0) : place.match.end() + _CONTEXT]
+    return any(sign in around for sign in "=≈<>")
+
+
+def _stands_between_units(place: Place) -> bool:
+    return bool(place.said) and place.after in place.locale.rows("unit")
+
+
+def read_unit_alone(place: Place) -> str:
+    """Unit without a number: one of them behind a word for per, else several."""
+    locale = place.locale
+    row = locale.rows("unit")[place.match["unit"]]
+    is_one = place.before.lower() in locale.words("per_words") or place.said.lower() in locale.words("per_words")
+    return noun_form(locale, row, Amount("", "1" if is_one else "100")).replace("{}", "").strip()
+
+
+def read_address(place: Place) -> str:
+    """Parts of an address with the names of the signs between them."""
+    locale = place.locale
+    names = locale.rows("address")
+    written = re.sub(r"\Ahttps?://", "", place.match.group()).rstrip("/")
+    said = []
+    for part in re.findall(r"[^\W\d_]+|[0-9]+|[^\w]|_", written):
+        if part[0].isdigit():
+            said.append(whole(locale, part) if len(part) < 5 else digits(locale, part))
+        elif part.isalpha():
+            said.append(part if part != "www" else "w w w")
+        elif part in names:
+            said.append(names[part].spoken)
+    return " ".join(said)
