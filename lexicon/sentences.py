@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from lexicon.capitals import sentence_case
+from lexicon.gesture_names import GESTURES
 from lexicon.given_phones import TextWord, ToneSpan, phrase_words
 from lexicon.ipa import IpaPhone
 from lexicon.marked_text import GestureMark, Mark, MarkedText, PauseMark, PhoneMark, StyleRun
@@ -19,6 +20,7 @@ from lexicon.pauses import PARAGRAPH_S, pause_behind
 from lexicon.sentence_length import n_letters, overlapping_runs, pieces_of_text
 from lexicon.tones import EVEN
 
+MAX_LAST_GESTURE_S = 1.2  # of silence behind the last word, for a gesture that stands there
 _BLANK_LINE = re.compile(r"\n\s*\n")
 
 
@@ -188,13 +190,15 @@ def text_prefix(written: str, n: int) -> str:
 def index_by_letters(text: MarkedText) -> MarkedText:
     """A marked text with positions in letters; at one position the last run, the sum of pauses, the largest gestures.
 
+    Gestures behind the last word get a pause in which they are seen.
+
     Raises
     ------
     InputError
         The sum of the pauses at one position is too long.
     """
     ends = (mark.end for mark in text.marks if isinstance(mark, PhoneMark))
-    positions = sorted({0, *(run.start for run in text.runs), *(mark.at for mark in text.marks), *ends})
+    positions = sorted({0, len(text.text), *(run.start for run in text.runs), *(mark.at for mark in text.marks), *ends})
     letters = {0: 0}
     for before, position in pairwise(positions):
         letters[position] = letters[before] + n_letters(text.text[before:position])
@@ -213,8 +217,16 @@ def index_by_letters(text: MarkedText) -> MarkedText:
             names.append(replace(mark, at=at, end=letters[mark.end]))
         else:
             names.append(replace(mark, at=at))
+    last = letters[len(text.text)]
+    pauses |= _pause_of_gestures([mark for mark in gestures.values() if mark.at == last and last not in pauses])
     marks = sorted([*gestures.values(), *names, *pauses.values()], key=lambda mark: mark.at)
     return replace(text, runs=tuple(runs.values()), marks=tuple(marks))
+
+
+def _pause_of_gestures(last: Sequence[GestureMark]) -> dict[int, PauseMark]:
+    """Silence in which gestures behind the last word are seen, by its place."""
+    needed = max((mark.seconds or GESTURES[mark.name].seconds for mark in last), default=0.0)
+    return {mark.at: PauseMark(mark.at, min(needed, MAX_LAST_GESTURE_S)) for mark in last}
 
 
 def _phrases(

@@ -6,7 +6,8 @@ import pytest
 
 from lexicon.errors import InputError
 from lexicon.gesture_names import GESTURES, gesture_name
-from lexicon.marked_text import GestureMark, MarkedText
+from lexicon.marked_text import GestureMark, MarkedText, PauseMark
+from lexicon.sentences import index_by_letters
 from lexicon.text_marks import parse_marks
 
 
@@ -81,3 +82,11 @@ def test_a_megabyte_is_read_at_once(piece: str) -> None:
     parse_marks(piece * (1_000_000 // len(piece)))
     parse_marks(f"[{piece[1:] * (200_000 // len(piece))}]")
     assert time.perf_counter() - begin < 10
+
+
+def test_a_gesture_behind_the_last_word_has_time() -> None:
+    found = index_by_letters(parse_marks("Great job. [wink][nod]"))
+    assert found.marks == (GestureMark(9, "wink"), GestureMark(9), PauseMark(9, 1.1))
+    assert index_by_letters(parse_marks("Bye [smile 4s][pause 0.2]")).marks[1] == PauseMark(3, 0.2)
+    assert index_by_letters(parse_marks("Bye [smile 4s]")).marks[1] == PauseMark(3, 1.2)
+    assert index_by_letters(parse_marks("[wink]Bye")).marks == (GestureMark(0, "wink"),)

@@ -230,9 +230,8 @@ class GestureFields:
         if feature == "head":
             added[:, :3] = head_turn(moving, times)
         elif feature == "blink":
-            # a lid that is shut already shuts no further
-            shut = pair_values(moving, "lid", times).clip(0.0, 1.0)
-            return np.asarray(np.maximum(values, shut), np.float32)
+            # of the way to shut lids, wherever they are: a lid that is shut already shuts no further
+            added += pair_values(moving, "lid", times).clip(0.0, 1.0) * (1.0 - values)
         elif feature == "brows":
             lift = self.palette.brow_lift
             added += np.outer(channel_values(moving, "brows_up", times), lift / (lift @ lift))
