@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tts2face.face.body import Body
 from tts2face.face.breathing import phrase_starts
 from tts2face.face.gestures import SPEECH_GAINS
-from tts2face.gestures.elements import interpolate_keys
+from tts2face.gestures.elements import StyleSpan, interpolate_keys
 from tts2face.gestures.gaze import microsaccades
 from tts2face.gestures.kinds import KINDS
 from tts2face.gestures.listening import with_responses
@@ -24,7 +24,7 @@ from tts2face.gestures.movements import timed
 from tts2face.gestures.noise import NoiseStream
 from tts2face.gestures.speech_plan import NO_PLAN, SpeechPlan, plan_speech
 from tts2face.gestures.stream import GestureFields, GestureStream, GestureValues
-from tts2face.gestures.timeline import Timeline
+from tts2face.gestures.timeline import Timeline, parse_style
 from tts2face.models.palette import Palette
 from tts2face.request import FIELDS, OPTIONS, SOURCE_OPTIONS
 from tts2face.session.animated_face import AnimatedFace
@@ -107,6 +107,7 @@ class GestureLayer:
         self._yield_turn = yield_turn
         self._memory = memory
         palette, request = fields.palette, prepared.request
+        self._palette = palette
         self._requested.check_styles(palette)
         for style in marked_styles(prepared.text):
             palette.require(style)
@@ -211,6 +212,20 @@ class GestureLayer:
         before = np.array(starts) + self._now.seconds - piece.clip.motion.duration - TURN_REACH_S
         listened = timeline.is_listening(before)
         return [start for start, was_listening in zip(starts, listened.tolist(), strict=True) if was_listening]
+
+    def change_style(self, style: str) -> None:
+        """From the next piece on, the face has another style, written as ``--style`` takes it.
+
+        Raises
+        ------
+        InputError
+            The palette has no such style.
+        """
+        now, chosen = self._now.seconds, parse_style(style)
+        spans = tuple(StyleSpan(feature, name, now) for feature, name in chosen.items())
+        Timeline(spans=spans).check_styles(self._palette)
+        # what has ended is forgotten, since a stream has no end
+        self._requested = self._requested.lasting(max(now - REACH_S, 0.0)).merge(Timeline(spans=spans))
 
     def finish(self) -> None:
         """Reject requested gestures beyond the end of the clip.

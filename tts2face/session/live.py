@@ -16,9 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
+from lexicon.marked_text import GestureMark
 from lexicon.pauses import pause_behind
+from lexicon.sentence_length import n_letters
+from lexicon.ssml_leniency import nearest_style
+from lexicon.text_marks import parse_marks
 from tts2face.gestures.elements import ListeningSpan
 from tts2face.gestures.listening import LASTS_S, responses
+from tts2face.gestures.movements import gesture_end
 from tts2face.gestures.timeline import Timeline
 from tts2face.lips.performer import PerformerRetargeter, build_performer_retargeter
 from tts2face.models.face import Face
@@ -28,6 +33,7 @@ from tts2face.session.joining import END_S, JOIN_LEAD_S
 from tts2face.session.prepared import prepare
 from tts2face.session.recording import select_audio_map
 from tts2face.session.shared_models import SessionModels
+from tts2face.session.speech import gesture_of
 from tts2face.session.speech_stream import Piece, after_listening
 from tts2face.session.steps import pieces_from
 from tts2face.sound.features import FEATURE_RATE
@@ -233,6 +239,14 @@ class LiveLips:
         return self._face.motion_of_parameters(Trajectory(self._channels, parameters, self.fps))
 
 
+@dataclass(frozen=True, slots=True)
+class ShownGesture:
+    """A gesture that was asked for while a clip grows, and the second of the clip at which it begins."""
+
+    name: str
+    time: float
+
+
 class LiveSpeech:
     """A clip without an end: `say` appends speech, `idle` and `listen` silence with a living face.
 
@@ -261,6 +275,9 @@ class LiveSpeech:
         self._has_listened = False
         self._rate = exact_rate(request.fps)
         self._cues: list[float] = []  # seconds of the clip at which the face responds
+        self._waiting: list[GestureMark] = []
+        self._shown: list[ShownGesture] = []
+        self._moves_until = 0.0  # seconds of the clip at which the last gesture ends
 
     @property
     def seconds(self) -> float:
@@ -287,13 +304,20 @@ class LiveSpeech:
         return float(n_frames / self._rate)
 
     def say(self, text: str) -> Iterator[Piece]:
-        """Append the sentences of a text; errors as `Session.stream`."""
+        """Append the sentences of a text; errors as `Session.stream`.
+
+        Gestures of a text without words are those of the next piece.
+        """
+        marked = parse_marks(text, self.language, self.markup)
+        alone = [mark for mark in marked.marks if isinstance(mark, GestureMark)]
+        if alone and not n_letters(marked.text):
+            return self.gesture(*alone)
         spoken = replace(self._spoken, text=text)
         spoken = after_listening(spoken) if self._has_listened else spoken
         self._has_listened = False
         if self._pause_s is not None:
             spoken = replace(spoken, lead=max(self._pause_s / spoken.rate - END_S, JOIN_LEAD_S))
-        yield from self._append(replace(self._request, source=spoken))
+        yield from self._append(replace(self._request, source=spoken), is_speech=True)
         self._pause_s = pause_behind(text)
 
     def idle(self, seconds: float) -> Iterator[Piece]:
@@ -318,14 +342,70 @@ class LiveSpeech:
         yield from self._append(replace(self._silent, source=Listening(seconds)), responding.merge(listened))
         self._has_listened = True
 
+    def gesture(self, *gestures: GestureMark) -> None:
+        """Make gestures with the next word of `say`, or at the beginning of the next `idle` or `listen`.
+
+        Of two with one name that wait, the later one is made.
+        """
+        for gesture in gestures:
+            self._waiting = [one for one in self._waiting if one.name != gesture.name] + [replace(gesture, at=0)]
+
+    @property
+    def has_gestures(self) -> bool:
+        """Whether a gesture waits or is being made."""
+        return bool(self._waiting) or self._moves_until > self.seconds
+
+    def forget_gestures(self) -> None:
+        """Make none of the gestures that wait."""
+        self._waiting.clear()
+
+    def shown_gestures(self) -> list[ShownGesture]:
+        """Gestures that are made since the last call, with the second of the clip at which they begin."""
+        shown, self._shown = self._shown, []
+        return shown
+
+    def change_style(self, style: str) -> None:
+        """From the next word or the next silence on, the face and its voice have another style.
+
+        Names of styles of speech services stand for the nearest ones, as in marks.
+
+        Raises
+        ------
+        InputError
+            There is no such style.
+        """
+        names = self._models.palette.names if self._models.palette is not None else ()
+        style = style if style in names else nearest_style(style) or style
+        if self._layer is not None:
+            self._layer.change_style(style)
+        self._request, self._silent = (replace(request, style=style) for request in (self._request, self._silent))
+
     def rest(self) -> None:
         """The next text begins with the ``lead`` of the request, without a pause after the sentence before it."""
         self._pause_s = None
 
-    def _append(self, request: Request, listening: Timeline | None = None) -> Iterator[Piece]:
+    def _append(
+        self, request: Request, listening: Timeline | None = None, *, is_speech: bool = False
+    ) -> Iterator[Piece]:
         prepared = self._models.with_own_styles(prepare(request, self._models.person))
-        prepared = prepared if listening is None else replace(prepared, listening=listening)
+        waiting = [*self._waiting]
+        if is_speech:
+            prepared = replace(prepared, text=replace(prepared.text, marks=(*waiting, *prepared.text.marks)))
+        else:
+            now = Timeline(gestures=tuple(gesture_of(mark, 0.0) for mark in waiting))
+            prepared = replace(prepared, listening=now if listening is None else now.merge(listening))
         models = self._models.for_request(prepared)
         for piece in pieces_from(prepared, models, self._layer, self._n_frames, ends_on_frame=True):
             self._n_frames += len(piece.clip.motion)
+            self._note_gestures(piece, waiting)
+            waiting = []
             yield piece
+
+    def _note_gestures(self, piece: Piece, waiting: Sequence[GestureMark]) -> None:
+        """Note when gestures of a piece are made; those that waited do so no longer."""
+        self._waiting = [one for one in self._waiting if one not in waiting]
+        for gesture in piece.timeline.gestures:
+            self._moves_until = max(self._moves_until, gesture_end(gesture))
+        for mark in waiting:
+            begins = [one.time for one in piece.timeline.gestures if one.name == mark.name]
+            self._shown.append(ShownGesture(mark.name, min(begins, default=piece.begin)))

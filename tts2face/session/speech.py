@@ -301,13 +301,14 @@ def resolve_marks(
         previous_end = max(end, previous_end)
         if start < end:
             spans += [StyleSpan(feature, style, start, end) for feature, style in innermost_styles(run.styles).items()]
-    gestures = tuple(
-        Gesture(times.onset(mark.at), mark.name, mark.size, mark.seconds, mark.down_deg, mark.left_deg)
-        for mark in marks
-        if isinstance(mark, GestureMark)
-    )
+    gestures = tuple(gesture_of(mark, times.onset(mark.at)) for mark in marks if isinstance(mark, GestureMark))
     names = tuple(MarkTime(mark.name, times.onset(mark.at)) for mark in marks if isinstance(mark, NameMark))
     return Timeline(spans=tuple(spans), gestures=gestures), names
+
+
+def gesture_of(mark: GestureMark, time: float) -> Gesture:
+    """The gesture of a mark, at a second."""
+    return Gesture(time, mark.name, mark.size, mark.seconds, mark.down_deg, mark.left_deg)
 
 
 def resolve_recording_marks(

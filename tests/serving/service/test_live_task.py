@@ -148,3 +148,85 @@ def test_another_stream_waits_while_idle_motion_is_made() -> None:
     assert isinstance(next(steps), Wait)
     idle._is_growing = False
     assert type_of(next(steps)) == "curves"
+
+
+def stream_events(session: tts2face.Session, *messages: dict[str, Any], **options: Any) -> list[Any]:
+    """Events of a stream that gets messages at once, and its end."""
+    return idle_events(session, 8.0, deque(Message(MORE, one) for one in (*messages, {"type": "end"})), **options)
+
+
+def nod(**fields: Any) -> dict[str, Any]:
+    return {"type": "gesture", "gesture": {"at": 0, "name": "nod", **fields}}
+
+
+def test_a_gesture_is_made_with_the_next_word() -> None:
+    session = tts2face.Session()
+    say = {"type": "say", "text": "Well, yes."}
+    events = stream_events(session, nod(), nod(name="shake"), nod(name="shake", size=2.0), say, with_idle=False)
+    speech = next(one for one in events if one["type"] == "speech")
+    made = [one for one in events if one["type"] == "gesture"]
+    assert [one["name"] for one in made] == ["nod", "shake"]
+    assert [one["at"] for one in made] == pytest.approx([speech["words"][0][1]] * 2, abs=1e-3)
+    plain = stream_events(session, say, with_idle=False)
+    pitch, turn, _ = np.degrees(frames_of(events)[:, -6:-3] - frames_of(plain)[:, -6:-3]).T
+    assert pitch.max() > 5.0
+    assert np.ptp(turn) > 15.0
+
+
+def test_a_gesture_in_silence_is_made_now_and_the_stream_ends_behind_it() -> None:
+    for options in ({"with_idle": False}, {}):
+        events = stream_events(tts2face.Session(), nod(name="tilt"), **options)
+        assert events[0]["type"] == "gesture"
+        frames = np.degrees(frames_of(events)[:, -6:-3])
+        assert np.abs(frames[:, 2]).max() > 6.0
+        assert 1.8 < len(frames) / 30 < 3.0
+
+
+def test_a_gesture_alone_in_a_text_is_one_of_the_silence() -> None:
+    events = stream_events(tts2face.Session(), {"type": "say", "text": "[wink left]"}, with_idle=False)
+    assert {one["type"] for one in events} >= {"gesture", "curves"}
+    assert "error" not in {one["type"] for one in events}
+
+
+def test_a_style_holds_from_the_next_word_on() -> None:
+    session = tts2face.Session()
+    say = [{"type": "say", "text": text} for text in ("We were away.", "We were away.")]
+    style = {"type": "style", "style": "cheerful"}
+    inputs: Inputs = deque(Message(MORE, one) for one in say[:1])
+    events: list[Any] = []
+    for step in LiveTask(session, Work(kind="live", request={"with_idle": False}), inputs, clock=lambda: 0.0).steps():
+        if isinstance(step, Wait):
+            if any(one["type"] == "style" for one in events):
+                break
+            inputs += [Message(MORE, one) for one in (style, say[1], {"type": "end"})]
+        elif not isinstance(step, Chunk):
+            events.append(content_of(step))
+    first, second = (one for one in events if one["type"] == "speech")
+    changed = next(one for one in events if one["type"] == "style")
+    assert changed == {"type": "style", "style": "cheerful", "at": pytest.approx(second["begin"], abs=1e-3)}
+    names = next(one["names"] for one in events if one["type"] == "curves")
+    smiles = frames_of(events)[:, names.index("mouthSmileLeft")]
+    middle = round(changed["at"] * 30)
+    assert smiles[middle + 20 :].mean() > smiles[: middle - 10].mean() + 0.15
+    # the voice is that of the style, too
+    assert second["seconds"] != pytest.approx(first["seconds"], abs=0.02)
+
+
+def test_an_unknown_style_is_an_error_and_the_stream_goes_on() -> None:
+    events = stream_events(
+        tts2face.Session(), {"type": "style", "style": "purple"}, {"type": "say", "text": "Yes."}, with_idle=False
+    )
+    assert events[0]["message"].startswith("there is no style 'purple' in the palette; it has neutral")
+    assert "speech" in {one["type"] for one in events}
+
+
+def test_the_idle_motion_has_the_style() -> None:
+    events = stream_events(
+        tts2face.Session(), {"type": "listen", "rate": None}, {"type": "style", "style": "delighted"}
+    )
+    assert events[0] == {"type": "style", "style": "delighted", "at": 0.0}
+
+
+def test_cancel_forgets_gestures_that_wait() -> None:
+    events = stream_events(tts2face.Session(), nod(), {"type": "cancel", "arrived": 0.0}, with_idle=False)
+    assert [one["type"] for one in events] == ["cancelled"]

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from lexicon.marked_text import GestureMark
 from tts2face.serving.service import live_text
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.live_text import (
@@ -214,3 +215,38 @@ def test_a_rate_that_is_none_is_refused(rate: Any) -> None:
     with pytest.raises(RefusedError, match="rate must be a sample rate from 8000 to 192000 Hz, or null, not"):
         follow(text, [{"type": "listen", "rate": rate}])
     assert text.inputs.empty()
+
+
+@pytest.mark.parametrize(
+    ("message", "mark"),
+    [
+        ({"name": "nod"}, {"name": "nod"}),
+        ({"name": "Brows up", "size": 0.5}, {"name": "brows_up", "size": 0.5}),
+        ({"name": "look left 2s", "size": None}, {"name": "look_at", "left_deg": 15.0, "seconds": 2.0}),
+        ({"name": "look_at", "down_deg": 5, "left_deg": -20}, {"name": "look_at", "down_deg": 5.0, "left_deg": -20.0}),
+    ],
+)
+def test_gestures_are_given_at_once(message: dict[str, Any], mark: dict[str, Any]) -> None:
+    text = live()
+    follow(text, [{"type": "gesture", **message}, {"type": "style", "style": " delighted "}])
+    gesture, style = (text.inputs.get_nowait()[0] for _ in range(2))
+    assert GestureMark(**gesture["gesture"]) == GestureMark(0, **mark)
+    assert style == {"type": "style", "style": "delighted"}
+
+
+@pytest.mark.parametrize(
+    ("message", "reason"),
+    [
+        ({"type": "gesture"}, "name must be the name of a gesture, not null; choose nod, shake"),
+        ({"type": "gesture", "name": "wave"}, 'name must be the name of a gesture, not "wave"'),
+        ({"type": "gesture", "name": "nod", "size": 9}, "size of the gesture nod must lie between 0.1 and 2, not 9"),
+        ({"type": "gesture", "name": "nod", "size": "big"}, "the gesture: size must be a number"),
+        ({"type": "gesture", "name": "nod", "speed": 1}, "the gesture: there is no 'speed' here; choose size"),
+        ({"type": "gesture", "name": "blink", "left_deg": 4}, "the gesture blink has no direction"),
+        ({"type": "style"}, "style must be the name of a style, not null"),
+        ({"type": "style", "style": 3}, "style must be the name of a style, not 3"),
+    ],
+)
+def test_wrong_gestures_and_styles_are_refused(message: dict[str, Any], reason: str) -> None:
+    with pytest.raises(RefusedError, match=reason):
+        follow(live(), [message])

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lexicon.errors import Tts2faceError
+from lexicon.marked_text import GestureMark
 from lexicon.spoken_words import reading_notes
 from tts2face.gestures.listening import PartnerSound
 from tts2face.processes.message import Message
@@ -32,10 +33,13 @@ GROWING_S = 0.02  # after which is looked again whether another stream has made 
 
 
 class LiveTask:
-    """One live stream: inputs are ``say``, ``listen``, ``heard``, ``cancel`` and ``end``; results are events and sound.
+    """One live stream: inputs are ``say``, ``gesture``, ``style``, ``listen``, ``heard``, ``cancel`` and ``end``.
+
+    Results are events and sound.
 
     The text of ``say`` is a sentence; ``said`` with their number ``n`` names those that are spoken or forgotten. From
-    ``listen`` to the next sentence the face listens; the payload of ``heard`` is 16-bit sound of the partner.
+    ``listen`` to the next sentence the face listens; the payload of ``heard`` is 16-bit sound of the partner. A
+    ``gesture`` is made with the next word that is not made yet, in silence at once; so is a ``style``.
 
     Parameters
     ----------
@@ -44,11 +48,11 @@ class LiveTask:
     """
 
     def __init__(self, session: "Session", work: Work, inputs: Inputs, clock: Any = time.monotonic) -> None:
-        options = dict(work.request)
-        self._has_idle = bool(options.pop("with_idle", True))
-        self._speech: LiveSpeech = session.live(**options)
+        self._session, self._options = session, dict(work.request)
+        self._has_idle = bool(self._options.pop("with_idle", True))
+        self._speech: LiveSpeech = session.live(**self._options)
         self._curves = Curves(session)
-        self._idle = idle_motion(session, options) if self._has_idle else None
+        self._idle = idle_motion(session, self._options) if self._has_idle else None
         self._idle_at = self._n_idle = 0  # next frame of the idle motion; frames of it that the stream has
         self._inputs, self._clock = inputs, clock
         self._sentences: deque[str] = deque()
@@ -73,7 +77,7 @@ class LiveTask:
         """Yield results until ``end`` and all its text are done."""
         while True:
             yield from self._read_inputs()
-            is_alive = self._has_idle or self._listens
+            is_alive = self._has_idle or self._listens or self._speech.has_gestures
             if self._began is None and (self._sentences or is_alive):
                 self._began = self._clock() - self._seconds
             if self._sentences:
@@ -81,7 +85,7 @@ class LiveTask:
                 yield from self._say(self._sentences.popleft())
                 yield _said(1)
                 continue
-            if self._is_ended:
+            if self._is_ended and not self._speech.has_gestures:
                 return
             if not is_alive or self._began is None:
                 yield Wait()
@@ -91,12 +95,42 @@ class LiveTask:
                 yield Wait(ahead - AHEAD_S)
                 continue
             with suppress(InterruptedTaskError):  # by a message that is read next
-                yield from self._listen() if self._listens else self._be_idle()
+                yield from self._be_silent()
 
-    def _listen(self) -> Iterator[Line]:
+    def _be_silent(self) -> Iterator[Step]:
+        if self._listens:
+            yield from self._listen()
+        elif self._speech.has_gestures:
+            yield from self._gesture()
+        else:
+            yield from self._be_idle()
+
+    def _gesture(self) -> Iterator[Step]:
+        """Idle motion of this stream alone, while a gesture is made."""
+        self._begin_source("gestures")
+        for piece in self._speech.idle(IDLE_S):
+            yield from self._shown_gestures()
+            yield from self._curves.of_clip(piece.clip, piece.begin + self._idle_s)
+
+    def _shown_gestures(self) -> Iterator[Event]:
+        for shown in self._speech.shown_gestures():
+            yield Event({"type": "gesture", "name": shown.name, "at": round(shown.time + self._idle_s, 4)})
+
+    def _change_style(self, style: str) -> Event:
+        try:
+            self._speech.change_style(style)
+        except Tts2faceError as error:
+            return Event({"type": "error", "message": " ".join(str(error).split())})
+        self._options["style"] = style
+        if self._has_idle:
+            self._idle, self._idle_at = idle_motion(self._session, self._options), 0
+        return Event({"type": "style", "style": style, "at": round(self._seconds, 4)})
+
+    def _listen(self) -> Iterator[Line | Event]:
         cues = None if self._partner is None else self._partner.new_cues()
         self._begin_source("listening")
         for piece in self._speech.listen(LISTEN_S, cues):
+            yield from self._shown_gestures()
             yield from self._curves.of_clip(piece.clip, piece.begin + self._idle_s)
 
     def _be_idle(self) -> Iterator[Step]:
@@ -133,6 +167,7 @@ class LiveTask:
             for piece in self._speech.say(sentence):
                 begin = piece.begin + self._idle_s
                 yield _speech_event(piece, begin)
+                yield from self._shown_gestures()
                 yield _sound(piece.clip)
                 yield from self._curves.of_clip(piece.clip, begin)
                 yield from self._read_inputs()
@@ -154,16 +189,23 @@ class LiveTask:
                     self._sentences.append(content["text"])
                 case "end":
                     self._is_ended = True
+                case "gesture":
+                    self._speech.gesture(GestureMark(**content["gesture"]))
+                case "style":
+                    yield self._change_style(content["style"])
                 case "cancel":
-                    if self._sentences:
-                        yield _said(len(self._sentences))
-                        self._sentences.clear()
-                    self._n_cancels += 1
-                    self._began = self._clock() - self._seconds  # what follows is due now
-                    self._speech.rest()
-                    after_ms = 1000 * (self._clock() - content["arrived"])
-                    cancelled = {"at": round(self._seconds, 4), "after_ms": round(after_ms, 1)}
-                    yield Event({"type": "cancelled", **cancelled})
+                    yield from self._cancel(content["arrived"])
+
+    def _cancel(self, arrived: float) -> Iterator[Event]:
+        if self._sentences:
+            yield _said(len(self._sentences))
+            self._sentences.clear()
+        self._n_cancels += 1
+        self._began = self._clock() - self._seconds  # what follows is due now
+        self._speech.rest()
+        self._speech.forget_gestures()
+        after_ms = 1000 * (self._clock() - arrived)
+        yield Event({"type": "cancelled", "at": round(self._seconds, 4), "after_ms": round(after_ms, 1)})
 
     def _hear(self, given: Message) -> None:
         """Begin to listen, or hear a block of the partner's sound."""

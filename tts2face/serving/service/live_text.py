@@ -4,12 +4,16 @@ import asyncio
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
+from dataclasses import asdict, make_dataclass, replace
 from typing import Any
 
-from lexicon.errors import DataError
+from lexicon.errors import DataError, InputError
+from lexicon.gesture_marks import parse_gesture
+from lexicon.gesture_names import GESTURES
 from lexicon.growing_text import GrowingText
 from lexicon.values.checks import format_value
 from lexicon.values.json_text import parse_json
+from lexicon.values.records import checked
 from tts2face.serving.service.access import Bucket
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import MINUTE_S
@@ -21,11 +25,16 @@ MAX_WAITING_CHARACTERS = 65_536  # of sentences that have not been given; then t
 MAX_CANCELS = 8  # that have not been answered; likewise
 N_GIVEN = 2  # sentences that a task has: one is spoken, the next one waits
 HEARD_S = 0.1  # of the partner's sound that the task gets at once
+MESSAGE_CHARACTERS = 20  # of text, as which a gesture or a style counts within the limits of a stream
+MAX_STYLE_CHARACTERS = 400
 REFUSED_S = 0.1  # for which a client that sends what is refused is not read from
 
 MAX_AHEAD_S = 5.0  # by which a client's sound is read ahead of real time
 SAMPLE_BYTES, SAMPLE_RATES = 2, (8_000, 192_000)  # of sound, and its rates in Hz
 
+_Given: Any = make_dataclass(
+    "_Given", [(name, float | None, None) for name in ("size", "seconds", "down_deg", "left_deg")]
+)
 Count = Callable[[], None]  # counts a sentence as a request of its key, or raises its refusal
 
 
@@ -111,6 +120,10 @@ class LiveText:
                 await self._add(content.get("text"))
             case "listen":
                 self._listen(content.get("rate"))
+            case "gesture":
+                self._gesture(content)
+            case "style":
+                self._style(content.get("style"))
             case "flush":
                 self._queue(self._growing.flush())
             case "end":
@@ -133,6 +146,36 @@ class LiveText:
         self._partner_pace = None if rate is None else Pace(SAMPLE_BYTES * rate)
         self._block = HEARD_S * SAMPLE_BYTES * (rate or 0)
         self.inputs.put_nowait(({"type": "listen", "rate": rate}, b""))
+
+    def _gesture(self, content: Mapping[str, Any]) -> None:
+        """Pass a gesture on: a name as in a mark of a text, and fields of one."""
+        given = {name: value for name, value in content.items() if name not in {"type", "name"} and value is not None}
+        name = content.get("name")
+        try:
+            mark = parse_gesture(name, 0) if isinstance(name, str) else None
+            if mark is None:
+                shown = format_value(name)
+                raise InputError(f"name must be the name of a gesture, not {shown}; choose {', '.join(GESTURES)}")
+            mark = replace(
+                mark,
+                **{
+                    name: value
+                    for name, value in vars(checked(_Given, given, "the gesture", InputError)).items()
+                    if value is not None
+                },
+            )
+        except InputError as wrong:
+            raise RefusedError(400, "invalid_request", str(wrong)) from wrong
+        self._check(MESSAGE_CHARACTERS)
+        self.inputs.put_nowait(({"type": "gesture", "gesture": asdict(mark)}, b""))
+
+    def _style(self, style: Any) -> None:
+        if not isinstance(style, str) or not style.strip():
+            raise RefusedError(
+                400, "invalid_request", f"style must be the name of a style, not {format_value(style)}; send one"
+            )
+        self._check(MESSAGE_CHARACTERS)
+        self.inputs.put_nowait(({"type": "style", "style": style.strip()[:MAX_STYLE_CHARACTERS]}, b""))
 
     async def _hear(self, samples: bytes) -> None:
         if self._partner_pace is None:

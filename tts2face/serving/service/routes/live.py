@@ -26,7 +26,8 @@ from tts2face.serving.service.state import ServiceState
 
 router = APIRouter(tags=["live"])
 
-TEXT_TYPES = frozenset({"text", "listen", "flush", "cancel", "interrupt", "end"})  # of messages of a stream of text
+# of messages of a stream of text
+TEXT_TYPES = frozenset({"text", "gesture", "style", "listen", "flush", "cancel", "interrupt", "end"})
 AUDIO_TYPES = frozenset({"end"})  # of a stream of sound, besides the sound
 MAX_BLOCK_BYTES = 1 << 16  # of sound in one message
 MAX_BLOCKS = 16  # that wait for the task
