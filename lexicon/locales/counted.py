@@ -5,7 +5,7 @@ import unicodedata
 
 from lexicon.locales.nouns import behind, count, gender_of, noun_form
 from lexicon.locales.numbers import Amount, Grammar, cardinal, digits, is_round_million, number, ordinal, whole, year
-from lexicon.locales.place import Place, read_amount
+from lexicon.locales.place import Place, amount_pattern, read_amount
 from lexicon.locales.tables import Locale, Row
 
 _MAGNITUDE_DIGITS = "1000000"  # the noun behind a million is that behind its digits
@@ -15,12 +15,15 @@ def read_measure(place: Place) -> str:
     """Number with a unit, perhaps per another one (5 km/h), and with an ending of the language (kg'lık)."""
     locale, grammar = place.locale, place.grammar("cardinal")
     row = locale.rows("unit")[place.match["unit"]]
+    if place.match["unit"] == "°" and place.after[:1].islower() and place.before.lower() in locale.words("articles"):
+        suffix = locale.rows("suffix")["°"]  # al 3° piano
+        return ordinal(locale, int(place.amount("amount").whole), Grammar(suffix.details["gender"]))
     said = _magnified(place, row, grammar.case) if place.match["magnitude"] else ""
     said = said or count(locale, place.amount("amount"), row, grammar.case)
     if place.match["per"]:
         per = locale.rows("unit")[place.match["per"]]
         said = f"{said} {locale.setting('per')} {per.forms[0]}"
-    return said + (place.match["tail"] or "")
+    return said
 
 
 def _magnified(place: Place, row: Row, case: str) -> str:
@@ -48,7 +51,7 @@ def read_money(place: Place) -> str:
     case = place.grammar("cardinal").case
     if place.match["magnitude"]:
         return _magnified(place, row, case)
-    return money(locale, amount, row, case) + (place.match.groupdict().get("tail") or "")
+    return money(locale, amount, row, case)
 
 
 def money(locale: Locale, amount: Amount, row: Row, case: str = "") -> str:
@@ -147,9 +150,18 @@ def _pair(locale: Locale, group: str) -> str:
     return digits(locale, group) if group[0] == "0" else cardinal(locale, int(group))
 
 
-def read_version(place: Place) -> str:
-    """Numbers with points between them: 1.2.3, 192.168.0.1, 3.11."""
+def read_named_telephone(place: Place) -> str | None:
+    """Number behind the word for telephone; None behind another one."""
+    if (place.said or place.before).lower() not in place.locale.words("telephone_words"):
+        return None
+    return read_telephone(place)
+
+
+def read_version(place: Place) -> str | None:
+    """Numbers with points between them: 1.2.3, 192.168.0.1, 3.11; None for a number in groups."""
     locale = place.locale
+    if re.fullmatch(amount_pattern(locale), place.match.group()):
+        return None
     return f" {locale.setting('dot', locale.setting('point'))} ".join(
         whole(locale, part) for part in place.match.group().split(".")
     )
@@ -165,9 +177,9 @@ def read_number(place: Place) -> str:
     """Number, in the gender of the noun behind it."""
     locale, written = place.locale, place.match["amount"]
     grammar = place.grammar("cardinal")
-    gender = grammar.gender or (
-        gender_of(locale, place.after) if place.after[:1].islower() or _has_cased_nouns(locale) else ""
-    )
+    if place.requires_ordinal and written.isdigit():
+        return ordinal(locale, int(written), grammar)
+    gender = grammar.gender or _gender_behind(place)
     amount = place.amount("amount")
     if amount.sign or amount.decimals or not written.isdigit():
         said = number(locale, amount, Grammar(gender, grammar.case))
@@ -175,11 +187,16 @@ def read_number(place: Place) -> str:
         said = year_or_number(locale, written, Grammar(gender, grammar.case))
     if is_round_million(amount) and place.after and locale.setting("of_million"):
         return behind(locale, said, place.after, links=True).removesuffix(place.after).rstrip(" ")
-    return said + (place.match["tail"] or "")
+    return said
 
 
-def _has_cased_nouns(locale: Locale) -> bool:
-    return bool(locale.setting("capital_nouns"))
+def _gender_behind(place: Place) -> str:
+    """Gender of the noun behind a number; empty where no noun follows."""
+    locale, word = place.locale, place.after
+    is_noun = word[:1].isupper() if locale.setting("capital_nouns") else word[:1].islower()
+    if not is_noun or word in locale.words("function_words"):
+        return ""
+    return gender_of(locale, word) or locale.setting("default_gender")
 
 
 def year_or_number(locale: Locale, written: str, grammar: Grammar) -> str:

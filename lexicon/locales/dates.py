@@ -1,5 +1,7 @@
 """Readers of dates, times and years."""
 
+import re
+
 from lexicon.locales.nouns import noun_form
 from lexicon.locales.numbers import Amount, Grammar, cardinal, digits, ordinal, year
 from lexicon.locales.place import Place
@@ -49,6 +51,13 @@ def _month_name(locale: Locale, written: str) -> str:
     return written
 
 
+def months_pattern(locale: Locale) -> str:
+    """Pattern of the names of months; short ones may have a full stop."""
+    full = {row.spoken for row in locale.rows("month").values()}
+    names = month_names(locale)
+    return "|".join(re.escape(name) + ("" if name in full else r"\.?") for name in names)
+
+
 def month_names(locale: Locale) -> list[str]:
     """Written names of months, the longest first."""
     names = [name for row in locale.rows("month").values() for name in (row.spoken, *row.details)]
@@ -65,6 +74,8 @@ def _date(place: Place, day: int, month: str, written: str) -> str:
 
 def _day(place: Place, day: int) -> str:
     locale = place.locale
+    if place.match.groupdict().get("ending") and locale.setting("marked_day"):  # 25η Μαρτίου
+        return ordinal(locale, day, Grammar(locale.setting("day_gender")))
     if day == 1 and locale.setting("first_day"):
         return locale.setting("first_day")
     gender = locale.setting("day_gender")
@@ -108,7 +119,7 @@ def read_time(place: Place) -> str | None:
     is_named = match["word"] or match["sign"] == "h"
     if is_named and locale.setting("hour_word") and locale.setting("hour_word") not in said:
         said = f"{said} {locale.setting('hour_word')}"
-    return said + (match.groupdict().get("tail") or "")
+    return said
 
 
 def _is_after_time_word(place: Place) -> bool:

@@ -168,7 +168,8 @@ def _spelt(locale: Locale, n: int, kind: str, grammar: Grammar) -> str:
     except NoRuleForNumberError:  # CLDR has no Russian ordinals of millions
         return digits(locale, str(n))
     for pattern, row in locale.rows("fix").items():
-        said = re.sub(pattern, row.spoken, said)
+        if row.details.get("gender", grammar.gender) == grammar.gender:
+            said = re.sub(pattern, row.spoken, said)
     return said
 
 

@@ -47,6 +47,12 @@ class Place:
         row = rows.get(f"{kind} {word}") or rows.get(word)
         return Grammar(row.details.get("gender", ""), row.spoken) if row else Grammar()
 
+    @property
+    def requires_ordinal(self) -> bool:
+        """Whether the word before has an ordinal behind it: godzina 14."""
+        row = self.locale.rows("case").get((self.said or self.before).lower())
+        return row is not None and "ordinal" in row.details
+
     def amount(self, group: str) -> Amount:
         """The amount of a group of the match."""
         return read_amount(self.locale, self.match[group])

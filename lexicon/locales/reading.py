@@ -76,6 +76,7 @@ def _read(locale: Locale, text: str, place: re.Match[str], said: str) -> tuple[r
             found = Place(locale, text, match, said)
             spoken = form.reader(found)
             if spoken is not None:
+                spoken += match.groupdict().get("tail") or ""
                 ends = match.group().endswith(".") and spoken[-1:].isalnum() and found.is_last
                 return match, f"{spoken}." if ends else spoken
     return None, None

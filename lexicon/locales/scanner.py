@@ -78,32 +78,34 @@ _NUMBER_FORMS: tuple[tuple[str, Reader], ...] = (
     (r"(?P<year>[0-9]{4})-(?P<month>[0-9]{2})-(?P<day>[0-9]{2})(?![\w-])", dates.read_numeric_date),
     (
         r"(?P<day>[0-9]{1,2})(?P<s>[/.-]) ?(?P<month>[0-9]{1,2})(?P=s) ?(?P<year>[0-9]{4}|[0-9]{2})(?![\w/]|[.,][0-9])"
-        r"‹year word›",
+        r"‹year word›‹tail›",
         dates.read_numeric_date,
     ),
     (
-        r"(?P<day>[0-9]{1,2})(?:‹day ending›)? ?‹of›(?P<month>‹months›)(?!‹letter›)\.?"
-        r"(?:,? ‹of›(?P<year>[12][0-9]{3})(?![0-9])‹year word›)?",
+        r"(?P<day>[0-9]{1,2})(?P<ending>‹day ending›)? ?‹of›(?P<month>‹months›)(?!‹letter›)"
+        r"(?:,? ‹of›(?P<year>[12][0-9]{3})(?![0-9])‹year word›)?‹tail›",
         dates.read_named_date,
     ),
     (r"(?P<day>[0-9]{1,2})\.(?P<month>[0-9]{1,2})\.(?! ?[0-9])", dates.read_short_date),
     (r"(?P<day>[0-9]{1,2})/(?P<month>[0-9]{1,2})(?![0-9/])", dates.read_short_date),
+    (
+        r"(?P<hour>[0-9]{1,2})(?P<sign>[‹time signs›])(?P<minute>[0-9]{2})(?::(?P<second>[0-9]{2}))?(?![0-9]|\.[0-9])"
+        r"(?P<word> ?(?:‹time words›)(?!‹letter›))?(?!‹letter›)‹tail›",
+        dates.read_time,
+    ),
     (
         r"\+[0-9]{1,3}(?:[ ./-]?\(?[0-9]{1,5}\)?){2,6}(?!\w)|0[0-9]{1,4}(?:[ ./-][0-9]{2,8}){1,5}(?!\w)"
         r"|\(?[0-9]{2,3}\) ?[0-9]{2,5}[ -][0-9]{2,5}(?:[ -][0-9]{2,4})?(?!\w)",
         counted.read_telephone,
     ),
     (
-        r"(?P<hour>[0-9]{1,2})(?P<sign>[‹time signs›])(?P<minute>[0-9]{2})(?::(?P<second>[0-9]{2}))?(?![0-9])"
-        r"(?P<word> ?(?:‹time words›)(?!‹letter›))?(?!‹letter›)‹tail›",
-        dates.read_time,
-    ),
-    (
         r"(?P<hour>[0-9]{1,2}) ?(?P<sign>‹hour sign›) ?(?P<minute>[0-9]{2})?(?!‹letter›|[0-9])(?P<second>(?!))?"
         r"(?P<word>(?!))?",
         dates.read_time,
     ),
+    (r"[0-9]{2,12}(?:[ ./-][0-9]{2,12}){0,5}(?![\w])", counted.read_named_telephone),
     (r"(?P<number>[12][0-9]{3})(?P<suffix>-?‹letter›{1,3})? ?(?P<word>‹year words›)‹end›", dates.read_year),
+    (r"(?P<digits>[0-9]{1,4})(?P<suffix>‹suffix›)(?!\w)", counted.read_suffixed),
     (r"‹signed›(?: ?(?P<magnitude>‹magnitude›))? ?(?P<currency>‹currency›)‹end›‹tail›", counted.read_money),
     (r"(?P<amount>‹amount›)(?:[-–](?=[0-9])| – (?=[0-9]))(?!‹amount›[-–][0-9])", counted.read_range),
     (
@@ -121,7 +123,6 @@ _NUMBER_FORMS: tuple[tuple[str, Reader], ...] = (
         counted.read_measure,
     ),
     (r"‹signed› ?(?P<magnitude>‹magnitude›)‹end›", counted.read_magnitude),
-    (r"(?P<digits>[0-9]{1,4})(?P<suffix>‹suffix›)(?!\w)", counted.read_suffixed),
     (r"(?P<digits>[0-9]{1,4})\.(?= ‹letter›)", counted.read_dotted_ordinal),
     (r"[0-9]{1,4}(?:\.[0-9]{1,4}){2,6}(?!\w)", counted.read_version),
     (r"[0-9]{1,4}‹other decimal›(?:[0-9]{1,2}|[0-9]{4})(?![0-9.])", counted.read_version),
@@ -142,7 +143,7 @@ def _parts(locale: Locale) -> dict[str, str]:
         "letter": letter,
         "end": rf"(?!{letter}|[0-9])",
         "tail": rf"(?:['’](?P<tail>{letter}{{1,12}}))?" if locale.setting("suffixes") else r"(?P<tail>(?!))?",
-        "months": "|".join(map(re.escape, dates.month_names(locale))),
+        "months": dates.months_pattern(locale),
         "of": f"(?:(?:{of}) )?" if of else "(?:)",
         "year word": f"(?P<yearword> ?(?:{year_words}))?" if year_words else "(?:)",
         "year words": alternatives(locale, "year_word") if locale.rows("year_word") else "",
@@ -168,7 +169,8 @@ def scanner(locale: Locale) -> Scanner:
     numbers = tuple(_number_forms(locale))
     address = Form(re.compile(_ADDRESS), words.read_address)
     suffix = alternatives(locale, "suffix")
-    stop = r"(?P<stop>\.(?=,| [^\W\d_A-Z]))?" if locale.setting("roman_stop") else ""
+    follows = {"yes": r"(?=,| [^\W\d_A-Z])", "ordinal": rf"(?= {LETTER})"}.get(locale.setting("roman_stop"))
+    stop = rf"(?P<stop>\.{follows})?" if follows else ""
     roman = Form(re.compile(_ROMAN.replace("{suffix}", suffix) + stop), words.read_roman)
     endings = locale.rows("ending")
     ending = Form(
@@ -210,7 +212,8 @@ def _forms_by_word(locale: Locale) -> dict[str, tuple[Form, ...]]:
     for first, forms in _grouped(locale.rows("currency")).items():
         pattern = re.compile(_money_before(locale, _any_of(forms)))
         found.setdefault(first, []).append(Form(pattern, counted.read_money))
-    add(locale.rows("abbreviation"), rf"(?:{{}}){end}", words.read_abbreviation)
+    short = locale.rows("abbreviation")
+    add({*short, *(form[:1].upper() + form[1:] for form in short)}, rf"(?:{{}}){end}", words.read_abbreviation)
     months = dates.month_names(locale)
     of = locale.setting("date_of")
     link = f"(?:(?:{of}) )?" if of else ""

@@ -83,6 +83,7 @@ def find_locale(language: str) -> Locale | None:
     for name in dict.fromkeys((code.partition("-x-")[0], code)):
         for kind, rows in (_read(name) or {}).items() if name != primary else ():
             kinds[kind] = {**kinds.get(kind, {}), **rows}
+    kinds["word"] = {**_loan_words(primary), **kinds.get("word", {})}
     return Locale(language, MappingProxyType({kind: MappingProxyType(rows) for kind, rows in kinds.items()}))
 
 
@@ -97,6 +98,18 @@ def _read(name: str) -> dict[str, dict[str, Row]] | None:
         for form in [written] if kind == "fix" or len(written) == 1 else written.split("|"):
             kinds.setdefault(kind, {})[form] = row
     return kinds
+
+
+def _loan_words(language: str) -> dict[str, Row]:
+    """International words and names in small letters, as a language says them."""
+    path = resources.files("lexicon.locales").joinpath("loan_words.tsv")
+    heading, *lines = path.read_text(encoding="utf-8").splitlines()
+    columns = heading.split("\t")
+    if language not in columns:
+        return {}
+    at = columns.index(language)
+    cells = (line.split("\t") for line in lines)
+    return {row[0]: Row(row[at], MappingProxyType({})) for row in cells if len(row) > at and row[at]}
 
 
 def _detail(part: str) -> tuple[str, str]:

@@ -6,7 +6,7 @@ from collections.abc import Collection
 from lexicon.locales.nouns import gender_of, noun_form
 from lexicon.locales.numbers import Amount, Grammar, cardinal, digits, ordinal, whole
 from lexicon.locales.place import Place
-from lexicon.locales.tables import Locale
+from lexicon.locales.tables import Locale, Row
 from lexicon.number_words import roman_value
 from lexicon.sentence_ends import ends_sentence
 
@@ -17,13 +17,14 @@ _CONTEXT = 40
 def read_abbreviation(place: Place) -> str | None:
     """Words of an abbreviation where its context is that of the table; a full stop that ends the sentence stays."""
     written = place.match.group()
-    row = place.locale.rows("abbreviation").get(written)
+    rows = place.locale.rows("abbreviation")
+    row = rows.get(written) or rows.get(written[:1].lower() + written[1:])
     if row is None:
         return None
     following = place.text[place.match.end() : place.match.end() + _CONTEXT]
     if not _is_in_context(place, row.details.keys(), following):
         return None
-    said = row.details.get(_case(place), row.spoken)
+    said = _form_in_context(place, row)
     if written[:1].isupper() and not place.before and not place.said and said[:1].islower():
         said = said[:1].upper() + said[1:]
     is_end = written.endswith(".") and "end" in row.details and _starts_sentence(place, following)
@@ -46,9 +47,13 @@ def _is_in_context(place: Place, details: Collection[str], following: str) -> bo
     return True
 
 
-def _case(place: Place) -> str:
-    row = place.locale.rows("case").get((place.said or place.before).lower())
-    return row.spoken if row else ""
+def _form_in_context(place: Place, row: Row) -> str:
+    """Form of an abbreviated word behind the word before it: its case, or the ending of the adjective (XX w.)."""
+    before = (place.said or place.before).lower()
+    for name, form in row.details.items():
+        if name[0] == "~" and before.endswith(name[1:]):
+            return form
+    return row.details.get(before) or row.details.get(place.grammar("abbreviation").case, row.spoken)
 
 
 def _starts_sentence(place: Place, following: str) -> bool:
@@ -71,6 +76,8 @@ def read_roman(place: Place) -> str | None:
         if not value or row is None or row.spoken != "ordinal" or not set(written) <= _SAFE_ROMAN:
             return None
         return ordinal(locale, value, Grammar(row.details.get("gender", ""), row.details.get("case", "")))
+    if value and place.match.groupdict().get("stop") and locale.setting("roman_stop") == "ordinal":
+        return ordinal(locale, value)
     before, after = kinds.get(place.before.lower()), kinds.get(f"+{_word_after(place)}")
     if value and (after or before):
         return _by_word(place, value, (after or before).spoken, bool(after))  # type: ignore[union-attr]
@@ -88,12 +95,13 @@ def _word_after(place: Place) -> str:
 
 def _by_word(place: Place, value: int, kind: str, is_after: bool) -> str:
     locale = place.locale
-    if kind != "ordinal":
+    if kind == "cardinal" or (kind == "ruler" and value > int(locale.setting("ruler_ordinals", "99"))):
         return cardinal(locale, value)
     word = _word_after(place) if is_after else place.before.lower()
-    gender = locale.rows("roman")[("+" if is_after else "") + word].details
-    case = gender.get("case") or place.grammar("ordinal").case
-    return ordinal(locale, value, Grammar(gender.get("gender") or gender_of(locale, word), case))
+    details = locale.rows("roman")[("+" if is_after else "") + word].details
+    before = place.before.lower() if is_after else ""
+    case = details.get(before) or details.get("case") or place.grammar("ordinal").case
+    return ordinal(locale, value, Grammar(details.get("gender") or gender_of(locale, word), case))
 
 
 def _ruler(place: Place, value: int) -> str:
@@ -104,7 +112,7 @@ def _ruler(place: Place, value: int) -> str:
         return cardinal(locale, value)
     if value == 1 and locale.setting("ruler_first"):
         return locale.setting("ruler_first")
-    case = "weak" if locale.setting(f"ruler_{gender}") else place.grammar("ruler").case
+    case = "weak" if locale.setting(f"ruler_{gender}") else row.details.get("case", "") if row else ""
     return locale.setting(f"ruler_{gender}", "{}").format(ordinal(locale, value, Grammar(gender, case)))
 
 

@@ -154,6 +154,17 @@ def _word_verdict(row: Row) -> Verdict:
     return Verdict(row["kind"], row["word"], " ".join(said), row["right"], is_right)
 
 
+def _language_verdict(row: Row) -> Verdict:
+    """What is said has the letters of the right words, or sounds as they do."""
+    words = pronounce(row["text"], row["language"])
+    said = " ".join(word.text for word in words.words)
+    is_right = any(
+        _key(said) == _key(answer) or words.phones == pronounce(answer, row["language"]).phones
+        for answer in row["right"].split(ALTERNATIVES)
+    )
+    return Verdict(row["language"], row["text"], said, row["right"], is_right)
+
+
 # Kinds of lists, with the verdict of a row.
 KINDS: dict[str, Callable[[Row], Verdict]] = {
     "sentences": lambda row: _sentence_verdict(row, "right"),
@@ -161,6 +172,7 @@ KINDS: dict[str, Callable[[Row], Verdict]] = {
     "homographs": _homograph_verdict,
     "homographs_2": _reading_verdict,
     "words": _word_verdict,
+    "languages": _language_verdict,
 }
 
 
