@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from lexicon.locales import counted, dates, words
+from lexicon.locales import counted, dates, roman, words
 from lexicon.locales.place import Reader, amount_pattern
 from lexicon.locales.tables import Locale, alternatives
 
@@ -171,12 +171,12 @@ def scanner(locale: Locale) -> Scanner:
     suffix = alternatives(locale, "suffix")
     follows = {"yes": r"(?=,| [^\W\d_A-Z])", "ordinal": rf"(?= {LETTER})"}.get(locale.setting("roman_stop"))
     stop = rf"(?P<stop>\.{follows})?" if follows else ""
-    roman = Form(re.compile(_ROMAN.replace("{suffix}", suffix) + stop), words.read_roman)
+    numeral = Form(re.compile(_ROMAN.replace("{suffix}", suffix) + stop), roman.read_roman)
     endings = locale.rows("ending")
     ending = Form(
         re.compile(rf"(?P<stem>{LETTER}{{2,40}}?)(?P<ending>{_any_of(endings) or '(?!)'})"), words.read_ending
     )
-    return Scanner(numbers, _forms_by_word(locale), _forms_by_sign(locale), address, roman, ending)
+    return Scanner(numbers, _forms_by_word(locale), _forms_by_sign(locale), address, numeral, ending)
 
 
 def _money_before(locale: Locale, currencies: str) -> str:

@@ -1,16 +1,14 @@
-"""Readers of abbreviations, Roman numbers, words of other languages, and signs."""
+"""Readers of abbreviations, words of other languages, addresses and signs."""
 
 import re
 from collections.abc import Collection
 
-from lexicon.locales.nouns import gender_of, noun_form
-from lexicon.locales.numbers import Amount, Grammar, cardinal, digits, ordinal, whole
+from lexicon.locales.nouns import noun_form
+from lexicon.locales.numbers import Amount, digits, whole
 from lexicon.locales.place import Place
-from lexicon.locales.tables import Locale, Row
-from lexicon.number_words import roman_value
+from lexicon.locales.tables import Row
 from lexicon.sentence_ends import ends_sentence
 
-_SAFE_ROMAN = frozenset("IVX")  # numbers of other letters are words and sizes (MIX, XL, DVD)
 _CONTEXT = 40
 
 
@@ -63,63 +61,6 @@ def _starts_sentence(place: Place, following: str) -> bool:
         and ends_sentence(before, following.lstrip(), place.locale.language)
         and (following.lstrip()[:1].isupper())
     )
-
-
-def read_roman(place: Place) -> str | None:
-    """Roman number by the words around it, else the names of its letters; None for a word."""
-    written, locale = place.match["roman"], place.locale
-    value = roman_value(written)
-    suffix = place.match["suffix"]
-    kinds = locale.rows("roman")
-    if suffix:
-        row = locale.rows("suffix").get(suffix.rstrip("."))
-        if not value or row is None or row.spoken != "ordinal" or not set(written) <= _SAFE_ROMAN:
-            return None
-        return ordinal(locale, value, Grammar(row.details.get("gender", ""), row.details.get("case", "")))
-    if value and place.match.groupdict().get("stop") and locale.setting("roman_stop") == "ordinal":
-        return ordinal(locale, value)
-    before, after = kinds.get(place.before.lower()), kinds.get(f"+{_word_after(place)}")
-    if value and (after or before):
-        return _by_word(place, value, (after or before).spoken, bool(after))  # type: ignore[union-attr]
-    if value and place.before in locale.rows("ruler"):
-        return _ruler(place, value)
-    if value and len(written) > 1 and set(written) <= _SAFE_ROMAN and "XXX" not in written:
-        return cardinal(locale, value)
-    return spelled(locale, written) if len(written) > 1 else None
-
-
-def _word_after(place: Place) -> str:
-    following = place.text[place.match.end() : place.match.end() + _CONTEXT].lstrip(" ")
-    return following.split(" ")[0].rstrip(",;:!?").lower() if following else ""
-
-
-def _by_word(place: Place, value: int, kind: str, is_after: bool) -> str:
-    locale = place.locale
-    if kind == "cardinal" or (kind == "ruler" and value > int(locale.setting("ruler_ordinals", "99"))):
-        return cardinal(locale, value)
-    word = _word_after(place) if is_after else place.before.lower()
-    details = locale.rows("roman")[("+" if is_after else "") + word].details
-    before = place.before.lower() if is_after else ""
-    case = details.get(before) or details.get("case") or place.grammar("ordinal").case
-    return ordinal(locale, value, Grammar(details.get("gender") or gender_of(locale, word), case))
-
-
-def _ruler(place: Place, value: int) -> str:
-    locale = place.locale
-    row = locale.rows("ruler").get(place.before)
-    gender = (row.details.get("gender") if row else "") or "m"
-    if value > int(locale.setting("ruler_ordinals", "99")):
-        return cardinal(locale, value)
-    if value == 1 and locale.setting("ruler_first"):
-        return locale.setting("ruler_first")
-    case = "weak" if locale.setting(f"ruler_{gender}") else row.details.get("case", "") if row else ""
-    return locale.setting(f"ruler_{gender}", "{}").format(ordinal(locale, value, Grammar(gender, case)))
-
-
-def spelled(locale: Locale, written: str) -> str:
-    """Names of letters; a letter without a name stays."""
-    names = locale.rows("letter")
-    return " ".join(names[letter].spoken if letter in names else letter for letter in written)
 
 
 def read_word(place: Place) -> str | None:

@@ -1,0 +1,77 @@
+"""Reader of Roman numbers: of centuries, chapters and rulers by the words around them, else the names of letters."""
+
+from lexicon.locales.nouns import gender_of
+from lexicon.locales.numbers import Grammar, cardinal, ordinal
+from lexicon.locales.place import Place
+from lexicon.locales.tables import Locale
+from lexicon.number_words import roman_value
+
+_SAFE_ROMAN = frozenset("IVX")  # numbers of other letters are words and sizes (MIX, XL, DVD)
+_CONTEXT = 40
+
+
+def read_roman(place: Place) -> str | None:
+    """Roman number by the words around it, else the names of its letters; None for a word."""
+    written, locale = place.match["roman"], place.locale
+    value = roman_value(written)
+    if place.match["suffix"]:
+        return _with_suffix(place, value)
+    known = _in_context(place, value) if value else None
+    if known:
+        return known
+    if value and len(written) > 1 and set(written) <= _SAFE_ROMAN and "XXX" not in written:
+        return cardinal(locale, value)
+    return spelled(locale, written) if len(written) > 1 else None
+
+
+def _with_suffix(place: Place, value: int) -> str | None:
+    """Ordinal with its ending (XIXe); None for a word of other letters (De, Me)."""
+    row = place.locale.rows("suffix").get(place.match["suffix"].rstrip("."))
+    if not value or row is None or row.spoken != "ordinal" or not set(place.match["roman"]) <= _SAFE_ROMAN:
+        return None
+    return ordinal(place.locale, value, Grammar(row.details.get("gender", ""), row.details.get("case", "")))
+
+
+def _in_context(place: Place, value: int) -> str | None:
+    locale = place.locale
+    if place.match.groupdict().get("stop") and locale.setting("roman_stop") == "ordinal":
+        return ordinal(locale, value)
+    for word in (f"+{_word_after(place)}", place.before.lower()):
+        if word in locale.rows("roman"):
+            return _by_word(place, value, word)
+    return _ruler(place, value) if place.before in locale.rows("ruler") else None
+
+
+def _word_after(place: Place) -> str:
+    following = place.text[place.match.end() : place.match.end() + _CONTEXT].lstrip(" ")
+    return following.split(" ")[0].rstrip(",;:!?").lower() if following else ""
+
+
+def _by_word(place: Place, value: int, word: str) -> str:
+    """Number of the kind of a row: XX secolo, siglo XXI."""
+    locale, row = place.locale, place.locale.rows("roman")[word]
+    if row.spoken == "cardinal" or (row.spoken == "ruler" and value > int(locale.setting("ruler_ordinals", "99"))):
+        return cardinal(locale, value)
+    is_after = word.startswith("+")
+    before = place.before.lower() if is_after else ""
+    case = row.details.get(before) or row.details.get("case") or place.grammar("ordinal").case
+    return ordinal(locale, value, Grammar(row.details.get("gender") or gender_of(locale, word.lstrip("+")), case))
+
+
+def _ruler(place: Place, value: int) -> str:
+    """Number of a ruler: quatorze, segundo, der vierzehnte."""
+    locale = place.locale
+    details = locale.rows("ruler")[place.before].details
+    gender = details.get("gender", "m")
+    if value > int(locale.setting("ruler_ordinals", "99")):
+        return cardinal(locale, value)
+    if value == 1 and locale.setting("ruler_first"):
+        return locale.setting("ruler_first")
+    case = "weak" if locale.setting(f"ruler_{gender}") else details.get("case", "")
+    return locale.setting(f"ruler_{gender}", "{}").format(ordinal(locale, value, Grammar(gender, case)))
+
+
+def spelled(locale: Locale, written: str) -> str:
+    """Names of letters; a letter without a name stays."""
+    names = locale.rows("letter")
+    return " ".join(names[letter].spoken if letter in names else letter for letter in written)
