@@ -6,6 +6,7 @@ from types import MappingProxyType
 from lexicon.locales.numbers import Amount, Grammar, is_round_million, number
 from lexicon.locales.tables import Locale, Row
 
+_WHOLE = "="  # before a form that says its number: كيلومتران is two kilometres
 _VOWELS = "aeiouyéèêàâîôûh"
 
 
@@ -89,9 +90,13 @@ def gender_of(locale: Locale, word: str) -> str:
 def count(locale: Locale, amount: Amount, row: Row, case: str = "") -> str:
     """A number with its noun: trois kilomètres, un million de kilomètres, yüzde yirmi."""
     said = number(locale, amount, Grammar(row.details.get("gender") or gender_of(locale, row.forms[0]), case))
+    if amount.whole == "2" and not amount.decimals and not amount.sign:
+        said = locale.setting("two") or said  # 两公里, but 二
     noun = noun_form(locale, row, amount, case)
     if "{}" in noun:
         return noun.format(said)
+    if noun.startswith(_WHOLE):
+        return noun.removeprefix(_WHOLE)
     return behind(locale, said, noun, links=is_round_million(amount))
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from lexicon.locales.arabic import arabic_number
 from lexicon.locales.tables import Locale, Row
 
 if TYPE_CHECKING:
@@ -67,6 +68,10 @@ def ordinal(locale: Locale, n: int, grammar: Grammar = COUNTING) -> str:
 
 def year(locale: Locale, n: int, grammar: Grammar = COUNTING) -> str:
     """Words of a year."""
+    hundreds = locale.setting("year_hundreds")
+    if hundreds and 1100 <= n < 2000:  # उन्नीस सौ अट्ठानवे
+        rest = [cardinal(locale, n % 100)] if n % 100 else []
+        return " ".join([cardinal(locale, n // 100), hundreds, *rest])
     if not locale.setting("year"):
         return cardinal(locale, n)
     return ordinal(locale, n, grammar) if locale.setting("year") == "ordinal" else _spelt(locale, n, "year", grammar)
@@ -153,11 +158,23 @@ def _by_grammar(rows: Mapping[str, Row], kind: str, grammar: Grammar) -> Row | N
     return None
 
 
+def has_rule(locale: Locale, kind: str) -> bool:
+    """Whether a language has numbers of a kind of its own (Korean native ones)."""
+    return bool(_ruleset(locale, kind, COUNTING))
+
+
+def by_rule(locale: Locale, n: int, kind: str, grammar: Grammar = COUNTING) -> str:
+    """Words of a whole number of a kind."""
+    return _spelt(locale, n, kind, grammar)
+
+
 @functools.lru_cache(maxsize=10_000)
 def _spelt(locale: Locale, n: int, kind: str, grammar: Grammar) -> str:
     # unicode-rbnf takes 10 to 40 ms a language, and no English text needs it
     from unicode_rbnf.engine import NoRuleForNumberError
 
+    if locale.rows("numeral"):
+        return arabic_number(locale, n, kind, grammar.gender == "f", bool(grammar.case))
     ruleset = _ruleset(locale, kind, grammar)
     try:
         said = (

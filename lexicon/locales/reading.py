@@ -10,7 +10,7 @@ from lexicon.written_forms import WrittenForm
 
 # one character for one, so that the written form of each word stays known
 _PLAIN = {0xA0: " ", 0x202F: " ", 0x2009: " ", 0x2007: " ", 0x2212: "-", 0x2010: "-", 0x2011: "-", 0x2044: "/",
-          0xFF05: "%", 0x2019: "'", 0x2BC: "'"}  # fmt: skip
+          0xFF05: "%", 0x66A: "%", 0x66B: ".", 0x66C: ",", 0x2019: "'", 0x2BC: "'"}  # fmt: skip
 _LAST_WORD = re.compile(r"[^\W\d_]+\Z")
 
 
@@ -54,13 +54,18 @@ def read_forms(text: str, language: str) -> list[WrittenForm]:
             found.append(WrittenForm(text[done : match.start()], plain[done : match.start()]))
         at = done = match.end()
         is_joined = found and found[-1].spoken[-1:].isalnum() and spoken[:1].isalnum()
+        is_joined = is_joined and _last_word(found[-1].spoken) not in locale.words("prefixes")
         is_followed = plain[at : at + 1].isalnum() and spoken[-1:].isalnum()
         found.append(WrittenForm(text[match.start() : at], join * bool(is_joined) + spoken + join * is_followed))
-        last = _LAST_WORD.search(spoken.rstrip())
-        said = last.group() if last else ""
+        said = _last_word(spoken.rstrip())
     if done < len(text):
         found.append(WrittenForm(text[done:], plain[done:]))
     return found
+
+
+def _last_word(text: str) -> str:
+    last = _LAST_WORD.search(text)
+    return last.group() if last else ""
 
 
 def read(text: str, language: str) -> str:

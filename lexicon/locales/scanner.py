@@ -11,10 +11,16 @@ from dataclasses import dataclass
 from lexicon.locales import counted, dates, roman, words
 from lexicon.locales.place import Reader, amount_pattern
 from lexicon.locales.tables import Locale, alternatives
+from lexicon.locales.templates import template_forms
 
 LETTER = r"[^\W\d_\u00b2\u00b3\u00b9\u00bc-\u00be\u2070-\u209f\u2150-\u218b]"
-PLACE = re.compile(rf"(?P<number>[0-9\u00bc-\u00be\u2150-\u215e])|(?P<word>{LETTER}+)|[^\w\s]|\S")
-_LEADING_LETTERS = re.compile(rf"{LETTER}*")
+# Latin letters among others are words of their own (我的iPhone, وWi-Fi); signs of vowels belong to a word (डॉ.).
+_LATIN = "A-Za-z\u00aa\u00ba\u00c0-\u00d6\u00d8-\u00f6\u00f8-\u024f\u0300-\u036f\u1e00-\u1eff"
+_UNSPACED = "\u2e80"  # the first character of writing without spaces
+_VOWEL_SIGNS = "\u064b-\u065f\u0670\u0900-\u0903\u093a-\u094f\u0955-\u0957\u0962\u0963"
+WORD = rf"(?:[{_LATIN}]+|(?:(?![{_LATIN}]){LETTER}|[{_VOWEL_SIGNS}])+)"
+PLACE = re.compile(rf"(?P<number>[0-9\u00bc-\u00be\u2150-\u215e])|(?P<word>{WORD})|[^\w\s]|\S")
+_LEADING_LETTERS = re.compile(rf"{WORD}?")
 _LABEL = r"[A-Za-z0-9][A-Za-z0-9-]{0,62}"
 _TLD = (
     r"(?:com|org|net|edu|gov|io|ai|app|dev|info|eu|de|fr|es|it|pt|br|nl|be|pl|ru|tr|gr|at|ch|uk|us|mx|cn|jp|kr|in|vn)"
@@ -54,7 +60,8 @@ class Scanner:
         if found["word"]:
             return self._of_word(sign, text, found.end())
         is_before_digit = text[found.end() : found.end() + 2].lstrip(" ")[:1].isdigit()
-        is_behind_word = text[max(found.start() - 1, 0) : found.start()].isalnum()
+        before = text[max(found.start() - 1, 0) : found.start()]
+        is_behind_word = before.isalnum() and before < _UNSPACED  # 是-5
         if sign in "+-±" and is_before_digit and not is_behind_word:
             return (*self.numbers, *self.by_sign.get(sign, ()))
         return self.by_sign.get(sign, ())
@@ -124,16 +131,21 @@ _NUMBER_FORMS: tuple[tuple[str, Reader], ...] = (
     ),
     (r"‹signed› ?(?P<magnitude>‹magnitude›)‹end›", counted.read_magnitude),
     (r"(?P<digits>[0-9]{1,4})\.(?= ‹letter›)", counted.read_dotted_ordinal),
-    (r"[0-9]{1,4}(?:\.[0-9]{1,4}){2,6}(?!\w)", counted.read_version),
+    (r"(?![0-9]{1,3}(?:\.[0-9]{3})+(?![0-9.]))[0-9]{1,4}(?:\.[0-9]{1,4}){2,6}(?!\w)", counted.read_version),
     (r"[0-9]{1,4}‹other decimal›(?:[0-9]{1,2}|[0-9]{4})(?![0-9.])", counted.read_version),
     (r"(?P<first>[0-9]{1,3}):(?P<second>[0-9]{1,3})(?![0-9:])", counted.read_score),
     (r"‹signed›‹tail›", counted.read_number),
 )
 
 
+def _letter(locale: Locale) -> str:
+    """Letter that ends no written form when it follows: in writing without spaces those of Latin words only."""
+    return f"[{_LATIN}]" if locale.setting("dense") else LETTER
+
+
 def _parts(locale: Locale) -> dict[str, str]:
     """Parts of patterns by name; empty where a language has none of them."""
-    amount, letter = amount_pattern(locale), LETTER
+    amount, letter = amount_pattern(locale), _letter(locale)
     of, year_words = locale.setting("date_of"), locale.setting("year_words")
     named = {name.replace("_", " "): locale.setting(name) for name in ("hour_sign", "time_words", "day_ending")}
     named |= {kind: alternatives(locale, kind) for kind in ("unit", "magnitude", "currency", "suffix")}
@@ -166,7 +178,8 @@ def _number_forms(locale: Locale) -> Iterator[Form]:
 @functools.cache
 def scanner(locale: Locale) -> Scanner:
     """Forms of a language."""
-    numbers = tuple(_number_forms(locale))
+    own = (Form(pattern, reader) for places, pattern, reader in template_forms(locale) if not places)
+    numbers = (*own, *_number_forms(locale))
     address = Form(re.compile(_ADDRESS), words.read_address)
     suffix = alternatives(locale, "suffix")
     follows = {"yes": r"(?=,| [^\W\d_A-Z])", "ordinal": rf"(?= {LETTER})"}.get(locale.setting("roman_stop"))
@@ -177,6 +190,15 @@ def scanner(locale: Locale) -> Scanner:
         re.compile(rf"(?P<stem>{LETTER}{{2,40}}?)(?P<ending>{_any_of(endings) or '(?!)'})"), words.read_ending
     )
     return Scanner(numbers, _forms_by_word(locale), _forms_by_sign(locale), address, numeral, ending)
+
+
+def _templates_by_place(locale: Locale) -> dict[str, list[Form]]:
+    """Forms of the rows of a table by the word or sign at which they are tried."""
+    found: dict[str, list[Form]] = {}
+    for places, pattern, reader in template_forms(locale):
+        for place in places:
+            found.setdefault(place, []).append(Form(pattern, reader))
+    return found
 
 
 def _money_before(locale: Locale, currencies: str) -> str:
@@ -201,14 +223,14 @@ def _any_of(written: Iterable[str]) -> str:
 
 
 def _forms_by_word(locale: Locale) -> dict[str, tuple[Form, ...]]:
-    found: dict[str, list[Form]] = {}
+    found, letter = _templates_by_place(locale), _letter(locale)
 
     def add(written: Iterable[str], template: str, reader: Reader, flags: int = 0) -> None:
         for first, forms in _grouped(written).items():
             pattern = re.compile(template.replace("{}", _any_of(forms)), flags)
             found.setdefault(first.lower() if flags else first, []).append(Form(pattern, reader))
 
-    end = rf"(?!{LETTER}|[0-9])"
+    end = rf"(?!{letter}|[0-9])"
     for first, forms in _grouped(locale.rows("currency")).items():
         pattern = re.compile(_money_before(locale, _any_of(forms)))
         found.setdefault(first, []).append(Form(pattern, counted.read_money))
@@ -218,7 +240,7 @@ def _forms_by_word(locale: Locale) -> dict[str, tuple[Form, ...]]:
     of = locale.setting("date_of")
     link = f"(?:(?:{of}) )?" if of else ""
     add(months, rf"(?P<month>{{}})\.? {link}(?P<year>[12][0-9]{{3}})(?![0-9])", dates.read_month_year)
-    add((word.lower() for word in locale.rows("word")), rf"(?:{{}}){end}(?!-{LETTER})", words.read_word, re.IGNORECASE)
+    add((word.lower() for word in locale.rows("word")), rf"(?:{{}}){end}(?!-{letter})", words.read_word, re.IGNORECASE)
     add(
         (unit for unit in locale.rows("unit") if "alone" in locale.rows("unit")[unit].details),
         rf"(?P<unit>{{}}){end}",
@@ -228,7 +250,7 @@ def _forms_by_word(locale: Locale) -> dict[str, tuple[Form, ...]]:
 
 
 def _forms_by_sign(locale: Locale) -> dict[str, tuple[Form, ...]]:
-    found: dict[str, list[Form]] = {}
+    found = _templates_by_place(locale)
     for first, forms in _grouped(locale.rows("currency")).items():
         if not first.isalpha():
             pattern = re.compile(_money_before(locale, _any_of(forms)))

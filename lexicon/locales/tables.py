@@ -24,6 +24,8 @@ sign         sign that is spoken, by its words
 fraction     words of a fraction
 word         word of another language, as the language says it
 letter       name of a letter
+form         written form with a pattern and a template of its own (`lexicon.locales.templates`)
+numeral      words of numbers of which CLDR has no grammatical forms
 ============ ====================================================================================================
 """
 
@@ -95,7 +97,7 @@ def _read(name: str) -> dict[str, dict[str, Row]] | None:
     for line in path.read_text(encoding="utf-8").splitlines()[1:]:
         kind, written, spoken, details = (line.split("\t") + [""] * COLUMNS)[:COLUMNS]
         row = Row(spoken, MappingProxyType(dict(_detail(part) for part in details.split(";") if part)))
-        for form in [written] if kind == "fix" or len(written) == 1 else written.split("|"):
+        for form in [written] if kind in {"fix", "form"} or len(written) == 1 else written.split("|"):
             kinds.setdefault(kind, {})[form] = row
     return kinds
 
