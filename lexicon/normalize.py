@@ -15,8 +15,9 @@ from lexicon.canonical import canonical_text, signs_before_vowels
 from lexicon.capitals import sentence_case
 from lexicon.locales.reading import read_forms
 from lexicon.number_words import MAX_CARDINAL_DIGITS
-from lexicon.pauses import MARKS
+from lexicon.pauses import MARKS, last_mark
 from lexicon.scripts import name_foreign_letters, name_letters_in_words
+from lexicon.sources import written_groups
 from lexicon.vowels import add_vowels
 from lexicon.written_forms import WrittenForm
 
@@ -246,6 +247,17 @@ def _readable(spoken: str, language: str) -> str:
     text = name_foreign_letters(spoken.translate(_AS_ESPEAK_READS), language)
     text = _LONG_NUMBER.sub(lambda number: " ".join(number.group()), text)
     return _LONG_WORD.sub(r"\g<0> ", text)
+
+
+def written_pieces(text: str, language: str) -> list[tuple[str, str]]:
+    """Words of a text that is not English as they are written (3,50 €), and the punctuation after each."""
+    forms = spoken_forms(text, language)
+    pieces = "".join(form.spoken for form in forms).split()
+    found: list[tuple[str, str]] = []
+    for written, at in written_groups(pieces, forms):
+        last = pieces[at.stop - 1]
+        found.append((written, "" if written == last else last_mark(last)))
+    return found
 
 
 def spoken_form(text: str, language: str) -> str:

@@ -39,6 +39,22 @@ def sources_of(words: Sequence[str], forms: Sequence[WrittenForm]) -> list[tuple
     return found
 
 
+def written_groups(words: Sequence[str], forms: Sequence[WrittenForm]) -> list[tuple[str, range]]:
+    """Words of a text as they are written, each with the range of its spoken words; parameters as of `sources_of`.
+
+    Words whose written form is not known are as they are spoken.
+    """
+    found: list[tuple[str, range]] = []
+    before = None
+    for at, (number, source) in enumerate(sources_of(words, forms) or enumerate(words)):
+        if found and number == before:
+            found[-1] = (found[-1][0], range(found[-1][1].start, at + 1))
+        else:
+            found.append((source, range(at, at + 1)))
+        before = number
+    return found
+
+
 def _n_letters(text: str) -> int:
     return sum(map(str.isalnum, text))
 

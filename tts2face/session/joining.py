@@ -9,10 +9,11 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.normalize import spoken_form
+from lexicon.normalize import spoken_form, spoken_forms
 from lexicon.sentence_length import n_letters
 from lexicon.sentences import text_prefix
 from lexicon.sequence import MIN_PHONE_S, SILENCE, PhoneSequence, WordSpan, enforce_increasing
+from lexicon.sources import written_groups
 from lexicon.written_words import written_words
 from tts2face.sound.pauses import speech_onset
 from tts2face.sound.spacing import fade_gains
@@ -260,10 +261,12 @@ class WordTimes:
         return min(self._count_words(before) - is_inside, len(self._onsets))
 
     def _count_words(self, written: str) -> int:
-        normalised = spoken_form(written, self._language)
-        if not self._language.startswith("en"):
-            return len(written_words(normalised, self._language))
-        return sum(any(letter.isalnum() for letter in word) for word in normalised.split())
+        if self._language.startswith("en"):
+            words = spoken_form(written, self._language).split()
+            return sum(any(letter.isalnum() for letter in word) for word in words)
+        forms = spoken_forms(written, self._language)
+        spoken = written_words("".join(form.spoken for form in forms), self._language)
+        return len(written_groups([word.text for word in spoken], forms))
 
 
 @dataclass(frozen=True, slots=True)

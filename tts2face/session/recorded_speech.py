@@ -5,7 +5,7 @@ from dataclasses import replace
 from itertools import islice
 
 from lexicon.given_phones import TextWord
-from lexicon.normalize import spoken_form
+from lexicon.normalize import spoken_form, written_pieces
 from lexicon.sequence import WordSpan
 from tts2face.models.talker import Talker
 from tts2face.request import FromSound, Recorded
@@ -64,7 +64,7 @@ def recorded_pieces(prepared: PreparedRequest, source: Recorded, heard: TimedTra
         prepared.timeline.check_duration(n_frames / fps)
     timeline, marks = resolve_recording_marks(prepared.text, heard.phones, heard.words, prepared.request.language)
     before = 0
-    script = _script(spoken_form(prepared.text.text, prepared.request.language).split(), heard.words)
+    script = _script(_written(prepared.text.text, prepared.request.language), heard.words)
     for clip in recording_clips(source.audio, heard, n_frames, prepared.fps, volume=source.volume):
         after = before + len(clip.motion)
         start, end = before / fps, after / fps
@@ -81,6 +81,13 @@ def recorded_pieces(prepared: PreparedRequest, source: Recorded, heard: TimedTra
             is_last=after == n_frames,
         )
         before = after
+
+
+def _written(text: str, language: str) -> list[str]:
+    """Words of a text with their punctuation, as `pronounce_transcript` has them."""
+    if language.startswith("en"):
+        return spoken_form(text, language).split()
+    return [written + after for written, after in written_pieces(text, language)]
 
 
 def _script(written: Sequence[str], words: Sequence[WordSpan]) -> Iterator[TextWord]:

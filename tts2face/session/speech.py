@@ -11,10 +11,12 @@ import numpy as np
 from lexicon.errors import InputError, SilentTextError
 from lexicon.given_phones import TextWord
 from lexicon.marked_text import MAX_PAUSE_S, GestureMark, Mark, MarkedText, NameMark, StyleRun
+from lexicon.normalize import spoken_forms, written_pieces
 from lexicon.pauses import PAUSES_S, last_mark
 from lexicon.sentence_length import n_letters
 from lexicon.sentences import Phrase, Sentence, index_by_letters
 from lexicon.sequence import PhoneSequence, WordSpan
+from lexicon.sources import written_groups
 from tts2face.gestures.elements import Gesture, StyleSpan, span_weights
 from tts2face.gestures.timeline import Timeline
 from tts2face.numeric.arrays import FloatArray
@@ -151,6 +153,10 @@ def speak_sentence(
     spoken[0] = _led(spoken[0], request)
     spoken[-1] = _ended(spoken[-1], sentence, prosody.rate)
     sentence = replace(sentence, utterances=tuple(parts))
+    spoken = [
+        as_written(speech, part, part.language or request.language)
+        for speech, part in zip(spoken, sentence.utterances, strict=True)
+    ]
     word_times = [
         WordTimes(
             part.source, speech.phones, speech.words, language=part.language or request.language, first=part.first
@@ -170,6 +176,31 @@ def speak_sentence(
     return SpokenSentence(
         speech, *resolve_marks(sentence.runs, sentence.marks, times, (sentence.first, sentence.last)), sound
     )
+
+
+def as_written(speech: Speech, part: Phrase, language: str) -> Speech:
+    """Speech whose words are those of the text (3,50 €), each with the phones of its spoken ones; English as it is."""
+    if language.startswith("en") or part.words:
+        return speech
+    words = speech.words
+    groups = written_groups([word.text for word in words], spoken_forms(part.source, language))
+    spans = [
+        WordSpan(text, words[at.start].first, words[at.stop - 1].last, min(words[k].confidence for k in at))
+        for text, at in groups
+    ]
+    return replace(speech, words=tuple(spans))
+
+
+def script_of(sentence: Sentence, language: str) -> tuple[TextWord, ...]:
+    """Words of a sentence as `as_written` has them, with the punctuation after them."""
+    found: list[TextWord] = []
+    for part in sentence.utterances:
+        own = part.language or language
+        if own.startswith("en") or part.words:
+            found += part.words or map(TextWord, part.text.split())
+            continue
+        found += (TextWord(text, after=after) for text, after in written_pieces(part.source, own))
+    return tuple(found)
 
 
 def expect_sentence(voice: Voice, sentence: Sentence) -> None:

@@ -30,6 +30,7 @@ from tts2face.session.speech import (
     Voices,
     expect_sentence,
     long_silence,
+    script_of,
     sentence_sound,
     silent_sentences,
     speak_sentence,
@@ -313,7 +314,7 @@ def speak_sentences(
         said[text] += 1
         before = long_silence(before_s, Timeline(), voice.sample_rate)
         after = long_silence(after_s, spoken.timeline, voice.sample_rate)
-        part = SpokenPart(spoken, sentence.n_characters, text, script=sentence.words)
+        part = SpokenPart(spoken, sentence.n_characters, text, script=script_of(sentence, request.language))
         yield from _ending(chain(before, [part], after), is_last=is_last)
 
 

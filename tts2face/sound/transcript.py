@@ -10,8 +10,10 @@ from lexicon.errors import DataError
 from lexicon.foreign_words import make_readable
 from lexicon.function_words import fitting_forms, weak_forms
 from lexicon.marked_text import MarkedText
+from lexicon.normalize import spoken_forms
 from lexicon.pronounce import Word, pronounce
 from lexicon.sequence import PhoneSequence, WordSpan
+from lexicon.sources import written_groups
 from tts2face.sound.alignment import Aligner, TextMismatch, join_alignments, unwritten_part
 from tts2face.sound.pauses import SILENCE_DB, cut_at_pauses, cut_sound
 from tts2face.sound.word_assignment import assign_words
@@ -39,8 +41,12 @@ def pronounce_transcript(text: str, language: str, own: Dictionary | None = None
     """
     found: list[tuple[str, Pronunciations]] = []
     for part, spoken in _parts(text, language):
-        words = [(word.text, _pronunciations(word, spoken, own)) for word in pronounce(part, spoken, own).words]
-        found += fitting_forms(words) if spoken.startswith("en") else words
+        words = pronounce(part, spoken, own).words
+        if spoken.startswith("en"):
+            found += fitting_forms([(word.text, _pronunciations(word, own)) for word in words])
+            continue
+        groups = written_groups([word.text for word in words], spoken_forms(part, spoken))
+        found += ((text, (tuple(phone for k in at for phone in words[k].phones),)) for text, at in groups)
     return tuple(found)
 
 
@@ -54,9 +60,9 @@ def _parts(text: str, language: str) -> Iterator[tuple[str, str]]:
             yield part, run.language or language
 
 
-def _pronunciations(word: Word, language: str, own: Dictionary | None) -> Pronunciations:
+def _pronunciations(word: Word, own: Dictionary | None) -> Pronunciations:
     # what the user's dictionary says is the only pronunciation
-    if not language.startswith("en") or (own is not None and own.lookup(word.text) is not None):
+    if own is not None and own.lookup(word.text) is not None:
         return (word.phones,)
     alternatives = [word.phones]
     # CMUdict numbers further pronunciations: read, read(2), read(3)
