@@ -10,7 +10,7 @@ from lexicon.sentence_ends import ends_sentence
 # A sentence ends at ., !, ? or … (with closing quotes) before a space that no lower-case letter follows, at an end mark
 # of East Asian or Indic writing, at a blank line or a line separator, or where a line ends on purpose. A run of marks
 # is tried once, from its first mark, and as a whole.
-_END = re.compile(r"""(?<![.!?…])[.!?…]++["'”’)\]]*+(?=\s++[^a-z])|[。！？｡।॥؟۔]+["'”’」』）]*|\n\s*\n|\u2028|\n""")
+_END = re.compile(r"""(?<![.!?…])[.!?…]++["'”’)\]]*+(?=\s++[^a-z=×÷])|[。！？｡।॥؟۔]+["'”’」』）]*|\n\s*\n|\u2028|\n""")
 _CLAUSE = re.compile(r"[,;:—–、，；：،؛](?=\s)|[、，；：]")
 # Words before which an English phrase may end where a sentence has no clause mark, the better places first.
 _PHRASE_STARTS = (

@@ -9,7 +9,7 @@ from lexicon.dictionary import cmudict_lookup, named_pronunciation, own_pronunci
 from lexicon.ipa import IpaPhone
 from lexicon.misaki import misaki_lookup
 from lexicon.phones import ARPABET, PHONES, nearest_phones
-from lexicon.word_parts import Lookup, add_s, read_parts
+from lexicon.word_parts import Lookup, add_s, beginning, read_parts
 
 _INVENTORY = frozenset(ARPABET.values())
 # espeak-ng's finer English phones in the inventory of CMUdict; phones that are not listed map to the nearest one.
@@ -145,7 +145,10 @@ def look_up_word(word: str, *, is_letter: bool, own: Lookup) -> tuple[IpaPhone, 
     entry = entry or (add_s(own_stem) if own_stem else _listed(word)) or _look_up_without_accents(word)
     if entry is None and "-" in word:
         parts = [part for part in word.split("-") if part]
+        # re-elected, co-own: not the note re, nor the company
+        begins = beginning(parts[0]) if len(parts) > 1 and own(parts[0]) is None and parts[0].islower() else None
         spoken = [look_up_word(part, is_letter=part.isupper(), own=own) for part in parts]
+        spoken[:1] = [begins or spoken[0]] if spoken else []
         known = [segments for segments in spoken if segments]
         entry = _join_compound(parts, known) if known and len(known) == len(parts) else None
     if entry is None and stem:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from lexicon import written_forms as readings
 from lexicon.dictionary import word_set
+from lexicon.number_contexts import words_in_context
 from lexicon.number_words import cardinal_words, digit_words, number_words, ordinal_words, roman_value, year_words
 from lexicon.pauses import MARKS
 from lexicon.scripts import language_scripts, letter_name, letter_script
@@ -27,13 +28,26 @@ RULERS = word_set(
     "frederick wilhelm nicholas catherine peter alexander napoleon ramses leo gregory clement innocent urban ivan "
     "ferdinand henri boniface constantine albert margaret"
 )
+# common names: John I is hardly a king where a sentence goes on with I
+_RULERS_NOT_FIRST = word_set(
+    "john robert alfonso carl christian gustav otto leopold victor sixtus julius adrian martin stephen eugene "
+    "baldwin philippe rama amenhotep thutmose ludwig umberto celestine nikolai karl"
+)
 Reader = Callable[[re.Match[str], str], str]
 _BEFORE_NAME = re.compile(r" [A-Z]")
 _BEFORE_LETTER = re.compile(r" [a-z]")
 _BEFORE_NUMBER = re.compile(r" ?[0-9]")
 _NO_NAMES = word_set("The On In At And But When Dear I If As To From Near")
+_CENTURY = re.compile(r"(?:st|nd|rd|th)?[ -](?:[Cc]entur(?:y|ies)|[Dd]ynasty|[Oo]lympi)")
+_NOON = re.compile(r" (?:noon|midnight)\b")
+_LASTED = re.compile(r"\b(?:took|takes|lasted|lasts|last|in|of|ran|runs|time|record|duration|for|after|finished) \Z")
 _AT_END = re.compile(r"\s*$")
 _CONTEXT_AFTER = 48  # characters after a full stop that decide whether a sentence begins there
+
+
+def _before(m: re.Match[str]) -> str:
+    """Text before a form that decides how it is read."""
+    return m.string[max(0, m.start() - _CONTEXT_AFTER) : m.start()]
 
 
 def read_numeric_date(m: re.Match[str], _: str) -> str:
@@ -88,6 +102,11 @@ def read_clock(m: re.Match[str], _: str) -> str:
     if int(hour) > 24 or int(minute) > 59:
         after = f" {half.replace('.', '').upper()}".rstrip()
         return " to ".join(cardinal_words(int(part)) for part in (hour, minute, m["ss"]) if part) + after
+    # 1:23:45 hours says itself what it is
+    if m["ss"] and _LASTED.search(_before(m)) and not m.string.startswith(" hour", m.end()):
+        return readings.duration_words(int(hour), int(minute), int(m["ss"]))
+    if int(hour) == 12 and int(minute) == 0 and _NOON.match(m.string, m.end()):
+        return "twelve"
     return _keep_full_stop(readings.time_words(int(hour), int(minute), int(m["ss"] or 0), half), m)
 
 
@@ -96,24 +115,34 @@ def read_proportion(m: re.Match[str], _: str) -> str:
     return f"{cardinal_words(int(m['ra']))} to {cardinal_words(int(m['rb']))}"
 
 
-def read_money(m: re.Match[str], _: str) -> str:
+def read_money(m: re.Match[str], previous: str) -> str:
     """$5.20 is five dollars and twenty cents."""
-    sign = "USD" if m["sign"] == "US$" else m["sign"]
+    sign = readings.DOLLARS.get(m["sign"][:-1], m["sign"])
     if m["moneyto"]:
         return f"{number_words(m['moneya'].lstrip('-'))} to {readings.money_words(m['moneyto'], sign, m['mag'] or '')}"
-    return readings.money_words((m["moneyminus"] or "") + m["moneya"], sign, m["mag"] or "")
+    words = readings.money_words((m["moneyminus"] or "") + m["moneya"], sign, m["mag"] or "")
+    return _as_attribute(words, sign, m, previous) if m["mag"] or "." not in m["moneya"] else words
 
 
-def read_money_after(m: re.Match[str], _: str) -> str:
-    """5 EUR is five euros."""
-    return readings.money_words(m["moneyb"], m["sign2"] or m["sign3"], m["mag2"] or "")
+def read_money_after(m: re.Match[str], previous: str) -> str:
+    """5 EUR is five euros, a 75¢ stamp a seventy-five cent stamp."""
+    sign = m["sign2"] or m["sign3"]
+    words = readings.money_words(m["moneyb"], sign, m["mag2"] or "")
+    return words if "." in m["moneyb"] else _as_attribute(words, sign, m, previous)
+
+
+def _as_attribute(words: str, currency: str, m: re.Match[str], previous: str) -> str:
+    """Money in the singular before a noun: a $5 bill."""
+    one, many = readings.CURRENCIES[currency][:2]
+    is_attribute = previous.lower() in {"a", "an"} and _BEFORE_LETTER.match(m.string, m.end())
+    return words.removesuffix(many) + one if is_attribute and words.endswith(many) else words
 
 
 def read_measure(m: re.Match[str], previous: str) -> str:
     """5 km is five kilometers, a 5 km run a five kilometer run."""
     is_attribute = previous.lower() in {"a", "an"} and _BEFORE_LETTER.match(m.string, m.end())
     if is_attribute:
-        return f"{readings.signed_number_words(m['amount'])} {readings.read_table('units.tsv')[m['unit']][0]}"
+        return f"{readings.signed_number_words(m['amount'])} {readings.unit_words(m['unit'], is_one=True)}"
     return readings.measure_words(m["amount"], m["unit"])
 
 
@@ -146,7 +175,40 @@ def read_thousands(m: re.Match[str], _: str) -> str:
 
 def read_plain_number(m: re.Match[str], previous: str) -> str:
     """A number by itself: a year, a cardinal, a decimal, or digits."""
-    return _number(m.group(), previous)
+    return words_in_context(m, m.group()) or _number(m.group(), previous)
+
+
+def read_owner(m: re.Match[str], _: str) -> str:
+    """The 4's of no. 4's turn is four's."""
+    return f"{number_words(m['owner'])}'s"
+
+
+def read_packs(m: re.Match[str], _: str) -> str:
+    """2 x 400g tins is two four hundred gram tins."""
+    return f"{number_words(m['packs'])} {number_words(m['content'])} {readings.unit_words(m['punit'], is_one=True)}"
+
+
+def read_per(m: re.Match[str], _: str) -> str:
+    """The /kg of $3/kg is per kilogram."""
+    short = {"mo": "month", "wk": "week", "yr": "year"}
+    return f"per {readings.unit_words(m['per'], is_one=True) if m['per'] else short.get(m['perword'], m['perword'])}"
+
+
+def read_short_name(m: re.Match[str], _: str) -> str:
+    """The days and months of Mon–Fri."""
+    written = m["dayone"] or m["daytwo"]
+    full = next(name for name in (*readings.DAYS, *readings.MONTHS) if name.startswith(written[:3]))
+    return _keep_full_stop(full, m)
+
+
+def read_who(m: re.Match[str], previous: str) -> str:
+    """The WHO is spelled, WHO is not."""
+    return "W H O" if previous.lower() == "the" else m.group()
+
+
+def read_lap(m: re.Match[str], _: str) -> str:
+    """3:42.7 is three forty-two point seven."""
+    return f"{readings.time_words(int(m['lapm']), int(m['laps']), 0, '')} point {digit_words(m['lapf'])}"
 
 
 def read_initial(m: re.Match[str], previous: str) -> str:
@@ -177,14 +239,20 @@ def read_dot(m: re.Match[str], _: str) -> str:
     return "dot" if before.isalnum() and after.isalnum() else "."
 
 
+# 50-50, 80-20: shares of a whole
+_SPLITS = frozenset((str(part), str(100 - part)) for part in range(10, 95, 5) if part >= 50 or part % 10 == 0)
+
+
 def read_range(m: re.Match[str], previous: str) -> str:
     """5-10 km is five to ten kilometers, 1990-1995 two years."""
     # 1815-1820: two numbers of four digits are years, whatever stands before
     before = "in" if len(m["from"]) == len(m["to"]) == 4 else previous
+    if not m["runit"] and (m["from"], m["to"]) in _SPLITS:
+        return f"{number_words(m['from'])} {number_words(m['to'])}"
     words = f"{_number(m['from'], before)} to {_number(m['to'], before)}"
     if m["sign4"]:
         return f"{_number(m['from'], '')} to {readings.money_words(m['to'], m['sign4'], '')}"
-    return f"{words} {readings.read_table('units.tsv')[m['runit']][1]}" if m["runit"] else words
+    return f"{words} {readings.unit_words(m['runit'])}" if m["runit"] else words
 
 
 def _number(written: str, previous: str) -> str:
@@ -198,13 +266,49 @@ def _number(written: str, previous: str) -> str:
     return readings.signed_number_words(written)
 
 
+_NAMED_FRACTIONS = {
+    "24/7": "twenty-four seven",
+    "9/11": "nine eleven",
+    "50/50": "fifty fifty",
+    "20/20": "twenty twenty",
+}
+_SCORED = re.compile(
+    r"\b(?:scor|rat(?:e|ing)|grade|quiz|test|exam|review|mark|points?|got|gave|give|solid|perfect)", re.I
+)
+_OUT_OF = frozenset({"5", "10", "20", "50", "100"})  # of which marks are given
+_ALONE_AFTER = re.compile(r"\s*(?:[.,;:!?)]|\Z)|,? (?:on|in|for|from|by|and|but|at|with|to|so|because|this|last)\b")
+_EQUATION = re.compile(r"\s*[=+×÷*<>≤≥-]\s*[0-9a-z]")
+_PRESSURES = (range(60, 261), range(30, 161))  # mmHg, of the heart's beat and between two
+
+
 def read_fraction(m: re.Match[str], _: str) -> str:
-    """3/4 is three quarters."""
-    known = {"24/7": "twenty-four seven", "9/11": "nine eleven", "50/50": "fifty fifty"}.get(m["frac"])
-    # 10/10 is a score
-    if m["top"] == m["bottom"] and not m["whole"]:
-        return f"{number_words(m['top'])} out of {number_words(m['bottom'])}"
-    return known or readings.ratio_words(m["top"], m["bottom"], m["whole"] or "")
+    """3/4 is three quarters, 10/10 ten out of ten, 120/80 one hundred twenty over eighty, 245/3 for three wickets."""
+    top, bottom, unit = m["top"], m["bottom"], m["funit"]
+    if m["whole"] or unit:
+        is_one = not m["whole"] and int(top) <= int(bottom)
+        name = "" if not unit else readings.unit_words("inch" if unit == "in" else unit, is_one=is_one)
+        return f"{readings.ratio_words(top, bottom, m['whole'] or '')} {name}".strip()
+    if m["frac"] in _NAMED_FRACTIONS:
+        return _NAMED_FRACTIONS[m["frac"]]
+    relation = _relation(m, int(top), int(bottom))
+    return f"{number_words(top)} {relation} {number_words(bottom)}" if relation else readings.ratio_words(top, bottom)
+
+
+def _relation(m: re.Match[str], top: int, bottom: int) -> str:
+    """What a slash between two numbers is said as; empty for a fraction."""
+    if top == bottom:
+        return "out of"
+    if top in _PRESSURES[0] and bottom in _PRESSURES[1] and top > bottom:
+        return "over"
+    if top >= 30 and bottom <= 10 and not _EQUATION.match(m.string, m.end()):
+        return "for"
+    is_mark = m["bottom"] in _OUT_OF and top < bottom and _ALONE_AFTER.match(m.string, m.end())
+    return "out of" if is_mark and _SCORED.search(_before(m)) else ""
+
+
+def read_out_of(m: re.Match[str], _: str) -> str:
+    """4.5/5 is four point five out of five."""
+    return f"{number_words(m['outtop'])} out of {number_words(m['outbottom'])}"
 
 
 def read_ordinal(m: re.Match[str], _: str) -> str:
@@ -215,10 +319,12 @@ def read_ordinal(m: re.Match[str], _: str) -> str:
 def read_roman_numeral(m: re.Match[str], previous: str) -> str:
     """Henry VIII is Henry the eighth, Chapter IV Chapter four; elsewhere capitals are read as letters."""
     value, before = roman_value(m.group()), previous.lower()
+    if value and _CENTURY.match(m.string, m.end()):
+        return ordinal_words(value)
     # I is the pronoun unless a name stands before it
     if value == 1 and not previous[:1].isupper():
         return m.group()
-    if value and before in RULERS and value < 40:
+    if value < 40 and ((value and before in RULERS) or (value > 1 and before in _RULERS_NOT_FIRST)):
         return f"the {ordinal_words(value)}"
     if value and (before in BEFORE_ROMAN or m.group() in NEVER_LETTERS):
         return cardinal_words(value)
@@ -253,17 +359,6 @@ def read_dotted_letters(m: re.Match[str], _: str) -> str:
     return _keep_full_stop(" ".join(letters) if letters in NEVER_LETTERS else letters, m)
 
 
-def read_address(m: re.Match[str], _: str) -> str:
-    """a@b.com is a at b dot com."""
-    return readings.address_words(m.group())
-
-
-def read_hashtag(m: re.Match[str], _: str) -> str:
-    """#MachineLearning is hashtag machine learning."""
-    words = readings.hashtag_words(m.group())
-    return f"{'hashtag' if m.group()[0] == '#' else 'at'} {words}".strip()
-
-
 def read_scientific(m: re.Match[str], _: str) -> str:
     """1e-9 is one times ten to the minus nine."""
     power = readings.signed_number_words(m["exponent"].removeprefix("+"))
@@ -287,7 +382,7 @@ def read_dimensions(m: re.Match[str], _: str) -> str:
 
 def _unit_words(unit: str | None) -> str:
     """Plural of a unit after a space; empty for none."""
-    return f" {readings.read_table('units.tsv')[unit][1]}" if unit else ""
+    return f" {readings.unit_words(unit)}" if unit else ""
 
 
 def read_sharp(m: re.Match[str], _: str) -> str:
@@ -300,16 +395,16 @@ def read_letter_a(m: re.Match[str], _: str) -> str:
     return f"A-{number_words(m['sheet']).replace(' ', '-')}"
 
 
-def read_feet(m: re.Match[str], _: str) -> str:
-    """5'10 is five foot ten."""
-    inches = f" {cardinal_words(int(m['inches']))}" if m["inches"] else ""
-    return f"{cardinal_words(int(m['feet']))} foot{inches}"
-
-
 def read_slashed(m: re.Match[str], _: str) -> str:
     """and/or is and or."""
     known = {"and/or": "and or", "w/o": "without", "w/": "with", "n/a": "not applicable", "N/A": "not applicable"}
+    known |= {"b/c": "because", "c/o": "care of"}
     return known[m.group()]
+
+
+def read_either(m: re.Match[str], _: str) -> str:
+    """input/output is input output, AC/DC AC DC."""
+    return f"{m['either']} {m['other']}"
 
 
 def read_unchanged(m: re.Match[str], _: str) -> str:

@@ -48,6 +48,11 @@ def _parts(table: str) -> tuple[tuple[str, Segments], ...]:
     return tuple((written, arpabet_segments(names)) for written, (names,) in rows)
 
 
+def beginning(word: str) -> Segments | None:
+    """Phones of a beginning that stands before a hyphen (re-, co-); None for another word."""
+    return next((segments for written, segments in _parts("word_beginnings.tsv") if written == word), None)
+
+
 def read_parts(word: str, look_up: Lookup, n_parts: int = MAX_PARTS) -> Segments | None:
     """Phones of a word from those of its parts; None if a part is in no dictionary.
 

@@ -22,6 +22,7 @@ MONTHS = (
     "January", "February", "March", "April", "May", "June", "July", "August", "September", "October", "November",
     "December",
 )  # fmt: skip
+DAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")
 CURRENCIES = {
     "$": ("dollar", "dollars", "cent", "cents"), "£": ("pound", "pounds", "penny", "pence"),
     "€": ("euro", "euros", "cent", "cents"), "¥": ("yen", "yen", "sen", "sen"),
@@ -33,18 +34,20 @@ CURRENCIES = {
     "CHF": ("Swiss franc", "Swiss francs", "centime", "centimes"),
     "CAD": ("Canadian dollar", "Canadian dollars", "cent", "cents"),
     "AUD": ("Australian dollar", "Australian dollars", "cent", "cents"),
+    "NZD": ("New Zealand dollar", "New Zealand dollars", "cent", "cents"),
+    "HKD": ("Hong Kong dollar", "Hong Kong dollars", "cent", "cents"),
+    "SGD": ("Singapore dollar", "Singapore dollars", "cent", "cents"),
+    "BRL": ("real", "reais", "centavo", "centavos"), "MXN": ("Mexican peso", "Mexican pesos", "centavo", "centavos"),
     "INR": ("rupee", "rupees", "paisa", "paise"), "CNY": ("yuan", "yuan", "fen", "fen"),
 }  # fmt: skip
 MAGNITUDES = {
     "k": "thousand", "K": "thousand", "m": "million", "M": "million", "b": "billion", "B": "billion", "T": "trillion",
     "mn": "million", "bn": "billion", "tn": "trillion",
 }  # fmt: skip
-_SPELT_OUT = {"etc": "et cetera", "vs": "versus", "approx": "approximately"}
-_ADDRESS_SIGNS = {
-    ".": "dot", "/": "slash", "-": "dash", "_": "underscore", "@": "at", ":": "colon", "?": "question mark",
-    "=": "equals", "&": "and", "#": "hash", "+": "plus", "~": "tilde", "%": "percent",
+DOLLARS = {
+    "US": "USD", "C": "CAD", "CA": "CAD", "A": "AUD", "AU": "AUD", "NZ": "NZD", "HK": "HKD", "S": "SGD", "R": "BRL",
+    "MX": "MXN",
 }  # fmt: skip
-_SPELLED_ENDINGS = re.compile("uk|us|de|fr|eu|io|ai|tv|ca|ch|at|au|nz|jp|cn|ru|es|nl|se|pl|be|dk|fi|ie|br|mx|kr")
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +91,17 @@ def money_words(amount: str, currency: str, magnitude: str) -> str:
 
 def measure_words(amount: str, unit: str) -> str:
     """5 km is five kilometers, 1 km one kilometer."""
-    singular, many = read_table("units.tsv")[unit]
-    return f"{signed_number_words(amount)} {singular if amount.lstrip('+-') == '1' else many}"
+    return f"{signed_number_words(amount)} {unit_words(unit, is_one=amount.lstrip('+-') == '1')}"
+
+
+def unit_words(unit: str, *, is_one: bool = False) -> str:
+    """Name of a unit: kilometers, of one kilometer; milligrams per deciliter of mg/dL."""
+    table = read_table("units.tsv")
+    name = table.get(unit)
+    if name is None:
+        first, _, second = unit.partition("/")
+        return f"{table[first][0 if is_one else 1]} per {table[second][0]}"
+    return name[0 if is_one else 1]
 
 
 def year_or_number_words(written: str) -> str:
@@ -136,43 +148,17 @@ def time_words(hour: int, minute: int, second: int, half: str) -> str:
     return f"{words} {half.replace('.', '').upper()}" if half else words
 
 
+def duration_words(hours: int, minutes: int, seconds: int) -> str:
+    """1:02:35 is one hour two minutes and thirty-five seconds."""
+    parts = [(hours, "hour"), (minutes, "minute"), (seconds, "second")]
+    said = [f"{cardinal_words(count)} {name}{'' if count == 1 else 's'}" for count, name in parts if count]
+    return " and ".join([" ".join(said[:-1]), said[-1]]) if len(said) > 1 else "".join(said)
+
+
 def telephone_words(written: str) -> str:
     """Digit by digit, with a comma between groups."""
     groups = [digit_words(group) for group in re.findall(r"[0-9]+", written)]
     return ("plus " if written.lstrip().startswith("+") else "") + ", ".join(groups)
-
-
-def _unambiguous_word(written: str) -> str:
-    """A word of an address or tag in an unambiguous form: lower case, or an initialism in capitals."""
-    is_initialism = written.isupper() and len(written) > 1 and not re.fullmatch("[IVXLCDM]+", written)
-    if is_initialism:
-        return written
-    small = written.lower()
-    return _SPELT_OUT.get(small) or read_table("symbols.tsv").get(small, (small,))[0]
-
-
-def address_words(written: str) -> str:
-    """www.example.com/a is WWW dot example dot com slash a."""
-    bare = re.sub(r"^[A-Za-z]{2,8}://", "", written).rstrip("/")
-    host = re.match(r"[^/?#]*", bare)
-    last_dot = bare.rfind(".", 0, host.end() if host else None)
-    words = []
-    for piece in re.finditer(r"[^\W\d_]+|[0-9]+|[^\w\s]|_", bare):
-        text = piece.group()
-        if text[0].isdigit():
-            words.append(number_words(text) if len(text) < 5 else digit_words(text))
-        elif text.isalpha():
-            is_spelled = text == "www" or (piece.start() == last_dot + 1 and _SPELLED_ENDINGS.fullmatch(text))
-            words.append(text.upper() if is_spelled else _unambiguous_word(text.lower()))
-        elif text in _ADDRESS_SIGNS:
-            words.append(_ADDRESS_SIGNS[text])
-    return " ".join(words)
-
-
-def hashtag_words(written: str) -> str:
-    """#MachineLearning2024 is machine learning twenty twenty-four."""
-    pieces = re.findall(r"[A-Z]{2,}(?![a-z])|[A-Z]?[^\W\d_A-Z]+|[A-Z]|[0-9]+|[^\W\d_]+", written.lstrip("#@"))
-    return " ".join(year_or_number_words(piece) if piece[0].isdigit() else _unambiguous_word(piece) for piece in pieces)
 
 
 def ratio_words(top: str, bottom: str, whole: str = "") -> str:

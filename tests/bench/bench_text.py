@@ -17,6 +17,8 @@ from bench_words import NEAR, RIGHT, WEAK_VOWELS, word_distance
 
 from lexicon.errors import InputError
 from lexicon.pronounce import Word, pronounce
+from lexicon.spoken_words import pronounce_marked
+from lexicon.text_marks import parse_marks
 
 Row = Mapping[str, str]
 ALTERNATIVES = " | "
@@ -35,6 +37,11 @@ class Verdict:
     said: str
     wanted: str
     is_right: bool
+
+
+def printed_words(text: str, language: str = "en-us") -> tuple[Word, ...]:
+    """Words as ``tts2face phones`` prints them."""
+    return pronounce_marked(parse_marks(text, language), language).words
 
 
 def _key(written: str) -> str:
@@ -93,7 +100,7 @@ def _has_phones(words: Sequence[Word], given: str) -> bool:
 
 def _sentence_verdict(row: Row, column: str) -> Verdict:
     text = row["text"].replace("\\n", "\n")
-    words = pronounce(text).words
+    words = printed_words(text)
     said = spoken_words(words)
     is_said = row["kind"] == "stretched" or any(said == _plain(own) for own in row[column].split(ALTERNATIVES))
     sounds = " ".join(f"{word.text}={' '.join(word.arpabet)}" for word in words) if row["phones"] and is_said else ""
@@ -126,7 +133,7 @@ def _stressed_distance(said: str, wanted: str) -> float:
 
 def _homograph_verdict(row: Row) -> Verdict:
     """Each occurrence is nearer to the expected reading than to the other one."""
-    said = [" ".join(word.arpabet) for word in pronounce(row["sentence"]).words if _is_form(word, row["word"])]
+    said = [" ".join(word.arpabet) for word in printed_words(row["sentence"]) if _is_form(word, row["word"])]
     wanted, others = row["expected"].split(" ; "), row["other"].split(" ; ")
     if len(wanted) == 1:
         wanted, others = wanted * len(said), others * len(said)
@@ -143,13 +150,13 @@ def _is_form(word: Word, wanted: str) -> bool:
 
 def _reading_verdict(row: Row) -> Verdict:
     """The first occurrence of a word has the right reading, whatever its weak vowels are."""
-    said = next(" ".join(word.arpabet) for word in pronounce(row["text"]).words if _is_form(word, row["word"]))
+    said = next(" ".join(word.arpabet) for word in printed_words(row["text"]) if _is_form(word, row["word"]))
     is_right = _stressed_distance(said, row["right"]) <= RIGHT
     return Verdict(row["word"], row["text"], said, row["right"], is_right)
 
 
 def _word_verdict(row: Row) -> Verdict:
-    said = _sounds(pronounce(row["word"]).words)
+    said = _sounds(printed_words(row["word"]))
     is_right = any(word_distance(said, answer.split()) <= RIGHT for answer in row["right"].split(ALTERNATIVES))
     return Verdict(row["kind"], row["word"], " ".join(said), row["right"], is_right)
 
