@@ -37,6 +37,7 @@ GESTURE_COST = 1.0  # of changes of all weights by gestures
 SIDEWAYS, SIDEWAYS_COST = ("jawLeft", "jawRight", "mouthLeft", "mouthRight"), 20.0
 ROLLED = "mouthRollLower"
 CORNER_SHAPE = "mouthCorners"  # of moods, which bends both lips alike; does not shut them either
+CORNER_CARRIERS = ("mouth",)  # name prefixes of what serves it in files without it; with the jaw it opened by .007
 OVERLAP = 3.0  # tolerance of lips pressed into each other, relative to that of a slit between them, which is seen
 USUAL_EXPRESSION = 0.3  # weight of a basis expression in speech, at which closed lips shall be so within the tolerance
 CLOSED_SMILE_COST = 0.3  # of the smile of a basis expression, whose lips are closed

@@ -1,6 +1,6 @@
 """Retargeting of a performer to a face: lips, lids and brows by landmarks, gaze by blendshape scores."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +26,8 @@ from tts2face.types import Trajectory
 # as a talker has (decisions 012 and 035)
 N_MOUTH_MODES = 20
 SMILE = "mouthSmile"
+# Scores of happy at `SMILE_WEIGHTS`: medians over the shipped faces in films of two sentences (decision 276).
+SMILE_SCORES, SMILE_WEIGHTS = (0.0, 0.25, 0.5, 0.63, 0.77), (0.0, 0.25, 0.5, 0.7, 1.0)
 CARRIED_RIDGE = 0.02  # of each shape's own curvature: shapes that do nearly the same share what they carry
 CLOSED_FRAME_SHARE = 0.15  # share of the frames that count as having closed lips
 SCORE_DRIVEN_SHAPES = ("eye", "brow", "nose", "cheek")  # name prefixes of the shapes that follow scores
@@ -118,7 +120,7 @@ def build_performer_retargeter(landmarks: NDArray[np.floating], scores: Trajecto
     closed = _closed_frames(gaps)
     contact = np.clip(np.percentile(gaps[closed], 50, axis=0), 0.0, MAX_CONTACT_MM)
     rest_scores = np.median(mouth_scores(scores)[closed], axis=0)
-    smile = held_smile(landmarks, scores)  # scores of other shapes at rest are due to the person's build
+    smile = held_smile(scores)  # scores of other shapes at rest are due to the person's build
     is_smile = np.array(list(SCORE_SHAPES)) == SMILE
     talker = Talker(scores.fps, model, (), {"name": "performer"})
     lips = build_retargeter(
@@ -156,11 +158,19 @@ def _read_in_blinks(
     return added
 
 
-def held_smile(landmarks: NDArray[np.floating], scores: Trajectory) -> dict[str, float]:
-    """Scores of a person's smile at closed lips, by shape; empty for people who do not smile, whose are .00 to .01."""
+def held_smile(scores: Trajectory) -> dict[str, float]:
+    """Scores of a person's smile, by shape; empty for people who do not smile, whose are .00.
+
+    They are medians of all frames: lips that are closed may be rounded, on which a smile is smaller (decision 276).
+    """
     names = SCORE_SHAPES[SMILE]
-    found = np.median(scores.columns(names)[_closed_frames(inner_lip_gaps(landmarks))], axis=0)
+    found = np.median(scores.columns(names), axis=0)
     return dict(zip(names, found.tolist(), strict=True)) if found.mean() > SCORE_DEAD_ZONE else {}
+
+
+def smile_weight(smile: Mapping[str, float]) -> float:
+    """Weight of the basis expression ``happy`` that has the scores of `held_smile`."""
+    return float(np.interp(np.mean(list(smile.values())), SMILE_SCORES, SMILE_WEIGHTS))
 
 
 def _closed_frames(gaps: NDArray[np.floating]) -> NDArray[np.int64]:

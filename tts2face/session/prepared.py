@@ -7,8 +7,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from lexicon.dictionary import read_dictionary
 from lexicon.errors import InputError
 from lexicon.foreign_words import make_readable
@@ -46,7 +44,7 @@ if TYPE_CHECKING:
 HEARING_STEPS, RECORDING_STEPS = 300, 700  # steps of progress of a recording: until its phones are known, and then
 IDLE_STEPS = 1000  # steps of progress of idle animation
 OF_VIDEO = "video"  # expression of the person in the video of a recording
-SMILE_S = 10.0  # of its beginning are read: as `held_smile`, its score is the weight of happy (.63 for .7)
+SMILE_S = 10.0  # of its beginning are read
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -346,14 +344,14 @@ def _expressions(request: Request) -> tuple[ExpressionSpan, ...]:
     source = request.source
     if not isinstance(source, Recorded):
         raise InputError("--expression video needs a recording with pictures of the person; add --audio clip.mp4")
-    from tts2face.lips.performer import held_smile
+    from tts2face.lips.performer import held_smile, smile_weight
     from tts2face.video.blendshapes import BlendshapeReader
     from tts2face.video.streaming import StreamingTracker
     from tts2face.video.take import read_take
 
     take = read_take(source.audio, StreamingTracker(), BlendshapeReader(), seconds=SMILE_S)
-    smile = held_smile(take.landmarks, take.scores)
-    return (ExpressionSpan("happy", float(np.mean(list(smile.values())))),) if smile else ()
+    smile = held_smile(take.scores)
+    return (ExpressionSpan("happy", smile_weight(smile)),) if smile else ()
 
 
 def _gains(request: Request) -> Gains:

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from tts2face.face.combinations import PREFIX
 from tts2face.face.landmarks import landmark_motion
-from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES
+from tts2face.face.lip_constraints import CORNER_CARRIERS, CORNER_SHAPE, SPEECH_SHAPE_PREFIXES
 from tts2face.face.stand_in import stand_in
 from tts2face.interchange.characters.shapes import ShapeMapping
 from tts2face.models.face import Face
@@ -51,13 +51,16 @@ def _own_values(motion: Trajectory, face: Face, own: list[str]) -> FloatArray:
     turned = {name for eye in face.eyes for name in eye.turns}
     carried = [k for k, name in enumerate(channels) if name not in own and not name.startswith(PREFIX)]
     others = [k for k in carried if channels[k] not in turned and values[:, k].any()]
-    for is_mouth in (True, False):
-        group = [k for k in others if channels[k].startswith(SPEECH_SHAPE_PREFIXES) == is_mouth]
-        columns = [
-            n
-            for n, name in enumerate(own)
-            if name.startswith(SPEECH_SHAPE_PREFIXES) == is_mouth and "eyeLook" not in name
-        ]
+    spoken = [k for k in others if channels[k].startswith(SPEECH_SHAPE_PREFIXES)]
+    bent = [k for k in spoken if channels[k] == CORNER_SHAPE]
+    of_mouth = [n for n, name in enumerate(own) if name.startswith(SPEECH_SHAPE_PREFIXES)]
+    groups = (
+        ([k for k in spoken if k not in bent], of_mouth),
+        (bent, [n for n in of_mouth if own[n].startswith(CORNER_CARRIERS)]),
+        ([k for k in others if k not in spoken], [n for n in range(len(own)) if n not in of_mouth]),
+    )
+    for group, carriers in groups:
+        columns = [n for n in carriers if "eyeLook" not in own[n]]
         if group and columns:
             shapes = np.array([channels.index(own[n]) for n in columns])
             missing = (np.array(group), values[:, group])

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from tts2face.face.combinations import PREFIX
-from tts2face.face.lip_constraints import SPEECH_SHAPE_PREFIXES
+from tts2face.face.lip_constraints import CORNER_CARRIERS, CORNER_SHAPE, SPEECH_SHAPE_PREFIXES
 from tts2face.face.mouth import NO_VISEME, mouth_products
 from tts2face.face.shape_transfer import add_missing_shapes
 from tts2face.face.stand_in import stand_in
@@ -132,7 +132,12 @@ def arkit_projection(channels: tuple[str, ...], face: Face | None, name: str) ->
     # the products of a face's shapes are the same for each clip of it
     known = _PARTS.setdefault(face, {})
     if channels not in known:
-        made = (_by_vertices(face, columns, others[~spoken]), _by_mouth(face, channels, others[spoken]))
+        bent = np.array([channels[at] == CORNER_SHAPE for at in others], bool)
+        made = (
+            _by_vertices(face, columns, others[~spoken]),
+            _by_mouth(face, channels, others[spoken & ~bent], SPEECH_SHAPE_PREFIXES),
+            _by_mouth(face, channels, others[bent], CORNER_CARRIERS),
+        )
         known[channels] = tuple(part for part in made if part is not None)
     return ArkitProjection(columns, known[channels])
 
@@ -155,11 +160,13 @@ def _by_vertices(face: Face, columns: NDArray[np.int64], others: NDArray[np.int6
     return Expressed(others, helpers, curvature, cross)
 
 
-def _by_mouth(face: Face, channels: tuple[str, ...], others: NDArray[np.int64]) -> Expressed | None:
-    """Visemes by the visible motion of the mouth; jaw and lips that the face lacks move as on the default head."""
+def _by_mouth(
+    face: Face, channels: tuple[str, ...], others: NDArray[np.int64], prefixes: tuple[str, ...]
+) -> Expressed | None:
+    """Visemes and a bent mouth by its visible motion; jaw and lips that the face lacks move as on the default head."""
     if not len(others):
         return None
-    names = [name for name in ARKIT_SHAPES if name.startswith(SPEECH_SHAPE_PREFIXES) and name not in NO_VISEME]
+    names = [name for name in ARKIT_SHAPES if name.startswith(prefixes) and name not in NO_VISEME]
     complete = add_missing_shapes(stand_in(face), names)
     rows = np.array([complete.shape_names.index(name) for name in (*names, *(channels[at] for at in others))])
     products = mouth_products(complete, rows)

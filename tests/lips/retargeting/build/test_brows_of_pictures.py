@@ -36,5 +36,7 @@ def test_a_drawn_face_is_read_in_its_pictures(face_model: Path) -> None:
             shown = read.values[:, read.channels.index(name)]
             assert shown[number] == pytest.approx(weight, abs=0.5)
             assert shown[at_rest].max() < 0.15
-    # its scores say raised brows throughout
-    assert scores.columns(["browInnerUp"]).min() > 0.88  # .9 in a blink
+    # its scores say raised brows whatever the brows do; of shut eyes, of which no white is left, they say a little less
+    risen = scores.columns(["browInnerUp"])[:, 0]
+    assert risen[[pose is not BLINK for pose in POSES]].min() > 0.9
+    assert risen.min() > 0.8
