@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.face.eyeballs import SINK_SHARE, SINK_SLOPE
 from tts2face.face.landmarks import landmark_positions
 from tts2face.face.rest_light import in_rest_light
 from tts2face.interchange.exports.skeleton import HEAD, Skeleton, build_skeleton
@@ -239,6 +240,7 @@ def _stage(face: Face, surface: Surface, skeleton: Skeleton, channels: tuple[str
         "pivot": (skeleton.places[HEAD] / MM_PER_M).tolist(),
         "head": list(HEAD_CHANNELS),
         "eyes": eyes,
+        "sink": {"slope": SINK_SLOPE, "share": SINK_SHARE},
         "catchlight": {
             "height": catchlights.HEIGHT_SHARE,
             "aside": float(np.sign(lamps.LAMPS[0][0])) * catchlights.ASIDE_SHARE,

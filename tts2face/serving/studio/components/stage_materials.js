@@ -4,6 +4,7 @@ import { THREE } from "nicegui-scene";
 import { FRAGMENT, LAMPS, VERTEX } from "./stage_shader.js";
 
 const BEHIND_UNITS = 8000; // of a depth of 24 bits: at one metre about 25 mm further back
+const BALL_MM = 12; // radius of the eyeball in whose mm the shaders measure lids
 
 /** Values that all materials of a face share; those of the lamps and the eyes follow the camera and the motion. */
 export function sharedUniforms(stage) {
@@ -28,7 +29,8 @@ export function sharedUniforms(stage) {
     spotUp: { value: vectors(2) },
     spotSoft: { value: stage.catchlight.soft },
     iris: { value: stage.eyes[0]?.iris ?? 0.868 },
-    eyeScale: { value: stage.eyes.length ? 12 / stage.eyes[0].radius : 1 }, // to mm of an eyeball of 12 mm
+    eyeScale: { value: stage.eyes.length ? BALL_MM / stage.eyes[0].radius : 1 },
+    sink: { value: new THREE.Vector2(stage.sink.slope, stage.sink.share * BALL_MM) },
     hasLids: { value: stage.eyes.length === 2 && stage.eyes.every((eye) => eye.lids.length) ? 1 : 0 },
   };
 }

@@ -29,6 +29,34 @@ const COARSE_COLOUR = `
   varying vec3 vBase, vSlope;
   #endif`;
 
+// Edges of the lids around both eyes, from the centres of eyeballs of 12 mm, in mm across and up the head.
+const LIDS = `
+  uniform vec3 eyeCentres[2], eyeAcross, eyeUp;
+  uniform vec2 lids[36];
+  uniform float eyeScale, hasLids;
+  float lidHeight(int begin, float across) {
+    for (int k = 0; k < 8; k++) {
+      vec2 a = lids[begin + k], b = lids[begin + k + 1];
+      if (across <= b.x || k == 7) return mix(a.y, b.y, b.x > a.x ? clamp((across - a.x) / (b.x - a.x), 0., 1.) : 0.);
+    }
+    return 0.;
+  }`;
+
+// As tts2face.face.eyeballs.EyeOpenings.sink.
+const SINK = `
+  ${LIDS}
+  uniform vec2 sink; // of the way beyond the edge of a lid, and at most, in mm of an eyeball of 12 mm
+  vec3 sunk(vec3 place, int eye) {
+    vec3 offset = place - eyeCentres[eye], ahead = cross(eyeAcross, eyeUp);
+    if (hasLids < .5 || dot(offset, ahead) <= 0.) return place;
+    float across = dot(offset, eyeAcross) * eyeScale, height = dot(offset, eyeUp) * eyeScale;
+    int upper = eye * 18, lower = upper + 9;
+    float beyond = max(height - lidHeight(upper, across), lidHeight(lower, across) - height);
+    beyond = max(beyond, min(lids[upper].x, lids[lower].x) - across);
+    beyond = max(beyond, across - max(lids[upper + 8].x, lids[lower + 8].x));
+    return place - ahead * clamp(sink.x * beyond, 0., sink.y) / eyeScale;
+  }`;
+
 export const VERTEX = `
   ${COARSE_COLOUR}
   uniform mat4 joints[4];
@@ -48,6 +76,9 @@ export const VERTEX = `
   varying vec3 vNormal, vPlace, vLight, vShine, vColour;
   varying vec4 vExposure;
   varying vec2 vUv, vSurface;
+  #ifdef EYE
+  ${SINK}
+  #endif
   #ifdef FLAT
   uniform float dark, shine;
   uniform vec3 darkTexel, brightTexel;
@@ -85,6 +116,9 @@ export const VERTEX = `
     float follow = _skin.x > .5 ? _skin.y / 65535. : 0.;
     #endif
     vec4 place = vec4(mix(position, (joint * vec4(position, 1.)).xyz, follow), 1.);
+    #ifdef EYE
+    if (_skin.x > 1.5) place.xyz = sunk(place.xyz, int(_skin.x + .5) - 2);
+    #endif
     vec3 n = normalize(normal);
     vNormal = normalize(mix(n, mat3(joint) * n, follow));
     vPlace = place.xyz;
@@ -167,18 +201,11 @@ export const VERTEX = `
   }`;
 
 const EYES = `
-  uniform vec3 eyeCentres[2], eyeGaze[2], eyeAcross, eyeUp;
-  uniform vec2 lids[36];
-  uniform float iris, eyeScale, hasLids, spotSoft;
+  ${LIDS}
+  uniform vec3 eyeGaze[2];
+  uniform float iris, spotSoft;
   uniform vec4 eyeSpot[2];
   uniform vec3 spotRight[2], spotUp[2];
-  float lidHeight(int begin, float across) {
-    for (int k = 0; k < 8; k++) {
-      vec2 a = lids[begin + k], b = lids[begin + k + 1];
-      if (across <= b.x || k == 7) return mix(a.y, b.y, b.x > a.x ? clamp((across - a.x) / (b.x - a.x), 0., 1.) : 0.);
-    }
-    return 0.;
-  }
   float lightEye(vec3 place, vec3 towards, inout vec3 albedo, inout vec3 diffuse, inout vec4 exposure, inout vec3 n) {
     int best = distance(place, eyeCentres[0]) < distance(place, eyeCentres[1]) ? 0 : 1;
     vec3 offset = place - eyeCentres[best], gaze = eyeGaze[best];
