@@ -27,7 +27,7 @@ from tts2face.types import Trajectory
 N_MOUTH_MODES = 20
 SMILE = "mouthSmile"
 # Scores of happy at `SMILE_WEIGHTS`: medians over the shipped faces in films of two sentences (decision 276).
-SMILE_SCORES, SMILE_WEIGHTS = (0.0, 0.25, 0.5, 0.63, 0.77), (0.0, 0.25, 0.5, 0.7, 1.0)
+SMILE_SCORES, SMILE_WEIGHTS = (0.0, 0.27, 0.49, 0.63, 0.75), (0.0, 0.25, 0.5, 0.7, 1.0)
 CARRIED_RIDGE = 0.02  # of each shape's own curvature: shapes that do nearly the same share what they carry
 CLOSED_FRAME_SHARE = 0.15  # share of the frames that count as having closed lips
 SCORE_DRIVEN_SHAPES = ("eye", "brow", "nose", "cheek")  # name prefixes of the shapes that follow scores
