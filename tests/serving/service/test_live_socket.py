@@ -127,7 +127,7 @@ def test_a_sentence_that_cannot_be_spoken_does_not_end_the_stream(live: Live) ->
     assert [one["text"] for one in live.of("speech")] == ["Hello there."]
     messages = " ".join(one["message"] for one in live.of("error"))
     assert "cannot read the mark [nod x]" in messages
-    assert "one of the types cancel, end, flush, interrupt, listen, text" in messages
+    assert "one of the types cancel, end, flush, gesture, interrupt, listen, style, text" in messages
 
 
 @pytest.mark.parametrize(
