@@ -10,6 +10,7 @@ from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.given_phones import pronounce_words
 from lexicon.languages import language_code
 from lexicon.marked_text import MarkedText
+from lexicon.moods import is_auto, with_moods
 from lexicon.normalize import split_tokens, spoken_forms
 from lexicon.pronounce import NOTHING, Pronunciation, Word, pronounce
 from lexicon.sentences import Phrase, split_sentences
@@ -38,12 +39,16 @@ def pronounce_marked(
     return Pronunciation(text.text, language, tuple(words))
 
 
-def reading_notes(text: str, language: str, markup: str = "auto") -> tuple[str, ...]:
-    """Notes on marks that are not followed, and on words that a language does not read; raises as `parse_marks`."""
-    if text.isascii() and markup != "ssml" and not is_ssml(text):
+def reading_notes(text: str, language: str, markup: str = "auto", style: str | None = None) -> tuple[str, ...]:
+    """Notes on marks that are not followed, on words that a language does not read, and on moods of ``--style auto``.
+
+    Raises as `parse_marks`.
+    """
+    if text.isascii() and markup != "ssml" and not is_ssml(text) and not is_auto(style):
         return ()
     marked = parse_marks(text, language, markup)
-    return (*marked.notes, *make_readable(marked, language)[1])
+    readable, notes = make_readable(marked, language)
+    return (*marked.notes, *notes, *(with_moods(readable, language)[1] if is_auto(style) else ()))
 
 
 def pronounce_phrase(phrase: Phrase, language: str, dictionary: Dictionary | None = None) -> tuple[Word, ...]:

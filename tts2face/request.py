@@ -304,7 +304,9 @@ class Request:
         choices=GESTURES,
     )
     style: str | None = option(
-        None, "Style of the gestures: one name, or one for each feature (brows=annoyed,head=delighted)."
+        None,
+        "Style of the gestures: one name, one for each feature (brows=annoyed,head=delighted), or auto: the mood of "
+        "each English sentence by its words.",
     )
     gain: str | None = option(
         None, "Gain of each feature's motion, 0 to 3: head=1.5,blink=0.8; jaw and lips too; all sets every gesture."

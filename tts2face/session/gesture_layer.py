@@ -213,15 +213,15 @@ class GestureLayer:
         listened = timeline.is_listening(before)
         return [start for start, was_listening in zip(starts, listened.tolist(), strict=True) if was_listening]
 
-    def change_style(self, style: str) -> None:
-        """From the next piece on, the face has another style, written as ``--style`` takes it.
+    def change_style(self, style: str | None) -> None:
+        """From the next piece on, the face has another style, written as ``--style`` takes it; None is the default one.
 
         Raises
         ------
         InputError
             The palette has no such style.
         """
-        now, chosen = self._now.seconds, parse_style(style)
+        now, chosen = self._now.seconds, parse_style(style or default_style(self._palette))
         spans = tuple(StyleSpan(feature, name, now) for feature, name in chosen.items())
         Timeline(spans=spans).check_styles(self._palette)
         # what has ended is forgotten, since a stream has no end

@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from lexicon.marked_text import GestureMark
+from lexicon.moods import is_auto
 from lexicon.pauses import pause_behind
 from lexicon.sentence_length import n_letters
+from lexicon.spoken_words import reading_notes
 from lexicon.ssml_leniency import nearest_style
 from lexicon.text_marks import parse_marks
 from tts2face.gestures.elements import ListeningSpan
@@ -303,6 +305,10 @@ class LiveSpeech:
         """Duration of a number of frames."""
         return float(n_frames / self._rate)
 
+    def notes_on(self, text: str) -> tuple[str, ...]:
+        """What of a text is read otherwise than written, and its moods with the style auto; raises as `parse_marks`."""
+        return reading_notes(text, self.language, self.markup, self._request.style)
+
     def say(self, text: str) -> Iterator[Piece]:
         """Append the sentences of a text; errors as `Session.stream`.
 
@@ -367,7 +373,7 @@ class LiveSpeech:
     def change_style(self, style: str) -> None:
         """From the next word or the next silence on, the face and its voice have another style.
 
-        Names of styles of speech services stand for the nearest ones, as in marks.
+        Names of styles of speech services stand for the nearest ones, as in marks; ``auto`` follows the words.
 
         Raises
         ------
@@ -377,7 +383,7 @@ class LiveSpeech:
         names = self._models.palette.names if self._models.palette is not None else ()
         style = style if style in names else nearest_style(style) or style
         if self._layer is not None:
-            self._layer.change_style(style)
+            self._layer.change_style(None if is_auto(style) else style)
         self._request, self._silent = (replace(request, style=style) for request in (self._request, self._silent))
 
     def rest(self) -> None:

@@ -13,6 +13,7 @@ from lexicon.foreign_words import make_readable
 from lexicon.ipa import IpaPhone
 from lexicon.languages import language_code
 from lexicon.marked_text import PITCH_LIMITS, RANGE_LIMITS, RATE_LIMITS, VOLUME_LIMITS, MarkedText
+from lexicon.moods import is_auto, with_moods
 from lexicon.scripts import check_readable
 from lexicon.sentence_length import check_silence
 from lexicon.sentences import Sentence, split_sentences
@@ -157,6 +158,9 @@ def prepare(request: Request, person: Person | None = None) -> PreparedRequest:
             raise InputError(f"there is no recording {path}; check the path")
     written = read_marks(request, person)
     text, notes = make_readable(written, request.language)
+    if is_auto(request.style):
+        text, of_moods = with_moods(text, request.language)
+        request, notes = replace(request, style=None), (*notes, *of_moods)
     prepared = PreparedRequest(
         request,
         text,

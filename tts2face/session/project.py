@@ -11,6 +11,7 @@ from types import MappingProxyType
 from lexicon.dictionary import Dictionary, parse_dictionary
 from lexicon.errors import InputError
 from lexicon.ipa import IpaPhone
+from lexicon.moods import is_auto
 from lexicon.values.fields import check_fields
 from tts2face.gestures.elements import Gains, StyleSpan, check_feature
 from tts2face.gestures.timeline import Timeline, parse_style
@@ -138,7 +139,8 @@ def cut_timeline(project: Project, duration: float) -> Project:
 
 def used_styles(project: Project) -> frozenset[str]:
     """Names of the styles that a project's timeline and request name."""
-    asked = parse_style(project.request.style).values() if project.request.style else ()
+    style = project.request.style
+    asked = parse_style(style).values() if style and not is_auto(style) else ()
     return frozenset([*(span.style for span in project.timeline.spans), *asked])
 
 
@@ -156,7 +158,7 @@ def drop_style(project: Project, name: str) -> Project:
 
 def _changed(project: Project, spans: tuple[StyleSpan, ...], change: Callable[[str], str | None]) -> Project:
     timeline = replace(project.timeline, spans=spans)
-    if not project.request.style:
+    if not project.request.style or is_auto(project.request.style):
         return replace(project, timeline=timeline)
     named = {feature: change(style) for feature, style in parse_style(project.request.style).items()}
     written = ",".join(f"{feature}={style}" for feature, style in named.items() if style is not None)

@@ -231,3 +231,14 @@ def test_the_idle_motion_has_the_style() -> None:
 def test_cancel_forgets_gestures_that_wait() -> None:
     events = stream_events(tts2face.Session(), nod(), {"type": "cancel", "arrived": 0.0}, with_idle=False)
     assert [one["type"] for one in events] == ["cancelled"]
+
+
+def test_the_style_auto_follows_the_words_and_says_why() -> None:
+    say = {"type": "say", "text": "We won the cup!"}
+    events = stream_events(tts2face.Session(), {"type": "style", "style": "auto"}, say, with_idle=False)
+    note = "'We won the cup!' is delighted, by We won (2.5)"
+    assert [one["message"] for one in events if one["type"] == "note"] == [note]
+    plain = stream_events(tts2face.Session(), say, with_idle=False)
+    names = next(one["names"] for one in events if one["type"] == "curves")
+    smile, usual = (frames_of(found)[:, names.index("mouthSmileLeft")].max() for found in (events, plain))
+    assert smile > usual + 0.15

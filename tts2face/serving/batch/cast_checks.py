@@ -5,6 +5,7 @@ from functools import lru_cache
 from typing import Any
 
 from lexicon.errors import InputError
+from lexicon.moods import is_auto
 from tts2face.articulation import NATURAL, parse_articulation
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_names import BALD
@@ -32,8 +33,9 @@ def check_names(models: Models, request: Mapping[str, Any]) -> None:
         factor = parse_articulation(str(request["articulation"]))
         if models.face == OWN_FACE and factor != NATURAL:
             raise InputError("a talker's own face articulates as recorded; remove articulation, or choose another face")
-    if request.get("style") is not None and models.palette is not None:
-        load_palette(models.palette).require(str(request["style"]))
+    style = request.get("style")
+    if style is not None and not is_auto(str(style)) and models.palette is not None:
+        load_palette(models.palette).require(str(style))
 
 
 @lru_cache(maxsize=64)

@@ -67,10 +67,12 @@ class Adjustments:
         if language != DEFAULT_LANGUAGE:
             self.made.append(f"the language is {language}")
 
-    async def note_words(self, state: ServiceState, text: str, language: str, markup: str = "auto") -> None:
-        """Note what of a text is not followed, and what is done with words of other writing systems."""
+    async def note_words(
+        self, state: ServiceState, text: str, language: str, markup: str = "auto", style: str | None = None
+    ) -> None:
+        """Note what of a text is not followed, words of other writing systems, and moods of the style auto."""
         state.results.check_length(text)
-        notes = await asyncio.to_thread(reading_notes, text, language_code(language), markup)
+        notes = await asyncio.to_thread(reading_notes, text, language_code(language), markup, style)
         self.made += [_in_header(note) for note in notes]
 
     def note_fitted(self, models: Models, language: str) -> None:

@@ -11,7 +11,6 @@ import numpy as np
 
 from lexicon.errors import Tts2faceError
 from lexicon.marked_text import GestureMark
-from lexicon.spoken_words import reading_notes
 from tts2face.gestures.listening import PartnerSound
 from tts2face.processes.message import Message
 from tts2face.serving.service.live_motion import Curves, idle_motion
@@ -162,7 +161,7 @@ class LiveTask:
         self._begin_source("speech")
         try:
             check_words(sentence)
-            for note in reading_notes(sentence, self._speech.language, self._speech.markup):
+            for note in self._speech.notes_on(sentence):
                 yield Event({"type": "note", "text": sentence, "message": note})
             for piece in self._speech.say(sentence):
                 begin = piece.begin + self._idle_s

@@ -114,7 +114,7 @@ async def _answer(
     format = given.pop("format", "mp4")
     state = service_state(request)
     language, markup = given.get("language", DEFAULT_LANGUAGE), given.get("markup", "auto")
-    await adjustments.note_words(state, given.get("text", ""), language, markup)
+    await adjustments.note_words(state, given.get("text", ""), language, markup, given.get("style"))
     fields = await divide_options(state, request.state.key, given)
     picture = fields.picture | {name: files[name] for name in ("background",) if name in files}
     spoken = fields.request | {name: files[name] for name in (*SOUNDS, "timeline") if name in files}
