@@ -193,7 +193,7 @@ def read_number(place: Place) -> str:
 def _gender_behind(place: Place) -> str:
     """Gender of the noun behind a number; empty where no noun follows."""
     locale, word = place.locale, place.after
-    is_noun = word[:1].isupper() if locale.setting("capital_nouns") else word[:1].islower()
+    is_noun = bool(word) and word[0].isupper() == bool(locale.setting("capital_nouns"))  # Arabic has no capitals
     if not is_noun or word in locale.words("function_words"):
         return ""
     return gender_of(locale, word) or locale.setting("default_gender")

@@ -1,14 +1,19 @@
-"""Sentences of each language with a table, written down with their reading before anything was run."""
+"""Sentences of each language with a table, written down with their reading before anything was run.
 
-import re
+Several readings that are all right stand between ``|``. Vowel signs of Arabic do not count, nor do spaces within words
+of numbers where a language is written without them or has them at will.
+"""
+
+import unicodedata
 from pathlib import Path
 
 import pytest
 
 from lexicon.normalize import spoken_form
+from lexicon.vowels import without_vowels
 
 TABLES = sorted(Path(__file__).parent.glob("*.tsv"))
-_WORD = re.compile(r"[^\W_]+(?:['’][^\W_]+)*")
+UNSPACED = frozenset({"cmn", "ja", "ko"})
 
 
 def _rows() -> list[tuple[str, str, str]]:
@@ -21,12 +26,14 @@ def _rows() -> list[tuple[str, str, str]]:
     return found
 
 
-def _words(text: str) -> list[str]:
-    return _WORD.findall(text.casefold())
+def _key(text: str, language: str) -> str:
+    plain = without_vowels(unicodedata.normalize("NFC", text), language).casefold()
+    kept = (sign if sign.isalnum() or unicodedata.category(sign)[0] == "M" or sign in "'’" else " " for sign in plain)
+    return ("" if language in UNSPACED else " ").join("".join(kept).split())
 
 
 @pytest.mark.parametrize(("language", "text", "spoken"), _rows())
 def test_a_sentence_is_read_as_its_grammar_says(language: str, text: str, spoken: str) -> None:
     said = spoken_form(text, language)
-    assert _words(said) == _words(spoken)
+    assert _key(said, language) in {_key(own, language) for own in spoken.split("|")}
     assert spoken_form(said, language) == said
