@@ -1,42 +1,44 @@
 """Written forms of spoken words: which part of a text (1 234 567, 3,50 €) each word is a part of."""
 
-from bisect import bisect_right
+import unicodedata
 from collections.abc import Sequence
 from itertools import accumulate
 
 from lexicon.written_forms import WrittenForm
 
-_MARKS = ' \n\t.,;:!?—…«»“”„"()[]¿¡'
+_MARKS = ' \n\t.,;:!?—…«»“”„"()[]¿¡。、，．！？：；「」『』（）؟،؛।'
 
 
 def sources_of(words: Sequence[str], forms: Sequence[WrittenForm]) -> list[tuple[int, str]] | None:
     """Number and text of the written form of each spoken word, equal for words of one form; None if they differ.
+
+    A word that lies in a form and beside it is with both (l'1, 3.5ドルです); of a form whose letters are spoken as they
+    are written each word is for itself.
 
     Parameters
     ----------
     words
         Spoken words, in order.
     forms
-        The text as written, with its spoken form; those that are spoken as they are written are no forms.
+        The text as written, with its spoken form.
     """
-    ends = [*accumulate(_n_letters(form.spoken) for form in forms)]
-    if not ends or ends[-1] != sum(map(_n_letters, words)):
+    text, spans = _spans_of_letters(forms)
+    if not spans or len(spans) != sum(map(_n_letters, words)):
         return None
-    groups = _groups(forms)
-    found: list[tuple[int, str]] = []
+    found: list[list[int]] = []  # beginning and end in the text, of each written word
+    numbers: list[int] = []
     at = 0
-    for number, word in enumerate(words):
+    for word in words:
         n = _n_letters(word)
-        first = bisect_right(ends, at)
-        last = bisect_right(ends, at + max(n, 1) - 1)
-        inside = range(first, min(last + 1, len(forms)))
-        own = next((k for k in inside if not _is_plain(forms[k])), None)
-        if own is None:
-            found.append((-number - 1, word))
+        letters = spans[at : at + n] or [(found[-1][1] if found else 0,) * 2]
+        first, last = letters[0][0], letters[-1][1]
+        if found and first < found[-1][1]:
+            found[-1][1] = max(found[-1][1], last)
         else:
-            found.append((groups[own], _joined(forms, groups, groups[own], inside)))
+            found.append([first, last])
+        numbers.append(len(found) - 1)
         at += n
-    return found
+    return [(number, _without_signs(text, *found[number]) or word) for number, word in zip(numbers, words, strict=True)]
 
 
 def written_groups(words: Sequence[str], forms: Sequence[WrittenForm]) -> list[tuple[str, range]]:
@@ -59,30 +61,44 @@ def _n_letters(text: str) -> int:
     return sum(map(str.isalnum, text))
 
 
-def _is_plain(form: WrittenForm) -> bool:
-    return form.source == form.spoken
+def _letters(text: str) -> str:
+    return "".join(filter(str.isalnum, text))
 
 
-def _groups(forms: Sequence[WrittenForm]) -> list[int]:
+def _without_signs(text: str, first: int, last: int) -> str:
+    while last < len(text) and unicodedata.category(text[last])[0] == "M":  # signs of vowels
+        last += 1
+    written = text[first:last]
+    return written.strip(_MARKS) or written.strip()
+
+
+def _spans_of_letters(forms: Sequence[WrittenForm]) -> tuple[str, list[tuple[int, int]]]:
+    """The written text, and for each spoken letter the range of it that it is a part of."""
+    text = "".join(form.source for form in forms)
+    starts = [0, *accumulate(len(form.source) for form in forms)]
+    is_plain = [_letters(form.source) == _letters(form.spoken) for form in forms]
+    groups = _groups(forms, is_plain)
+    ends = {groups[at]: starts[at + 1] for at in range(len(forms))}
+    spans: list[tuple[int, int]] = []
+    for at, form in enumerate(forms):
+        if is_plain[at]:
+            places = (starts[at] + k for k, letter in enumerate(form.source) if letter.isalnum())
+            spans += [(place, place + 1) for place in places]
+        else:
+            spans += [(starts[groups[at]], ends[groups[at]])] * _n_letters(form.spoken)
+    return text, spans
+
+
+def _groups(forms: Sequence[WrittenForm], is_plain: Sequence[bool]) -> list[int]:
     """Number of the first form of each run of forms without white space or words between them (10-15 km)."""
     numbers: list[int] = []
     for at, form in enumerate(forms):
         is_continued = (
             at > 0
-            and not _is_plain(form)
-            and not _is_plain(forms[at - 1])
-            and (not form.source[:1].isspace() and not forms[at - 1].source[-1:].isspace())
+            and not is_plain[at]
+            and not is_plain[at - 1]
+            and not form.source[:1].isspace()
+            and not forms[at - 1].source[-1:].isspace()
         )
         numbers.append(numbers[-1] if is_continued else at)
     return numbers
-
-
-def _joined(forms: Sequence[WrittenForm], groups: Sequence[int], group: int, inside: range) -> str:
-    """Written text of a group, with the letters before and behind it that are part of the word (l'1, 20-fach)."""
-    own = [at for at, number in enumerate(groups[group:], start=group) if number == group and not _is_plain(forms[at])]
-    text = "".join(forms[at].source for at in own)
-    if inside.start < own[0]:
-        text = (forms[own[0] - 1].source.split() or [""])[-1] + text
-    if inside.stop - 1 > own[-1]:
-        text += (forms[own[-1] + 1].source.split() or [""])[0]
-    return text.strip(_MARKS) or text.strip()

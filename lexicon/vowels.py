@@ -44,11 +44,16 @@ def add_vowels(text: str, language: str) -> str:
 
 
 def _with_marks(word: str, marked: str, marks: re.Pattern[str]) -> str:
-    """A word with the marks of another spelling of it at letters that have none, if most letters have none."""
-    if not _is_bare(word, marks):
-        return word
+    """A word with the marks of another spelling of it at letters that have none, if most have none, else at its first.
+
+    A prefix that is written without its vowel stands before a word that has some (وخَمْسَة).
+    """
     own, other = (re.findall(rf"[^{marks.pattern[1:-1]}]{marks.pattern}*", spelling) for spelling in (word, marked))
-    return "".join(mine if len(mine) > 1 else theirs for mine, theirs in zip(own, other, strict=True))
+    n_filled = len(own) if _is_bare(word, marks) else 1
+    return "".join(
+        theirs if len(mine) == 1 and at < n_filled else mine
+        for at, (mine, theirs) in enumerate(zip(own, other, strict=True))
+    )
 
 
 def without_vowels(text: str, language: str) -> str:
