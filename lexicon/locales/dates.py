@@ -66,13 +66,14 @@ def month_names(locale: Locale) -> list[str]:
 
 def _date(place: Place, day: int, month: str, written: str) -> str:
     locale = place.locale
-    said = _day(place, day)
+    said = day_words(place, day)
     if not written:
         return locale.setting("date_short", "{day} {month}").format(day=said, month=month)
     return locale.setting("date", "{day} {month} {year}").format(day=said, month=month, year=_year(place, written))
 
 
-def _day(place: Place, day: int) -> str:
+def day_words(place: Place, day: int) -> str:
+    """Words of a day of a month."""
     locale = place.locale
     if place.match.groupdict().get("ending") and locale.setting("marked_day"):  # 25η Μαρτίου
         return ordinal(locale, day, Grammar(locale.setting("day_gender")))
@@ -91,6 +92,15 @@ def _year(place: Place, written: str) -> str:
         number += 2000 if number < 50 else 1900
     said = year(locale, number, Grammar(locale.setting("year_gender"), locale.setting("year_case")))
     return f"{said} {locale.setting('year_word')}" if place.match.groupdict().get("yearword") else said
+
+
+def read_weekdays(place: Place) -> str | None:
+    """Name of a weekday, or a span of them: Mo.-Fr.; None for a word at the end of a sentence."""
+    if not place.match["last"] and place.after[:1].isupper():
+        return None
+    rows = place.locale.rows("weekday")
+    days = [rows[day].spoken for day in (place.match["first"], place.match["last"]) if day]
+    return f" {place.locale.setting('to')} ".join(days).replace("  ", " ")
 
 
 def read_year(place: Place) -> str | None:

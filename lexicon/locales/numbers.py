@@ -56,7 +56,11 @@ def ordinal(locale: Locale, n: int, grammar: Grammar = COUNTING) -> str:
     if str(n) in known:
         return _inflected(locale, known[str(n)].spoken, grammar)
     if _ruleset(locale, "ordinal", grammar):
-        return _spelt(locale, n, "ordinal", grammar)
+        said = _spelt(locale, n, "ordinal", grammar)
+        has_case = not grammar.case or _ruleset(locale, "ordinal", grammar) != _ruleset(
+            locale, "ordinal", Grammar(grammar.gender)
+        )
+        return said if has_case else " ".join(_inflected(locale, word, grammar) for word in said.split(" "))
     # only tens and units are ordinal: dwa tysiące dwudziesty czwarty
     low = n % 100
     if low == 0:
@@ -102,6 +106,9 @@ def whole(locale: Locale, written: str, grammar: Grammar = COUNTING) -> str:
 
 
 def _decimal(locale: Locale, amount: Amount, grammar: Grammar) -> str:
+    if amount.decimals == "5" and int(amount.whole or 0) == 1 and locale.setting("one_and_half"):
+        forms = locale.setting("one_and_half").split("|")  # полтора, полторы
+        return forms[-1] if grammar.gender == "f" else forms[0]
     if amount.decimals == "5" and locale.setting("half") and int(amount.whole or 0):
         return locale.setting("half").format(whole(locale, amount.whole, grammar))
     named = locale.rows("decimal")

@@ -80,6 +80,8 @@ def read_amount(locale: Locale, written: str) -> Amount:
     sign = written[0] if written[0] in "+-±" else ""
     decimal = locale.setting("decimal", ",")
     bare = written.removeprefix(sign).strip().replace(" ", "")
+    if decimal not in bare and re.fullmatch(r"[0-9]+[.,][0-9]{1,2}", bare):
+        decimal = "," if "," in bare else "."
     if bare.count(decimal) > 1 or (decimal in bare and re.search(r"[.,'][0-9]+\Z", bare.rpartition(decimal)[2])):
         decimal = "." if decimal == "," else ","  # 1,234.50 in a language that writes 1.234,50
     whole, _, decimals = bare.rpartition(decimal) if decimal in bare else (bare, "", "")

@@ -19,9 +19,31 @@ def read_roman(place: Place) -> str | None:
     known = _in_context(place, value) if value else None
     if known:
         return known
-    if value and len(written) > 1 and set(written) <= _SAFE_ROMAN and "XXX" not in written:
+    if value and _is_number(written, value):
         return cardinal(locale, value)
+    if len(written) > 2 and "I" in written:  # espeak-ng reads MIX as 1009
+        return written.lower()
     return spelled(locale, written) if len(written) > 1 else None
+
+
+def _is_number(written: str, value: int) -> bool:
+    """Whether letters without a context are rather a number than a size, a word or an initialism."""
+    if set(written) <= _SAFE_ROMAN:
+        return len(written) > 1 and "XXX" not in written
+    return len(written) > 3 or (len(written) == 3 and "I" in written and value < 1000)
+
+
+def read_roman_with_stop(place: Place) -> str | None:
+    """Roman number with the full stop of an ordinal (II. Mehmed, Ludwig XIV. war); None where it ends a sentence."""
+    locale, value = place.locale, roman_value(place.match["roman"])
+    if not value:
+        return None
+    if locale.setting("roman_stop") == "ordinal":
+        return ordinal(locale, value)
+    case = place.grammar("ordinal").case
+    if place.after[:1].isupper():  # im II. Weltkrieg
+        return ordinal(locale, value, Grammar(case=case)) if case else None
+    return _in_context(place, value)
 
 
 def _with_suffix(place: Place, value: int) -> str | None:
@@ -34,8 +56,6 @@ def _with_suffix(place: Place, value: int) -> str | None:
 
 def _in_context(place: Place, value: int) -> str | None:
     locale = place.locale
-    if place.match.groupdict().get("stop") and locale.setting("roman_stop") == "ordinal":
-        return ordinal(locale, value)
     for word in (f"+{_word_after(place)}", place.before.lower()):
         if word in locale.rows("roman"):
             return _by_word(place, value, word)

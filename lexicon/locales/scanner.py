@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from lexicon.locales import counted, dates, roman, words
+from lexicon.locales import counted, dates, digit_groups, fractions, ordinals, roman, words
 from lexicon.locales.place import Reader, amount_pattern
 from lexicon.locales.tables import Locale, alternatives
 from lexicon.locales.templates import template_forms
@@ -49,7 +49,7 @@ class Scanner:
     by_word: Mapping[str, tuple[Form, ...]]
     by_sign: Mapping[str, tuple[Form, ...]]
     address: Form
-    roman: Form
+    romans: tuple[Form, ...]
     ending: Form
 
     def at(self, found: re.Match[str], text: str) -> Iterable[Form]:
@@ -77,7 +77,7 @@ class Scanner:
         if small != word:
             yield from self.by_word.get(small, ())
         if word.isupper() or word.rstrip("abcdefghijklmnopqrstuvwxyz").isupper():
-            yield self.roman
+            yield from self.romans
 
 
 # Names in angle quotes are parts of `_parts`; a form with a part that the language lacks is left out.
@@ -93,6 +93,11 @@ _NUMBER_FORMS: tuple[tuple[str, Reader], ...] = (
         r"(?:,? ‹of›(?P<year>[12][0-9]{3})(?![0-9])‹year word›)?‹tail›",
         dates.read_named_date,
     ),
+    (
+        r"(?P<day>[0-9]{1,2})(?P<ending>‹day ending›)? ?[-–] ?"
+        r"(?=[0-9]{1,2}(?:‹day ending›)? ?‹of›(?:‹months›)(?!‹letter›))",
+        ordinals.read_first_day,
+    ),
     (r"(?P<day>[0-9]{1,2})\.(?P<month>[0-9]{1,2})\.(?! ?[0-9])", dates.read_short_date),
     (r"(?P<day>[0-9]{1,2})/(?P<month>[0-9]{1,2})(?![0-9/])", dates.read_short_date),
     (
@@ -103,37 +108,41 @@ _NUMBER_FORMS: tuple[tuple[str, Reader], ...] = (
     (
         r"\+[0-9]{1,3}(?:[ ./-]?\(?[0-9]{1,5}\)?){2,6}(?!\w)|0[0-9]{1,4}(?:[ ./-][0-9]{2,8}){1,5}(?!\w)"
         r"|\(?[0-9]{2,3}\) ?[0-9]{2,5}[ -][0-9]{2,5}(?:[ -][0-9]{2,4})?(?!\w)",
-        counted.read_telephone,
+        digit_groups.read_telephone,
     ),
     (
         r"(?P<hour>[0-9]{1,2}) ?(?P<sign>‹hour sign›) ?(?P<minute>[0-9]{2})?(?!‹letter›|[0-9])(?P<second>(?!))?"
         r"(?P<word>(?!))?",
         dates.read_time,
     ),
-    (r"[0-9]{2,12}(?:[ ./-][0-9]{2,12}){0,5}(?![\w])", counted.read_named_telephone),
+    (r"[0-9]{1,12}(?:[ ./-][0-9]{1,12}){0,6}(?![\w])", digit_groups.read_named_telephone),
     (r"(?P<number>[12][0-9]{3})(?P<suffix>-?‹letter›{1,3})? ?(?P<word>‹year words›)‹end›", dates.read_year),
-    (r"(?P<digits>[0-9]{1,4})(?P<suffix>‹suffix›)(?!\w)", counted.read_suffixed),
-    (r"‹signed›(?: ?(?P<magnitude>‹magnitude›))? ?(?P<currency>‹currency›)‹end›‹tail›", counted.read_money),
+    (r"(?P<digits>[0-9]{1,4})(?P<suffix>‹suffix›)(?!\w)", ordinals.read_suffixed),
+    (
+        r"‹signed›(?:,[-–—]{1,2})?(?: ?(?P<magnitude>‹magnitude›))? ?(?P<currency>‹currency›)(?:/(?P<per>‹unit›))?‹end›"
+        r"‹tail›",
+        counted.read_money,
+    ),
     (r"(?P<amount>‹amount›)(?:[-–](?=[0-9])| – (?=[0-9]))(?!‹amount›[-–][0-9])", counted.read_range),
     (
         r"(?:(?P<integer>[0-9]{1,4}) ?)?(?P<vulgar>[\u00bc-\u00be\u2150-\u215e])(?P<top>(?!))?(?P<bottom>(?!))?"
         r"(?: (?P<noun>‹letter›{1,24}))?",
-        counted.read_fraction,
+        fractions.read_fraction,
     ),
     (
         r"(?:(?P<integer>[0-9]{1,4}) )?(?P<top>[0-9]{1,3})/(?P<bottom>[0-9]{1,3})(?![\w/])(?P<vulgar>(?!))?"
         r"(?: (?P<noun>‹letter›{1,24}))?",
-        counted.read_fraction,
+        fractions.read_fraction,
     ),
     (
         r"‹signed›(?: ?(?P<magnitude>‹magnitude›))?(?: ?|-)(?P<unit>‹unit›)(?:/(?P<per>‹unit›))?‹end›‹tail›",
         counted.read_measure,
     ),
     (r"‹signed› ?(?P<magnitude>‹magnitude›)‹end›", counted.read_magnitude),
-    (r"(?P<digits>[0-9]{1,4})\.(?= ‹letter›)", counted.read_dotted_ordinal),
-    (r"(?![0-9]{1,3}(?:\.[0-9]{3})+(?![0-9.]))[0-9]{1,4}(?:\.[0-9]{1,4}){2,6}(?!\w)", counted.read_version),
-    (r"[0-9]{1,4}‹other decimal›(?:[0-9]{1,2}|[0-9]{4})(?![0-9.])", counted.read_version),
-    (r"(?P<first>[0-9]{1,3}):(?P<second>[0-9]{1,3})(?![0-9:])", counted.read_score),
+    (r"(?P<digits>[0-9]{1,4})\.(?= ‹letter›)", ordinals.read_dotted_ordinal),
+    (r"(?![0-9]{1,3}(?:\.[0-9]{3})+(?![0-9.]))[0-9]{1,4}(?:\.[0-9]{1,4}){2,6}(?!\w)", digit_groups.read_version),
+    (r"[0-9]{1,4}‹other decimal›(?:[0-9]{1,2}|[0-9]{4})(?![0-9.])", digit_groups.read_version),
+    (r"(?P<first>[0-9]{1,3}):(?P<second>[0-9]{1,3})(?![0-9:])", digit_groups.read_score),
     (r"‹signed›‹tail›", counted.read_number),
 )
 
@@ -182,14 +191,16 @@ def scanner(locale: Locale) -> Scanner:
     numbers = (*own, *_number_forms(locale))
     address = Form(re.compile(_ADDRESS), words.read_address)
     suffix = alternatives(locale, "suffix")
-    follows = {"yes": r"(?=,| [^\W\d_A-Z])", "ordinal": rf"(?= {LETTER})"}.get(locale.setting("roman_stop"))
-    stop = rf"(?P<stop>\.{follows})?" if follows else ""
-    numeral = Form(re.compile(_ROMAN.replace("{suffix}", suffix) + stop), roman.read_roman)
+    pattern = _ROMAN.replace("{suffix}", suffix)
+    numerals = (Form(re.compile(pattern), roman.read_roman),)
+    if locale.setting("roman_stop"):  # XIV. is an ordinal
+        stop = rf"(?P<roman>[IVXLCDM]{{1,15}})\.(?=,| {LETTER})"
+        numerals = (Form(re.compile(stop), roman.read_roman_with_stop), *numerals)
     endings = locale.rows("ending")
     ending = Form(
         re.compile(rf"(?P<stem>{LETTER}{{2,40}}?)(?P<ending>{_any_of(endings) or '(?!)'})"), words.read_ending
     )
-    return Scanner(numbers, _forms_by_word(locale), _forms_by_sign(locale), address, numeral, ending)
+    return Scanner(numbers, _forms_by_word(locale), _forms_by_sign(locale), address, numerals, ending)
 
 
 def _templates_by_place(locale: Locale) -> dict[str, list[Form]]:
@@ -203,8 +214,10 @@ def _templates_by_place(locale: Locale) -> dict[str, list[Form]]:
 
 def _money_before(locale: Locale, currencies: str) -> str:
     magnitude = alternatives(locale, "magnitude")
+    other = r"\." if locale.setting("decimal", ",") == "," else ","  # $5.99
     return (
-        rf"(?P<minus>(?!))?(?P<currency>{currencies}) ?(?P<amount>-?{amount_pattern(locale)})"
+        rf"(?P<minus>(?!))?(?P<currency>{currencies}) ?"
+        rf"(?P<amount>-?(?:[0-9]{{1,7}}{other}[0-9]{{2}}(?![0-9{other}])|{amount_pattern(locale)}))(?:,[-–—]{{1,2}})?"
         rf"(?: ?(?P<magnitude>{magnitude})(?!{LETTER}))?(?P<tail>(?!))?"
     )
 
@@ -235,7 +248,12 @@ def _forms_by_word(locale: Locale) -> dict[str, tuple[Form, ...]]:
         pattern = re.compile(_money_before(locale, _any_of(forms)))
         found.setdefault(first, []).append(Form(pattern, counted.read_money))
     short = locale.rows("abbreviation")
-    add({*short, *(form[:1].upper() + form[1:] for form in short)}, rf"(?:{{}}){end}", words.read_abbreviation)
+    letters = {*short, *(form[:1].upper() + form[1:] for form in short)}
+    add({form for form in letters if not form[-1].isalpha()}, rf"(?:{{}})(?!{LETTER})", words.read_abbreviation)
+    add({form for form in letters if form[-1].isalpha()}, rf"(?:{{}}){end}", words.read_abbreviation)
+    days = _any_of(locale.rows("weekday")) or "(?!)"
+    span = rf"(?P<first>{{}})(?:\.? ?[-–] ?(?P<last>{days})(?!{LETTER})(?:\.(?= ?[0-9]))?|\.(?=,| ))"
+    add(locale.rows("weekday"), span, dates.read_weekdays)
     months = dates.month_names(locale)
     of = locale.setting("date_of")
     link = f"(?:(?:{of}) )?" if of else ""
@@ -264,6 +282,8 @@ def _forms_by_sign(locale: Locale) -> dict[str, tuple[Form, ...]]:
     for first, forms in _grouped(locale.rows("abbreviation")).items():
         if not first.isalpha():
             found.setdefault(first, []).append(Form(re.compile(_any_of(forms)), words.read_abbreviation))
+    for dash in "-–":
+        found.setdefault(dash, []).append(Form(re.compile(rf"{dash}(?=[0-9])"), words.read_dash))
     for first, forms in _grouped(locale.rows("sign")).items():
         found.setdefault(first, []).append(Form(re.compile(_any_of(forms)), words.read_sign))
     return {first: tuple(forms) for first, forms in found.items()}

@@ -15,6 +15,7 @@ unit         unit or noun behind a number; ``{}`` is the number where it does no
 magnitude    thousand, million and so on behind a number
 currency     currency; details ``cents=`` have its hundredth part
 month        number of a month: its name in dates, and written forms in details
+weekday      name of a short one; without a full stop only in a span (Mo-Fr)
 abbreviation its words; details: ``number`` (before a number only), ``after`` (behind a number), ``name`` (before a
              capital), ``end`` (may end a sentence), or a case with the form in it
 ending       abbreviation at the end of a word (str.)

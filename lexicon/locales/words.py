@@ -39,7 +39,7 @@ def _is_in_context(place: Place, details: Collection[str], following: str) -> bo
     if "number" in details:
         return bare[:1].isdigit() or bare[:1] in {"X", "V", "I"}
     if "name" in details:
-        return bare[:1].isupper()
+        return bare[:1].isupper() or bare.startswith(f"{place.locale.setting('and')} ")
     if "after" in details:
         return place.text[max(place.match.start() - 2, 0) : place.match.start()].strip(" ")[-1:].isalnum()
     return True
@@ -71,6 +71,12 @@ def read_word(place: Place) -> str | None:
     return row.spoken if row else None
 
 
+def read_dash(place: Place) -> str | None:
+    """Word for to between what was read and a number (9h-18h); None elsewhere (COVID-19)."""
+    is_behind = place.said and not place.text[place.match.start() - 1 : place.match.start()].isspace()
+    return f" {place.locale.setting('to')} " if is_behind else None
+
+
 def read_sign(place: Place) -> str | None:
     """Words of a sign that is spoken, where it stands as its row says; None elsewhere."""
     row = place.locale.rows("sign")[place.match.group()]
@@ -81,7 +87,7 @@ def read_sign(place: Place) -> str | None:
     if "math" in row.details and not (_is_term(before) and _is_term(after) and _has_equals(place)):
         return None
     if "unit" in row.details and not _stands_between_units(place):
-        return None
+        return " "
     return row.spoken
 
 

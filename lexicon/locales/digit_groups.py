@@ -1,0 +1,46 @@
+"""Readers of telephone numbers, versions and results, which are several numbers."""
+
+import re
+
+from lexicon.locales.numbers import cardinal, digits, whole
+from lexicon.locales.place import Place, amount_pattern
+from lexicon.locales.tables import Locale
+
+
+def read_telephone(place: Place) -> str:
+    """Digits of a telephone number with a comma between groups; pairs where the language reads pairs."""
+    locale = place.locale
+    written = place.match.group()
+    groups = re.findall(r"[0-9]+", written)
+    if locale.setting("telephone") == "pairs" and all(len(group) == 2 for group in groups[1:]):
+        words = [digits(locale, g) if len(g) > 2 or (g[0] == "0" and len(g) == 1) else _pair(locale, g) for g in groups]
+    else:
+        words = [digits(locale, group) for group in groups]
+    return f"{locale.setting('plus')} " * written.startswith("+") + ", ".join(words)
+
+
+def _pair(locale: Locale, group: str) -> str:
+    return digits(locale, group) if group[0] == "0" else cardinal(locale, int(group))
+
+
+def read_named_telephone(place: Place) -> str | None:
+    """Number behind the word for telephone; None behind another one."""
+    if (place.said or place.before).lower() not in place.locale.words("telephone_words"):
+        return None
+    return read_telephone(place)
+
+
+def read_version(place: Place) -> str | None:
+    """Numbers with points between them: 1.2.3, 192.168.0.1, 3.11; None for a number in groups."""
+    locale = place.locale
+    if re.fullmatch(amount_pattern(locale), place.match.group()):
+        return None
+    return f" {locale.setting('dot', locale.setting('point'))} ".join(
+        whole(locale, part) for part in place.match.group().split(".")
+    )
+
+
+def read_score(place: Place) -> str:
+    """Result of a match, or a proportion: 3:1."""
+    first, second = (whole(place.locale, place.match[name]) for name in ("first", "second"))
+    return f"{first} {place.locale.setting('against')} {second}".replace("  ", " ")
