@@ -192,15 +192,15 @@ def scanner(locale: Locale) -> Scanner:
     address = Form(re.compile(_ADDRESS), words.read_address)
     suffix = alternatives(locale, "suffix")
     pattern = _ROMAN.replace("{suffix}", suffix)
-    numerals = (Form(re.compile(pattern), roman.read_roman),)
+    numerals = [Form(re.compile(pattern), roman.read_roman)]
     if locale.setting("roman_stop"):  # XIV. is an ordinal
         stop = rf"(?P<roman>[IVXLCDM]{{1,15}})\.(?=,| {LETTER})"
-        numerals = (Form(re.compile(stop), roman.read_roman_with_stop), *numerals)
+        numerals = [Form(re.compile(stop), roman.read_roman_with_stop), *numerals]
     endings = locale.rows("ending")
     ending = Form(
         re.compile(rf"(?P<stem>{LETTER}{{2,40}}?)(?P<ending>{_any_of(endings) or '(?!)'})"), words.read_ending
     )
-    return Scanner(numbers, _forms_by_word(locale), _forms_by_sign(locale), address, numerals, ending)
+    return Scanner(numbers, _forms_by_word(locale), _forms_by_sign(locale), address, tuple(numerals), ending)
 
 
 def _templates_by_place(locale: Locale) -> dict[str, list[Form]]:
@@ -249,8 +249,7 @@ def _forms_by_word(locale: Locale) -> dict[str, tuple[Form, ...]]:
         found.setdefault(first, []).append(Form(pattern, counted.read_money))
     short = locale.rows("abbreviation")
     letters = {*short, *(form[:1].upper() + form[1:] for form in short)}
-    add({form for form in letters if not form[-1].isalpha()}, rf"(?:{{}})(?!{LETTER})", words.read_abbreviation)
-    add({form for form in letters if form[-1].isalpha()}, rf"(?:{{}}){end}", words.read_abbreviation)
+    add(letters, rf"(?:{{}})(?!{LETTER}|(?<={LETTER})[0-9])", words.read_abbreviation)
     days = _any_of(locale.rows("weekday")) or "(?!)"
     span = rf"(?P<first>{{}})(?:\.? ?[-–] ?(?P<last>{days})(?!{LETTER})(?:\.(?= ?[0-9]))?|\.(?=,| ))"
     add(locale.rows("weekday"), span, dates.read_weekdays)
