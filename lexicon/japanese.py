@@ -1,7 +1,7 @@
 """Accent phrases of Japanese text with their reading in kana, by pyopenjtalk-plus (extra ``[japanese]``).
 
-Without the library texts in kana alone are read by their spelling: the particles は and へ at the end of what is
-written between spaces or marks are wa and e.
+Without the library texts in kana alone are read by their spelling, with numbers in kana: the particles は and へ at the
+end of what is written between spaces or marks are wa and e.
 """
 
 import functools
@@ -14,6 +14,7 @@ from typing import Any
 
 from lexicon.chunks import split_chunks
 from lexicon.errors import BackendError, import_of_extra
+from lexicon.locales.tables import alternatives, find_locale
 
 _KANJI = re.compile("[㐀-䶿一-鿿豈-﫿々〆〇𠀀-𪛟]")
 _KANA = re.compile("[ァ-ヺー]+")
@@ -95,6 +96,17 @@ def japanese_phrases(text: str) -> tuple[JapanesePhrase, ...]:
         found += _phrases(read(chunk), _folded(text[start:end]), start)
         start = end
     return tuple(_whole_numbers(found, text))
+
+
+def numbers_in_kana(words: str) -> str:
+    """Words of a number in kana, where the library that reads Chinese characters is not installed."""
+    if has_reader():
+        return words
+    locale = find_locale("ja")
+    if locale is None:
+        return words
+    rows = locale.rows("kana")
+    return re.sub(alternatives(locale, "kana"), lambda found: rows[found.group()].spoken, words)
 
 
 def as_espeak_reads(kana: str) -> str:

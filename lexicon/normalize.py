@@ -16,6 +16,7 @@ from lexicon import number_contexts as contexts
 from lexicon import written_forms as readings
 from lexicon.canonical import canonical_text, signs_before_vowels
 from lexicon.capitals import sentence_case
+from lexicon.japanese import numbers_in_kana
 from lexicon.kept_signs import INCH, RANGE, STAR, keep_signs, written_signs
 from lexicon.locales.reading import read_forms
 from lexicon.number_words import MAX_CARDINAL_DIGITS
@@ -424,7 +425,14 @@ def spoken_forms(text: str, language: str) -> list[WrittenForm]:
     of other writing systems are replaced by their names; a word of more than 100 letters is divided, as are the digits
     of a longer number than English names.
     """
-    return [replace(form, spoken=_readable(form.spoken, language)) for form in read_forms(text, language)]
+    forms = read_forms(text, language)
+    if language == "ja":
+        forms = [form if form.source == form.spoken else _in_kana(form) for form in forms]
+    return [replace(form, spoken=_readable(form.spoken, language)) for form in forms]
+
+
+def _in_kana(form: WrittenForm) -> WrittenForm:
+    return replace(form, spoken=numbers_in_kana(form.spoken))
 
 
 def _readable(spoken: str, language: str) -> str:

@@ -6,11 +6,12 @@ import unicodedata
 from lexicon.locales.place import Place
 from lexicon.locales.scanner import PLACE, scanner
 from lexicon.locales.tables import Locale, find_locale
-from lexicon.written_forms import WrittenForm
+from lexicon.written_forms import WrittenForm, read_table
 
 # one character for one, so that the written form of each word stays known
 _PLAIN = {0xA0: " ", 0x202F: " ", 0x2009: " ", 0x2007: " ", 0x2212: "-", 0x2010: "-", 0x2011: "-", 0x2044: "/",
           0xFF05: "%", 0x66A: "%", 0x66B: ".", 0x66C: ",", 0x2019: "'", 0x2BC: "'"}  # fmt: skip
+_MINUS = re.compile(r"(?<![\w.,])([-−][0-9]{1,400}(?:[.,][0-9]{1,400})?)")
 _LAST_WORD = re.compile(r"[^\W\d_]+\Z")
 
 
@@ -39,7 +40,7 @@ def read_forms(text: str, language: str) -> list[WrittenForm]:
     """
     locale = find_locale(language)
     if locale is None:
-        return [WrittenForm(text, text)]
+        return _with_minus(text, language)
     plain = text.translate(_CHARACTERS)
     found: list[WrittenForm] = []
     at = done = 0
@@ -61,6 +62,17 @@ def read_forms(text: str, language: str) -> list[WrittenForm]:
     if done < len(text):
         found.append(WrittenForm(text[done:], plain[done:]))
     return found
+
+
+def _with_minus(text: str, language: str) -> list[WrittenForm]:
+    """Parts of a text of a language without a table, whose minus before a number espeak-ng 1.52 mostly leaves out."""
+    row = read_table("minus_words.tsv").get(language.partition("-")[0])
+    parts = _MINUS.split(text) if row else [text]
+    forms = [WrittenForm(part, part) for part in parts]
+    return [
+        WrittenForm(form.source, f"{row[0]} {form.source[1:]}") if row and at % 2 else form
+        for at, form in enumerate(forms)
+    ]
 
 
 def _last_word(text: str) -> str:

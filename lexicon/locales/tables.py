@@ -26,6 +26,7 @@ fraction     words of a fraction
 word         word of another language, as the language says it
 letter       name of a letter
 form         written form with a pattern and a template of its own (`lexicon.locales.templates`)
+kana         Chinese characters of numbers in kana, for Japanese without its reader
 numeral      words of numbers of which CLDR has no grammatical forms
 ============ ====================================================================================================
 """

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from lexicon import japanese
 from lexicon.errors import BackendError
+from lexicon.normalize import spoken_form
 from lexicon.pronounce import pronounce
 from lexicon.scripts import check_script
 from lexicon.written_words import written_words
@@ -76,6 +77,20 @@ def test_kana_without_the_reader_have_their_particles(monkeypatch: pytest.Monkey
     assert japanese.to_kana("わたしは がっこうへ いきます。では、はは は はを みがく。") == (
         "わたしわ がっこうえ いきます。 でわ、 はは は はを みがく。"
     )
+
+
+@pytest.mark.parametrize(
+    ("text", "spoken"),
+    [
+        ("100000えんです。", "じゅうまんえんです。"), ("3600えん", "さんぜんろっぴゃくえん"),
+        ("-5どです。", "マイナスごどです。"), ("14:30に あう。", "じゅうよじさんじゅっぷんに あう。"),
+        ("2024/5/1", "にせんにじゅうよねんごがつついたち"),
+    ],
+)  # fmt: skip
+def test_numbers_are_kana_without_the_reader(text: str, spoken: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(japanese, "has_reader", lambda: False)
+    assert spoken_form(text, "ja") == spoken
+    assert pronounce(text, "ja").phones
 
 
 @pytest.mark.parametrize(("written", "phones"), [("りょうり", "ɽijoɯɽi"), ("リャマ", "ɽijama"), ("りゅう", "ɽijɯɯ")])

@@ -2,10 +2,13 @@
 
 import pytest
 
+from lexicon.g2p import languages
 from lexicon.normalize import spoken_form
 from lexicon.pronounce import pronounce
 from lexicon.spoken_words import pronounce_marked
 from lexicon.text_marks import parse_marks
+from lexicon.vowels import without_vowels
+from lexicon.written_forms import read_table
 
 
 @pytest.mark.parametrize(
@@ -36,3 +39,21 @@ def test_words_are_read_as_they_are() -> None:
     for language in ("de", "fr-fr"):
         text = "Zug um acht Uhr, Karl der Große, l'été de Louis quatorze; Wort-Wort (so)"
         assert spoken_form(text, language) == text
+
+
+@pytest.mark.parametrize(
+    ("language", "text", "spoken"),
+    [
+        ("sv", "Det är -5 grader, 10-15 eller 3 - 4.", "Det är minus 5 grader, 10-15 eller 3 - 4."),
+        ("cs", "Je −5 °C.", "Je minus 5 °C."),
+        ("he", "עכשיו -5 מעלות", "עכשיו מינוס 5 מעלות"),
+        ("nb", "-5", "minus 5"),
+        ("gd", "-5", "-5"),
+    ],
+)
+def test_minus_is_a_word_in_languages_without_a_table(language: str, text: str, spoken: str) -> None:
+    assert without_vowels(spoken_form(text, language), language) == spoken
+
+
+def test_every_language_of_the_table_of_minus_is_one_of_espeak() -> None:
+    assert read_table("minus_words.tsv").keys() <= languages().keys()
