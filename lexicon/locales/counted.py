@@ -51,6 +51,8 @@ def read_money(place: Place) -> str:
 def money(locale: Locale, amount: Amount, row: Row, case: str = "") -> str:
     """Words of an amount of money."""
     cents = row.details.get("cents", "")
+    if not cents:
+        amount = Amount(amount.sign, amount.whole, amount.decimals.rstrip("0"))
     if amount.decimals and (len(amount.decimals) != 2 or not cents):
         return count(locale, amount, row, case)
     small = Amount("", amount.decimals.lstrip("0") or "0")

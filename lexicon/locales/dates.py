@@ -59,7 +59,9 @@ def months_pattern(locale: Locale) -> str:
 
 
 def month_names(locale: Locale) -> list[str]:
-    """Written names of months, the longest first."""
+    """Written names of months, the longest first; none where months have numbers."""
+    if locale.setting("numbered_months"):
+        return []
     names = [name for row in locale.rows("month").values() for name in (row.spoken, *row.details)]
     return sorted({*names, *(name[:1].upper() + name[1:] for name in names)}, key=len, reverse=True)
 

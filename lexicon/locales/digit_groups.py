@@ -35,9 +35,9 @@ def read_version(place: Place) -> str | None:
     locale = place.locale
     if re.fullmatch(amount_pattern(locale), place.match.group()):
         return None
-    return f" {locale.setting('dot', locale.setting('point'))} ".join(
-        whole(locale, part) for part in place.match.group().split(".")
-    )
+    join = locale.setting("join", " ")
+    dot = join + locale.setting("dot", locale.setting("point")) + join
+    return dot.join(whole(locale, part) for part in place.match.group().split("."))
 
 
 def read_score(place: Place) -> str:

@@ -96,7 +96,8 @@ def count(locale: Locale, amount: Amount, row: Row, case: str = "") -> str:
     if "{}" in noun:
         return noun.format(said)
     if noun.startswith(_WHOLE):
-        return noun.removeprefix(_WHOLE)
+        sign = locale.setting("minus") if amount.sign == "-" else ""
+        return f"{sign} {noun.removeprefix(_WHOLE)}".lstrip()
     return behind(locale, said, noun, links=is_round_million(amount))
 
 

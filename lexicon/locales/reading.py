@@ -56,12 +56,22 @@ def read_forms(text: str, language: str) -> list[WrittenForm]:
         at = done = match.end()
         is_joined = found and found[-1].spoken[-1:].isalnum() and spoken[:1].isalnum()
         is_joined = is_joined and _last_word(found[-1].spoken) not in locale.words("prefixes")
-        is_followed = plain[at : at + 1].isalnum() and spoken[-1:].isalnum()
+        is_followed = (
+            plain[at : at + 1].isalnum() and spoken[-1:].isalnum() and not _is_attached(locale, plain, at, spoken)
+        )
         found.append(WrittenForm(text[match.start() : at], join * bool(is_joined) + spoken + join * is_followed))
         said = _last_word(spoken.rstrip())
     if done < len(text):
         found.append(WrittenForm(text[done:], plain[done:]))
     return found
+
+
+def _is_attached(locale: Locale, text: str, at: int, spoken: str) -> bool:
+    """Whether the letters behind a form are an ending of its last word: of a noun (퍼센트가), or of a number (일이)."""
+    endings = locale.setting("endings")
+    return bool(endings) and (
+        spoken[-1] not in locale.setting("number_ends") or bool(re.match(endings, text[at : at + 8]))
+    )
 
 
 def _with_minus(text: str, language: str) -> list[WrittenForm]:

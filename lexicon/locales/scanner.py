@@ -26,8 +26,8 @@ _TLD = (
     r"(?:com|org|net|edu|gov|io|ai|app|dev|info|eu|de|fr|es|it|pt|br|nl|be|pl|ru|tr|gr|at|ch|uk|us|mx|cn|jp|kr|in|vn)"
 )
 _ADDRESS = (
-    rf"[\w.+-]{{1,64}}@{_LABEL}(?:\.{_LABEL}){{1,5}}(?!\w)|(?:https?://|www\.)[^\s,;!]{{0,400}}[^\s,;!.:?)]"
-    rf"|{_LABEL}(?:\.{_LABEL}){{0,3}}\.{_TLD}\b(?!\.\w)(?:/[^\s,;!]{{0,400}}[^\s,;!.:?)])?"
+    rf"[\w.+-]{{1,64}}@{_LABEL}(?:\.{_LABEL}){{1,5}}(?![A-Za-z0-9_])|(?:https?://|www\.)[^\s,;!]{{0,400}}[^\s,;!.:?)]"
+    rf"|{_LABEL}(?:\.{_LABEL}){{0,3}}\.{_TLD}(?![A-Za-z0-9_])(?!\.\w)(?:/[^\s,;!]{{0,400}}[^\s,;!.:?)])?"
 )
 _ROMAN = rf"(?P<roman>[IVXLCDM]{{1,15}})(?P<suffix>{{suffix}}\.?)?(?!{LETTER}|['’-]{LETTER}|[0-9])"
 _PART = re.compile("‹([a-z ]+)›")

@@ -2,8 +2,8 @@
 
 A pattern is a regular expression with named groups of digits, in which ``#`` stands for a number with decimals and
 groups. It is tried at numbers, or at the words and signs that its details name (``at=$|-``). Each field of the template
-is a group and how it is read: ``{n:number}``, ``{n:ordinal f}``, or the name of a rule of numbers or of a kind of rows,
-where a number is looked up (``{m:month}``; one without a row is a cardinal), or each digit (``{n:phone}``).
+is a group and how it is read: ``{n:number}``, ``{n:ordinal f genitive}``, the name of a rule of numbers, or of a kind
+of rows, where a number is looked up (``{m:month}``; one without a row is a cardinal), or each digit (``{n:phone}``).
 """
 
 import re
@@ -37,11 +37,11 @@ def _reader(row: Row) -> Reader:
 
 def _words(place: Place, written: str, how: str) -> str:
     """Words of a group of digits; nothing for a group without any."""
-    kind, _, gender = how.partition(" ")
+    kind, gender, case = (*how.split(" "), "", "")[:3]
     if not written:
         return ""
     read = _READERS.get(kind, _looked_up)
-    return read(place.locale, written, kind, Grammar(gender, place.grammar(kind).case))
+    return read(place.locale, written, kind, Grammar(gender, case or place.grammar(kind).case))
 
 
 def _number(locale: Locale, written: str, _: str, grammar: Grammar) -> str:
