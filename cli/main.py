@@ -100,7 +100,7 @@ def phones(
     language: Annotated[
         str, Parameter(help="Language of the text: a code, a BCP 47 tag or an English name.")
     ] = "en-us",
-    markup: Annotated[Literal["auto", "plain", "ssml"], Parameter(help="How the text is read.")] = "auto",
+    markup: Annotated[Literal["auto", "plain", "ssml", "llm"], Parameter(help="How the text is read.")] = "auto",
     dictionary: Annotated[
         Path | None, Parameter(help="File of pronunciations that take precedence over the built-in ones.")
     ] = None,

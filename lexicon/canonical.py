@@ -22,6 +22,8 @@ _BRACKETS = "()[]{}"
 _SUPERSCRIPT = re.compile(r"(?<=[0-9A-Za-z)])(?:⁻[⁰¹²³⁴-⁹]+|[⁰¹²³⁴-⁹]{2,}|[⁰⁴-⁹])|(?<=[0-9])¹")
 # ~5 is about 5; other tildes are dropped as markup
 _ABOUT = re.compile(r"(?<![\w~])[~≈] ?(?=[0-9])")
+# <name> are brackets, < and > elsewhere are words of maths
+_ANGLED = re.compile(r"(?<!\w)</?(?=[^\W\d])([^<>\n]{1,80}?)\s?/?>")
 _DROPPED_CHARACTERS = "™®*_~|\\•·●○◦▪▫■□★☆◆◇►▶◀»※†‡\u20e3"
 _FULL_STOPS = "。｡।॥۔።"
 _TRANSLATION = (
@@ -119,6 +121,7 @@ def canonical_text(text: str, *, keep_marks: bool = False) -> str:
     """
     text = _ABOUT.sub("about ", _AREA_CODE.sub(r"\1-", text))
     text = _SUPERSCRIPT.sub(lambda run: "^" + unicodedata.normalize("NFKC", run.group()).replace("−", "-"), text)
+    text = _ANGLED.sub(r" \1 ", text)
     text = _VULGAR.sub(r" \1", text).translate(_translation_table())
     # translated before and after: NFKC itself makes characters of the table, and would lose superscripts
     text = unicodedata.normalize("NFKC", text).translate(_translation_table())

@@ -2,17 +2,15 @@
 
 ``It is NOT here`` and ``It is *not* here`` stress *not*. In a line without small letters capitals mean nothing; words
 that are read letter by letter, acronyms and labels of speakers keep them. What somebody does (``*sighs*``) may stand
-between asterisks, too, and is no emphasis.
+between asterisks, too: `lexicon.inline_marks` reads it, and a clause there (``*the door creaks*``) is not emphasised.
 """
 
-import functools
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from lexicon.capitals import READ_ACRONYMS, is_word_in_capitals
 from lexicon.text_language import common_words
-from lexicon.written_forms import read_table
 
 STRONG, MODERATE = 1.0, 0.6  # `lexicon.tones.Tone.emphasis`
 MAX_STRONG_WORDS = 3  # of one span: a whole sentence said so has no accent
@@ -30,7 +28,8 @@ _STRETCHED = re.compile(r"(.)\1{2,}")  # SOOO, YESSS, COOOL
 _AFTER_NUMBER = re.compile(r"[0-9]\s*\Z")  # 5 AM, 12 IN
 _AFTER_TOWN = re.compile(r"[A-Z][a-z]+, \Z")  # Portland, OR 97201
 MAX_CODE_LETTERS = 2  # of units, halves of the day and states
-_SUBJECT = re.compile(r"(?:he|she|it|who|which|that|this|everyone|nobody)\s+\Z", re.IGNORECASE)  # she *looks* well
+_GOES_ON = re.compile(r"\s*[a-z]")
+MIN_NARRATED_WORDS = 3
 _BEFORE = 24  # characters before a word that hold the word before it
 
 
@@ -63,10 +62,8 @@ def find_emphases(text: str, language: str) -> Iterator[EmphasisedWords]:
             if has_small_letters:
                 yield from _in_capitals(line, start, (at, match.start()), language)
             at = match.end()
-            before = line[max(match.start() - _BEFORE, 0) : match.start()]
-            is_stage = is_direction(match[2], is_first=_SENTENCE_START.search(before) is not None)
             has_words = any(map(str.isalnum, match[2])) and match[2].count("(") == match[2].count(")")  # else footnotes
-            if has_words and (not is_stage or _SUBJECT.search(before)):
+            if has_words and not _is_narrated(line, match):
                 written = match[2]
                 for words in _in_capitals(line, 0, match.span(2), language) if has_small_letters else ():
                     first, last = words.start - match.start(2), words.end - match.start(2)
@@ -77,38 +74,11 @@ def find_emphases(text: str, language: str) -> Iterator[EmphasisedWords]:
         start += len(line)
 
 
-def is_direction(words: str, *, is_first: bool = False) -> bool:
-    """Whether words between asterisks say what somebody does, or how: a mood, a manner, a sound, or a verb (sighs).
-
-    Parameters
-    ----------
-    is_first
-        They begin a sentence, where also verbs are directions that are often emphasised elsewhere: takes, walks.
-    """
-    found = _WORD.findall(words.casefold())
-    if not found:
-        return False
-    is_moved = is_first and words[0].islower() and found[0] in _verbs("stage")
-    return is_moved or found[0] in _verbs("verb") or all(word in _direction_words() for word in found)
-
-
-@functools.cache
-def _verbs(kind: str) -> frozenset[str]:
-    """Verbs of directions, as they begin one: sighs, sighing."""
-    return frozenset(form for verb in read_table("directions.tsv")[kind][0].split() for form in _forms(verb))
-
-
-def _forms(verb: str) -> tuple[str, str, str]:
-    third = verb + "es" if verb.endswith(("sh", "ch", "ss")) else verb + "s"
-    third = verb[:-1] + "ies" if verb[-1] == "y" and verb[-2] not in "aeiou" else third
-    stem = verb.removesuffix("e")
-    return third, stem + "ing", stem + stem[-1] + "ing"
-
-
-@functools.cache
-def _direction_words() -> frozenset[str]:
-    table = read_table("directions.tsv")
-    return _verbs("verb") | frozenset(word for kind in ("noun", "mood", "manner") for word in table[kind][0].split())
+def _is_narrated(line: str, match: "re.Match[str]") -> bool:
+    """Whether a whole clause stands between asterisks: what happens (*the door creaks*), which nobody emphasises."""
+    words, before = match[2], line[max(match.start() - _BEFORE, 0) : match.start()]
+    is_clause = len(words.split()) >= MIN_NARRATED_WORDS and words[0].islower()
+    return is_clause and _SENTENCE_START.search(before) is not None and not _GOES_ON.match(line, match.end())
 
 
 def _in_capitals(line: str, start: int, span: tuple[int, int], language: str) -> Iterator[EmphasisedWords]:

@@ -4,8 +4,10 @@ Behind the name stand, in any order, the size as a number, the duration in secon
 with its degrees or without. ``[look left]`` is short for ``[look at left]``.
 """
 
+import functools
 import re
 
+from lexicon.errors import InputError
 from lexicon.gesture_names import DIRECTIONS, GESTURES, SIDES, gesture_name
 from lexicon.marked_text import GestureMark
 
@@ -17,6 +19,15 @@ _REST = re.compile(
     re.IGNORECASE,
 )
 _MAX_NAME_WORDS = 2
+
+
+@functools.lru_cache(maxsize=1000)
+def is_gesture(written: str) -> bool:
+    """Whether words between brackets are written as a gesture, also one with values out of range."""
+    try:
+        return parse_gesture(written, 0) is not None
+    except InputError:
+        return True
 
 
 def parse_gesture(written: str, at: int) -> GestureMark | None:

@@ -205,7 +205,7 @@ class MarkedTextBuilder:
         self._marks: list[Mark] = []
         self._open_spans: list[_OpenSpan] = []
         self._last_pause: tuple[int, PauseMark | None] = (0, None)
-        self._notes: dict[str, int] = {}  # with the line of the first
+        self._notes: dict[str, int | None] = {}  # with the line of the first
         self._foreign_styles: set[str] = set()
 
     @property
@@ -219,11 +219,11 @@ class MarkedTextBuilder:
         self._length += len(text)
         self._n_letters += len("".join(text.split()))
 
-    def note(self, text: str, line: int) -> None:
-        """Note what is not followed, once."""
+    def note(self, text: str, line: int | None = None) -> None:
+        """Note what is not followed, once; with its line in SSML."""
         self._notes.setdefault(text, line)
 
-    def add_pause(self, seconds: float, line: int) -> None:
+    def add_pause(self, seconds: float, line: int | None = None) -> None:
         """Add silence at the current position, as far as `MAX_PAUSE_S` reaches, with a note on the rest."""
         earlier = self._last_pause[1]
         room = MAX_PAUSE_S - (earlier.seconds if earlier is not None and earlier.at == self._length else 0.0)
@@ -316,6 +316,32 @@ class MarkedTextBuilder:
         """The last character so far; empty at the beginning."""
         return self._pieces[-1][-1:] if self._pieces else ""
 
+    @property
+    def last_visible(self) -> str:
+        """The last character so far that is no white space; empty without one."""
+        return next((piece.rstrip()[-1:] for piece in reversed(self._pieces) if not piece.isspace()), "")
+
+    def text_from(self, at: int) -> str:
+        """The text from a position on."""
+        pieces: list[str] = []
+        start = self._length
+        for piece in reversed(self._pieces):
+            if start <= at:
+                break
+            start -= len(piece)
+            pieces.append(piece[max(at - start, 0) :])
+        return "".join(reversed(pieces))
+
+    def close_open(self) -> None:
+        """End the innermost open span; one without words has no effect."""
+        last = self._open_spans.pop()
+        self._start_run(replace(last.before, start=self._length))
+
+    @property
+    def open_span(self) -> str:
+        """How the innermost open span is written; empty without one."""
+        return self._open_spans[-1].shown if self._open_spans else ""
+
     def close(self, kind: str, shown: str) -> None:
         """End the innermost open span.
 
@@ -326,10 +352,13 @@ class MarkedTextBuilder:
         """
         if not self._open_spans:
             raise InputError(f"{shown} has no opening mark; add one, or remove it")
-        last = self._open_spans.pop()
-        if last.kind != kind:
+        last = self._open_spans[-1]
+        if last.kind == kind:
+            self._open_spans.pop()
+        else:
             raise InputError(f"{shown} comes before the end of {last.shown}; close {last.shown} first")
         if self._length == last.start and self._runs[-1].styles != last.before.styles:
+            self._start_run(replace(last.before, start=self._length))
             raise InputError(f"{last.shown[:200]} contains no text; add words before its end")
         if last.seconds is not None and self._n_letters > last.first_letter:
             pace = last.seconds / (self._n_letters - last.first_letter)
@@ -354,7 +383,9 @@ class MarkedTextBuilder:
             merged = replace(run, language=None) if run.language and run.language == base_language else run
             if not runs or not runs[-1].is_spoken_as(merged):
                 runs.append(merged)
-        notes = [f"SSML, line {line}: {text}" for text, line in [*self._notes.items()][:MAX_NOTES]]
+        notes = [
+            text if line is None else f"SSML, line {line}: {text}" for text, line in [*self._notes.items()][:MAX_NOTES]
+        ]
         styles = frozenset(self._foreign_styles)
         return MarkedText("".join(self._pieces), tuple(runs), tuple(self._marks), language, tuple(notes), styles)
 

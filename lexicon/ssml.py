@@ -21,6 +21,9 @@ from xml.parsers import expat
 
 from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE
+from lexicon.inline_marks import Cue, Rules, Text, read_words
+from lexicon.mark_cues import PlacedCue, with_cues
+from lexicon.mark_table import MarkTable, shipped_marks
 from lexicon.marked_text import MAX_NESTING, GestureMark, MarkedText, MarkedTextBuilder, NameMark, PhoneMark
 from lexicon.say_as import reads_kind, say_as
 from lexicon.ssml_leniency import (
@@ -45,7 +48,6 @@ from lexicon.ssml_values import (
 )
 from lexicon.tones import Tone
 
-_MARK = re.compile(r"\[/?(?:style|nod|pause)\b")
 _TIME = re.compile(r"\+?([0-9]{1,9}(?:\.[0-9]{1,9})?|\.[0-9]{1,9})\s*(ms|s)", re.IGNORECASE)
 # Emphasis (`Tone.emphasis`) and nod size of each level: nods are the visual cue of stress (Krahmer and Swerts 2007,
 # J. Memory and Language 57).
@@ -64,7 +66,9 @@ def typical_hz(_: str | None, __: str) -> float:
     return TYPICAL_HZ
 
 
-def parse_ssml(text: str, language: str = DEFAULT_LANGUAGE, voice_hz: VoiceHz = typical_hz) -> MarkedText:
+def parse_ssml(
+    text: str, language: str = DEFAULT_LANGUAGE, voice_hz: VoiceHz = typical_hz, table: MarkTable | None = None
+) -> MarkedText:
     """Parse an SSML document into a marked text.
 
     Parameters
@@ -73,11 +77,13 @@ def parse_ssml(text: str, language: str = DEFAULT_LANGUAGE, voice_hz: VoiceHz = 
         Language of the text, where no element sets another.
     voice_hz
         By which pitches in Hz become semitones.
+    table
+        Marks of people and language models, of which emoji and directions are read within SSML, too.
     """
     # The parser is expat; declarations in a document type are refused, and without them there are no entities to
     # expand or fetch. Attributes are short (`MAX_ATTRIBUTE_CHARACTERS`), so that parsing is linear in the length of the
     # document.
-    reader = _SsmlReader(language, voice_hz)
+    reader = _SsmlReader(language, voice_hz, table or shipped_marks())
     try:
         return reader.read(text)
     except expat.ExpatError as broken:
@@ -94,7 +100,8 @@ def parse_ssml(text: str, language: str = DEFAULT_LANGUAGE, voice_hz: VoiceHz = 
 class _SsmlReader:
     """Handlers of the elements of one document."""
 
-    def __init__(self, language: str, voice_hz: VoiceHz) -> None:
+    def __init__(self, language: str, voice_hz: VoiceHz, table: MarkTable) -> None:
+        self._table, self._cues = table, list[PlacedCue]()
         self._builder = MarkedTextBuilder()
         self._elements: list[str] = []
         self._spans: list[str] = []  # for each element the kind of its span, or empty
@@ -147,7 +154,7 @@ class _SsmlReader:
         """Parse the whole document."""
         # XML allows nothing before its declaration
         self._parser.Parse(with_plain_entities(text.removeprefix("\ufeff").lstrip()), True)
-        return self._builder.build(self._language, base_language=self._base)
+        return with_cues(self._builder.build(self._language, base_language=self._base), self._cues, self._base)
 
     def _note(self, text: str) -> None:
         self._builder.note(text, self.line)
@@ -206,14 +213,22 @@ class _SsmlReader:
             return
         if inside in {"break", "mark"} and text.strip():
             raise InputError(f"<{inside}> cannot contain text; close it before {text.strip()[:20]!r}")
-        if _MARK.search(text):
-            raise InputError(
-                "marks in square brackets cannot be combined with SSML; use <break>, <emphasis> or <express-as>"
-            )
         if inside in REPLACED_KINDS:
             self._replaced_text.append(text)
         else:
-            self._add_text(text)
+            self._add_words(text)
+
+    def _add_words(self, text: str) -> None:
+        """Add text with the emoji and directions in it; marks of this project are left out."""
+        for part in read_words(text, Rules(self._base, self._table), self._builder.last_character):
+            if isinstance(part, Cue):
+                self._cues.append(PlacedCue(self._builder.at, part))
+                self._builder.add_pause(sum(mark.pause_s for mark in part.marks), self.line)
+                self._builder.add_text(part.said)
+            elif isinstance(part, Text):
+                self._add_text(part.said)
+            else:
+                self._note("marks in square brackets are left out of SSML; use <break>, <emphasis> or <express-as>")
 
     def _speak(self, attributes: Attributes) -> None:
         self._language = attributes.get(LANGUAGE)

@@ -19,7 +19,7 @@ from tts2face.exclusions import check_exclusions
 from tts2face.option import check_choices, check_option_limits, option
 
 AUTO_MARKUP = "auto"
-MARKUPS = (AUTO_MARKUP, "plain", "ssml")  # as `lexicon.text_marks.MARKUPS`, which is not loaded for flags
+MARKUPS = (AUTO_MARKUP, "plain", "ssml", "llm")  # as `lexicon.text_marks.MARKUPS`, which is not loaded for flags
 RECOGNISED = "phones"
 AUDIO_MAP_NAMES = (RECOGNISED, "voices", "network", "linear")
 IDLE_LIMITS_S = (0.1, 3600.0)
@@ -49,8 +49,8 @@ class SourceOptions:
     text: str = option("", "Text to speak.")
     markup: str = option(
         AUTO_MARKUP,
-        "How the text is read: auto (as SSML if it begins with <speak, else with its marks), plain (no marks), or ssml "
-        "(also without <speak> around it).",
+        "How the text is read: auto (as SSML if it begins with <speak, else with its marks, emoji and Markdown), plain "
+        "(no marks), ssml (also without <speak> around it), or llm (as auto, for the text of a language model).",
         choices=MARKUPS,
     )
     audio: Path | None = option(

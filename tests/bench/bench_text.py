@@ -108,6 +108,14 @@ def _sentence_verdict(row: Row, column: str) -> Verdict:
     return Verdict(row["kind"], row["text"], f"{' '.join(said)} {sounds}".strip(), row[column], is_right)
 
 
+def _marked_verdict(row: Row, markup: str) -> Verdict:
+    """What is spoken of a text with the marks of people and language models; letters may be joined or apart."""
+    said = spoken_words(pronounce_marked(parse_marks(row["text"].replace("\\n", "\n"), markup=markup)).words)
+    answers = [_plain(answer) for answer in row["spoken"].split(ALTERNATIVES)]
+    is_right = any("".join(said) == "".join(own) for own in answers)
+    return Verdict(row["kind"], row["text"], " ".join(said), row["spoken"], is_right)
+
+
 def _difference(a: str, b: str) -> float:
     """Distance of two names: primary stress counts, as do vowels but for weak ones, which hardly differ."""
     if not (a[-1].isdigit() and b[-1].isdigit()):
@@ -180,6 +188,8 @@ KINDS: dict[str, Callable[[Row], Verdict]] = {
     "homographs_2": _reading_verdict,
     "words": _word_verdict,
     "languages": _language_verdict,
+    "llm": lambda row: _marked_verdict(row, "llm"),
+    "marks": lambda row: _marked_verdict(row, "auto"),
 }
 
 

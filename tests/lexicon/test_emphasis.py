@@ -4,7 +4,6 @@ import time
 
 import pytest
 
-from lexicon.emphasis import is_direction
 from lexicon.given_phones import pronounce_words
 from lexicon.marked_text import GestureMark
 from lexicon.sentences import split_sentences
@@ -143,18 +142,6 @@ def test_emphasis_divides_no_sentence_and_changes_no_other() -> None:
     assert len(first.utterances) == len(second.utterances) == 1
     assert first.utterances[0].text == "It is not so."
     assert (bool(first.utterances[0].words), second.utterances[0].words) == (True, ())
-
-
-@pytest.mark.parametrize(
-    ("words", "is_one"),
-    [
-        ("sighs", True), ("rolls eyes", True), ("laughing", True), ("cries", True), ("nervously", True),
-        ("happy", True), ("winning", False), ("very", False), ("not now", False), ("", False), ("nod", True),
-        ("think", False),
-    ],
-)  # fmt: skip
-def test_directions(words: str, is_one: bool) -> None:
-    assert is_direction(words) == is_one
 
 
 @pytest.mark.parametrize("piece", ["*a", "*a* ", "NOT so ", "**", "A B ", "*a b* [nod]"])

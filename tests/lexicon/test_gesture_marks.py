@@ -36,17 +36,7 @@ def test_gestures_are_marks(written: str, mark: dict) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    [
-        "[smiling]",
-        "[think about it]",
-        "[listen to me]",
-        "[brows]",
-        "[look 5 times]",
-        "[sighs]",
-        "[surprised]",
-        "[wink up]",
-        "[tilt left 20]",
-    ],
+    ["[think about it]", "[listen to me]", "[brows]", "[look 5 times]", "[smile at it]", "[wink up]", "[tilt left 20]"],
 )
 def test_other_words_in_brackets_are_text(text: str) -> None:
     assert parse_marks(f"so {text} here") == MarkedText(f"so {text} here")
@@ -55,20 +45,6 @@ def test_other_words_in_brackets_are_text(text: str) -> None:
 @pytest.mark.parametrize("separator", [" ", "-", "_", "  "])
 def test_names_are_written_in_several_ways(separator: str) -> None:
     assert {gesture_name(f" {name.replace('_', separator).title()} ") for name in GESTURES} == {*GESTURES}
-
-
-@pytest.mark.parametrize(
-    ("written", "reason"),
-    [
-        ("smile 5", "size of the gesture smile must lie between 0.1 and 2, not 5"),
-        ("sigh 90s", "duration of the gesture sigh must lie between 0.1 and 30 s, not 90 s"),
-        ("look at left 80", "direction left of the gesture look at in degrees must lie between -35 and 35, not 80"),
-        ("blink left", "gesture blink has no direction; remove it, or choose look_at"),
-    ],
-)
-def test_values_out_of_range_are_refused(written: str, reason: str) -> None:
-    with pytest.raises(InputError, match=reason):
-        parse_marks(f"so [{written}] here")
 
 
 def test_an_unknown_gesture_is_refused() -> None:

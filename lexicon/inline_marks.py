@@ -1,0 +1,376 @@
+"""Marks within the words of a text: tags, directions, emoji, emoticons, links, entities, and those of this project.
+
+``read_parts`` divides a text into parts, of which each is spoken, silent, or a mark; what looks like a mark and is none
+is spoken. The rule what is one stands here and in `lexicon.directions`, for every door.
+"""
+
+import functools
+import html
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+from lexicon.dictionary import word_set
+from lexicon.directions import Direction, find_direction
+from lexicon.emoji import EMOJI, emoji_word
+from lexicon.emphasis import SPACED
+from lexicon.function_words import is_function_word
+from lexicon.gesture_marks import FIRST_WORDS, is_gesture
+from lexicon.mark_table import MarkTable, TextMark
+from lexicon.markdown import PARAGRAPH_END, SENTENCE_END, Block, split_blocks
+
+MAX_TAIL = 40  # characters of what is spoken before a mark, and of what follows it
+MAX_QUOTED_CHARACTERS = 40
+# A bracket, one of the words, and the rest up to the closing bracket, which a mark must have; words with phones up to
+# their end. Each part ends where the next begins, so that the scan is linear.
+OWN_MARK = (
+    r"\[phoneme:(?P<phones>[^\[\]]*)\](?P<words>[^\[\]]*)\[/phoneme\]"
+    r"|\[(?P<name>/?(?:style|pause)\b|/nod\b|phoneme(?=:)|/phoneme(?=\]))(?P<rest>[^\[\]]*)(?P<end>\]?)"
+    rf"|\[(?P<gesture>(?i:{'|'.join(FIRST_WORDS)})(?![^\W_])[^\[\]]*)(?P<gesture_end>\]?)"
+)
+_URL = r"\([^()\s]{0,2000}(?:\([^()\s]{0,200}\)[^()\s]{0,200})?(?:\s+\"[^\"\n]{0,200}\")?\)"
+_ATTRIBUTES = r"(?P<attributes>(?:\s[^<>]{0,400})?)"
+_KINDS: Mapping[str, str] = MappingProxyType({
+    "escape": r"\\[*_#\[\]()~`>|!{}<-]",
+    "code": r"(?P<ticks>`{1,2})(?P<source>[^`\n]{1,500})(?P=ticks)|`+",
+    "link": rf"!?\[(?=[^\[\]\n]{{0,300}}\]{_URL})|(?<=[^\s\[])\]{_URL}|\[\^[\w-]{{1,20}}\]:?|<(?=https?://[^<>\s]{{1,500}}>)",
+    "entity": r"&(?:[A-Za-z][A-Za-z0-9]{1,31}|#[0-9]{1,7}|#[xX][0-9A-Fa-f]{1,6});",
+    "tag": rf"<(?P<closing>/?)(?P<element>[A-Za-z][\w:.-]{{0,40}}){_ATTRIBUTES}\s?/?>",
+    "struck": r"~~(?=\S)[^~\n]{1,300}~~",
+    "square": r"(?P<around>[*_~]{1,3}|)\[(?P<squared>[^\[\]\n]{1,80})\](?P=around)(?!\()",
+    "round": r"(?P<outside>[*_~]{1,3}|)\((?P<rounded>[^()\n]{1,80})\)(?P=outside)",
+    "star": rf"(?<!{SPACED})(?<!\*)(?P<stars>\*{{1,3}})(?![\s*(\[])(?P<starred>[^*\n]{{1,80}})(?<!\s)(?P=stars)"
+    rf"(?!{SPACED}|\*)",
+    "line": r"(?<!\w)(?P<lines>_{1,2})(?![\s_])(?P<lined>[^_\n]{1,80})(?<!\s)(?P=lines)(?!\w)",
+    "wave": r"(?<![\w~])~(?![\s~\d])(?P<waved>[^~\n]{1,80})(?<!\s)~(?![\w~])",
+    "emoji": EMOJI,
+    "hashtag": r"(?<![\w&#/])#(?=[^\W\d_])\w{1,100}",
+})  # fmt: skip
+_READ_BY_XML = frozenset(("escape", "code", "link", "entity", "tag", "struck", "hashtag"))
+# Tags of HTML and SSML whose content is spoken; those of the last two lines wrap what models say.
+_BREAKS: Mapping[str, str] = MappingProxyType({
+    **dict.fromkeys(("br", "li", "tr", "s", "sentence", "dt", "dd"), SENTENCE_END),
+    **dict.fromkeys(
+        ("p", "div", "ul", "ol", "table", "h1", "h2", "h3", "h4", "h5", "h6", "blockquote", "hr", "paragraph"),
+        PARAGRAPH_END,
+    ),
+})  # fmt: skip
+_PASSED = word_set(
+    "b i u s em strong small big sub sup mark del ins span font a abbr cite code pre kbd samp var q html body head "
+    "title section article header footer main nav img th td tbody thead details summary center strike tt label w token "
+    "speak voice lang audio phoneme say-as prosody emphasis express-as bookmark desc meta metadata lexicon lookup "
+    "answer response output final result message speech say text reply assistant user system content dialogue dialog "
+    "script narration "
+)
+_UNFOLLOWED = frozenset(["voice", "lang", "audio", "phoneme", "say-as", "prosody"])
+_MOOD_TAGS = word_set("emotion mood expression style tone feeling gesture action express-as")
+_VALUE = re.compile(r"(?:name|value|type|style|mood|emotion|kind)\s*=\s*[\"']?([\w -]{1,40})", re.IGNORECASE)
+_LENGTH = re.compile(r"(?:time|duration|seconds|length|value)\s*=\s*[\"']?([0-9]{1,3}(?:\.[0-9]{1,3})?)\s*(ms|s)?")
+_PAUSE_TAGS: Mapping[str, float] = MappingProxyType({"break": 0.4, "pause": 0.7, "silence": 0.7})
+_SENTENCE_START = re.compile(r"(?:\A|\n|\u2028|[.!?:…]['\"”’)]{0,3}\s)\s*\Z")
+_CLAUSE_START = re.compile(r"[.!?:…,;—–-]['\"”’)]{0,3}\s*\Z")
+_RIGHT_END = re.compile(rf"[ \t]*(?:\Z|[\n.!?…]|[\"“‘(\[*]?[^\W\d_a-zß-ÿ]|[\"“‘*_~\[<]|{EMOJI})")
+_CLOSE_END = re.compile(r"[ \t]*(?:\Z|[\n.!?…])")
+_SUBJECT = re.compile(r"(?:he|she|it|who|which|that|this|everyone|nobody)\s+\Z", re.IGNORECASE)  # she *looks* well
+_NEW_SENTENCE = re.compile(r"\s*[\"“‘]?(?!I\b)[^\W\d_a-zß-ÿ]")
+_LAST_WORD = re.compile(r"([^\W\d_]+)[\"'”’)]?\s*\Z")
+_CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Za-z])(?=[0-9])|_")
+_MATHS = re.compile(r"(?:[0-9]|(?<![^\W_])(?!I\b)[A-Za-z])\s*\Z")
+_GLUED = re.compile(r"[:;=]-?[()]")
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """Characters that are spoken, as written or others in their place (`said`)."""
+
+    start: int
+    end: int
+    said: str
+
+
+@dataclass(frozen=True, slots=True)
+class Silent:
+    """Characters that are not spoken, with a note on them or without."""
+
+    start: int
+    end: int
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """Characters in whose place a sentence or a paragraph ends."""
+
+    start: int
+    end: int
+    said: str
+
+
+@dataclass(frozen=True, slots=True)
+class Own:
+    """A mark of this project in square brackets, matched by `OWN_MARK`."""
+
+    start: int
+    end: int
+    match: "re.Match[str]"
+
+
+@dataclass(frozen=True, slots=True)
+class Cue:
+    """A mark of the table, which shows something.
+
+    Parameters
+    ----------
+    is_within
+        It belongs to the sentence in which it stands or that it ends (emoji), not to what follows (tags).
+    ends_style
+        It is the end of a tag: what follows is said without its style.
+    said
+        What stands in its place: a space between two words, or a full stop where it ends a sentence.
+    """
+
+    start: int
+    end: int
+    marks: tuple[TextMark, ...]
+    is_within: bool = False
+    ends_style: bool = False
+    said: str = ""
+
+
+Part = Text | Silent | End | Own | Cue
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """How marks are found: the language, the table, and whether the text is known to be a language model's."""
+
+    language: str
+    table: MarkTable
+    is_model: bool = False
+
+
+@functools.lru_cache(maxsize=8)
+def _pattern(emoticons: tuple[str, ...], left_out: frozenset[str] = frozenset()) -> "re.Pattern[str]":
+    """All kinds of marks but some, each a group of its name; longer emoticons first."""
+    longest = sorted(emoticons, key=len, reverse=True)
+    written = "|".join(
+        f"{re.escape(one)}(?![\\w\\\\/])" if one[-1].isalnum() else f"{re.escape(one)}(?!\\w)" for one in longest
+    )
+    kinds = {"own": OWN_MARK, "emoticon": rf"(?<![\w\\/])(?:{written})|{_GLUED.pattern}(?!\w)", **_KINDS}
+    return re.compile("|".join(f"(?P<{kind}>{pattern})" for kind, pattern in kinds.items() if kind not in left_out))
+
+
+def read_parts(text: str, rules: Rules) -> Iterator[Part]:
+    """Parts of a text in order, which cover it; in linear time."""
+    for _, parts in read_blocks(text, rules):
+        yield from parts
+
+
+def read_words(text: str, rules: Rules, before: str = "") -> Iterator[Part]:
+    """Parts of words within SSML, whose parser has read tags and entities; `before` is the last character before."""
+    scanner = _Scanner(text, rules, _READ_BY_XML)
+    scanner.speak(before)
+    yield from scanner.scan(0, len(text))
+
+
+def read_blocks(text: str, rules: Rules) -> Iterator[tuple[Block, list[Part]]]:
+    """Blocks of a text, with their parts."""
+    scanner = _Scanner(text, rules)
+    for block in split_blocks(text):
+        parts: list[Part] = []
+        for run in block.runs:
+            if run.kind == "words":
+                parts += scanner.scan(run.start, run.end)
+            elif run.kind == "end":
+                parts.append(End(run.start, run.end, run.value))
+                scanner.tail = "\n"
+            elif run.kind == "insert":
+                parts.append(Text(run.start, run.end, run.value))
+                scanner.speak(run.value)
+            else:
+                parts.append(Silent(run.start, run.end, run.value))
+        yield block, parts
+
+
+class _Scanner:
+    """Finds the marks in runs of words."""
+
+    def __init__(self, text: str, rules: Rules, left_out: frozenset[str] = frozenset()) -> None:
+        self._text, self._rules = text, rules
+        self._pattern = _pattern(tuple(rules.table.marks["emoticon"]), left_out)
+        self.tail = "\n"  # of what is spoken
+        self._readers: Mapping[str, Callable[[re.Match[str]], Part | None]] = {
+            "escape": lambda match: Text(*match.span(), match[0][1]),
+            "code": self._code,
+            "link": lambda match: Silent(*match.span()),
+            "entity": self._entity,
+            "tag": self._tag,
+            "struck": lambda match: Silent(*match.span()),
+            "square": lambda match: self._bracket(match, match["squared"]),
+            "round": self._parenthesis,
+            "star": lambda match: self._starred(match, match["starred"]),
+            "line": lambda match: self._starred(match, match["lined"]),
+            "wave": lambda match: self._starred(match, match["waved"]),
+            "emoji": self._emoji,
+            "emoticon": self._emoticon,
+            "hashtag": self._hashtag,
+            "own": self._own,
+        }
+
+    def scan(self, start: int, end: int) -> Iterator[Part]:
+        """Parts of the words from `start` to `end`."""
+        at = place = start
+        before = self.tail
+        while (match := self._pattern.search(self._text, place, end)) is not None:
+            self.tail = (before + self._text[max(at, match.start() - MAX_TAIL) : match.start()])[-MAX_TAIL:]
+            part = self._readers[str(match.lastgroup)](match)
+            if part is None:  # its first character is text, and behind it may be a mark
+                place = match.start() + 1
+                continue
+            if match.start() > at:
+                yield Text(at, match.start(), self._text[at : match.start()])
+            if isinstance(part, Cue):
+                part = replace(part, said=self._in_place_of(part))
+            if isinstance(part, Text | Cue):
+                self.speak(part.said)
+            elif isinstance(part, End):
+                self.tail = "\n"
+            yield part
+            at = place = part.end
+            before = self.tail
+        if end > at:
+            self.tail = before
+            self.speak(self._text[max(at, end - MAX_TAIL) : end])
+            yield Text(at, end, self._text[at:end])
+
+    def speak(self, said: str) -> None:
+        """Follow what is spoken."""
+        self.tail = (self.tail + said)[-MAX_TAIL:]
+
+    def _in_place_of(self, cue: Cue) -> str:
+        after = self._after(cue.end)
+        if cue.is_within and _NEW_SENTENCE.match(after) and (word := _LAST_WORD.search(self.tail)) is not None:
+            return ". " if not is_function_word(word[1]) else " "
+        return " " if self.tail[-1:].isalnum() and after[:1].isalnum() else ""
+
+    def _after(self, at: int) -> str:
+        return self._text[at : at + MAX_TAIL]
+
+    def _is_first(self) -> bool:
+        return _SENTENCE_START.search(self.tail) is not None
+
+    def _own(self, match: "re.Match[str]") -> Part | None:
+        if match["gesture"] is None:
+            if match["name"] and not match["end"]:
+                note = f"the mark [{match['name']} has no closing bracket; its words are spoken"
+                return Silent(match.start(), match.start() + 1, note)
+            return Own(*match.span(), match)
+        if not match["gesture_end"]:
+            return None
+        if self._text[match.end() : match.end() + 1] == "(":  # the label of a link
+            return Silent(match.start(), match.start() + 1)
+        if is_gesture(match["gesture"]):
+            return Own(*match.span(), match)
+        return self._bracket(match, match["gesture"])
+
+    def _code(self, match: "re.Match[str]") -> Part:
+        return Text(*match.span(), match["source"].strip()) if match["source"] else Silent(*match.span())
+
+    def _entity(self, match: "re.Match[str]") -> Part | None:
+        said = html.unescape(match[0])
+        return None if said == match[0] else Text(*match.span(), said.replace("\xa0", " "))
+
+    def _hashtag(self, match: "re.Match[str]") -> Part:
+        return Text(*match.span(), _CAMEL.sub(" ", match[0][1:]))
+
+    def _emoji(self, match: "re.Match[str]") -> Part:
+        mark = self._rules.table.emoji(match[0])
+        word = emoji_word(match[0], mark, self.tail, self._after(match.end()), self._rules.language)
+        if word:
+            return Text(*match.span(), f" {word} " if self.tail[-1:].isalnum() else f"{word} ")
+        return Cue(*match.span(), (mark,) if mark else (), is_within=True)
+
+    def _emoticon(self, match: "re.Match[str]") -> Part | None:
+        mark = self._rules.table.emoticon(match[0])
+        if mark is None:
+            return None
+        is_glued = self.tail[-1:].isalnum()
+        if is_glued and (not _GLUED.fullmatch(match[0]) or "(" in self.tail):
+            return None
+        if match[0][0] in "<:=" and _MATHS.search(self.tail) and not _GLUED.match(match[0]):
+            return None
+        if mark.word:
+            return self._emoji(match) if self._rules.table.emoji(match[0]) else self._loved(match, mark)
+        return Cue(*match.span(), (mark,), is_within=True)
+
+    def _loved(self, match: "re.Match[str]", mark: TextMark) -> Part:
+        word = emoji_word(match[0], mark, self.tail, self._after(match.end()), self._rules.language)
+        return Text(*match.span(), f"{word} ") if word else Cue(*match.span(), (mark,), is_within=True)
+
+    def _bracket(self, match: "re.Match[str]", words: str) -> Part | None:
+        found = self._direction(words, is_strict=False)
+        return None if found is None else Cue(*match.span(), found.marks)
+
+    def _parenthesis(self, match: "re.Match[str]") -> Part | None:
+        words = match["rounded"]
+        found = self._direction(words, is_strict=True)
+        if found is None:
+            return None
+        is_attribute = not found.is_verb and (word := _LAST_WORD.search(self.tail)) and is_function_word(word[1])
+        stands_alone = _CLAUSE_START.search(self.tail) or self._is_first() or _CLOSE_END.match(self._after(match.end()))
+        is_model = self._rules.is_model and not is_attribute
+        if not (stands_alone or is_model or (found.is_verb and " " not in words)):
+            return None
+        return Cue(*match.span(), found.marks)
+
+    def _starred(self, match: "re.Match[str]", words: str) -> Part | None:
+        found = self._direction(words, is_strict=False)
+        if found is None or _SUBJECT.search(self.tail):
+            return None
+        after, is_first = self._after(match.end()), self._is_first()
+        ends = _RIGHT_END.match(after) is not None
+        if not found.is_verb:
+            is_alone = is_first and ends
+        elif any(mark.gesture or mark.style for mark in found.marks):
+            is_alone = True
+        else:
+            is_alone = is_first or ends or _CLAUSE_START.search(self.tail) is not None
+        return Cue(*match.span(), found.marks) if is_alone else None
+
+    def _direction(self, words: str, *, is_strict: bool) -> Direction | None:
+        return find_direction(words.strip(" *_~"), self._rules.table, is_first=self._is_first(), is_strict=is_strict)
+
+    def _tag(self, match: "re.Match[str]") -> Part | None:
+        name, attributes = match["element"].casefold().rpartition(":")[2], match["attributes"]
+        span, closing = match.span(), bool(match["closing"])
+        if name in _BREAKS:
+            return End(*span, _BREAKS[name])
+        if name in _PAUSE_TAGS:
+            return Silent(*span) if closing else Cue(*span, (_pause(attributes, _PAUSE_TAGS[name]),))
+        if name in _MOOD_TAGS:
+            value = _VALUE.search(attributes)
+            found = self._direction(f"emotion: {value[1]}", is_strict=False) if value else Direction()
+            return Cue(*span, found.marks if found and not closing else (), ends_style=closing)
+        found = self._direction(name.replace("_", " ").replace("-", " "), is_strict=False)
+        if found is not None and not attributes.strip(" /"):
+            return Cue(*span, () if closing else found.marks, ends_style=closing)
+        return self._other_tag(match, name)
+
+    def _other_tag(self, match: "re.Match[str]", name: str) -> Part | None:
+        """A tag without an effect here, or words between < and >."""
+        span, closing, attributes = match.span(), bool(match["closing"]), match["attributes"]
+        shown = " ".join(match[0][:MAX_QUOTED_CHARACTERS].split())
+        if name in _PASSED:
+            is_noted = name in _UNFOLLOWED and not closing
+            return Silent(*span, f"{shown} is followed within <speak> alone; its text is spoken" if is_noted else "")
+        wraps = self._is_first() or self._after(match.end())[:1].isalnum()  # not <name> in a letter
+        if closing or "=" in attributes or match[0].endswith("/>") or (self._rules.is_model and wraps):
+            return Silent(*span, "" if closing else f"{shown} is no tag that is known; the text behind it is spoken")
+        return None if attributes.strip() else Text(*span, match[0][1:-1])
+
+
+def _pause(attributes: str, usual: float) -> TextMark:
+    length = _LENGTH.search(attributes)
+    seconds = float(length[1]) / (1000 if length[2] == "ms" else 1) if length else usual
+    return TextMark("pause", "tag", pause_s=min(seconds, 10.0))
