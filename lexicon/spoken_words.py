@@ -44,7 +44,8 @@ def reading_notes(text: str, language: str, markup: str = "auto", style: str | N
 
     Raises as `parse_marks`.
     """
-    if text.isascii() and markup != "ssml" and not is_ssml(text) and not is_auto(style):
+    is_plain = text.isascii() and markup != "ssml" and not is_ssml(text) and "[" not in text and "<" not in text
+    if is_plain and not is_auto(style):
         return ()
     marked = parse_marks(text, language, markup)
     readable, notes = make_readable(marked, language)

@@ -35,6 +35,11 @@ def is_ssml(text: str) -> bool:
     return _SSML.match(text) is not None
 
 
+def has_words(text: str) -> bool:
+    """Whether a text with marks has a word that is spoken."""
+    return any(map(str.isalnum, text)) and any(map(str.isalnum, _read_marks(text, Reading(has_emphasis=False)).text))
+
+
 @dataclass(frozen=True, slots=True)
 class Reading:
     """How a text is read.
@@ -44,7 +49,7 @@ class Reading:
     language
         Of the text, by which SSML reads numbers and selects voices.
     has_emphasis
-        Whether words that are typed with emphasis are said so; not those of a recording.
+        Whether words that are typed with emphasis are said so, and directions make pauses; not those of a recording.
     voice_hz
         By which SSML's pitches in Hz become semitones.
     table
@@ -127,7 +132,7 @@ class PartReader:
     """
 
     def __init__(self, text: str, rules: Rules, builder: MarkedTextBuilder, *, has_emphasis: bool = True) -> None:
-        self._text, self._builder = text, builder
+        self._text, self._builder, self._has_pauses = text, builder, has_emphasis
         self._emphases = [*find_emphases(text, rules.language)][::-1] if has_emphasis else []
         self.cues: list[PlacedCue] = []
 
@@ -148,7 +153,7 @@ class PartReader:
                 _read_mark(builder, part.match)
             case Cue():
                 self.cues.append(PlacedCue(builder.at, part))
-                builder.add_pause(sum(mark.pause_s for mark in part.marks))
+                builder.add_pause(sum(mark.pause_s for mark in part.marks) if self._has_pauses else 0.0)
                 builder.add_text(part.said)
 
 

@@ -37,8 +37,8 @@ DRAWN_FACE, REALISTIC_FACE = "ada", "head"  # the shipped face that is shown by 
 # Order of flags, of fields over HTTP and of lists in messages.
 ORDER = (
     "text", "markup", "audio", "audio_map", "language", "voice", "rate", "voice_pitch", "voice_range", "lead",
-    "plain_delivery", "volume", "seed", "dictionary", "synthesis", "context", "exemplars", "articulation", "fps",
-    "gestures", "style", "gain", "expression", "timeline", "pitch", "gaze", "idle", "listen", "partner",
+    "plain_delivery", "volume", "seed", "dictionary", "text_marks", "synthesis", "context", "exemplars", "articulation",
+    "fps", "gestures", "style", "gain", "expression", "timeline", "pitch", "gaze", "idle", "listen", "partner",
 )  # fmt: skip
 
 
@@ -287,6 +287,9 @@ class Request:
     )
     seed: int | None = option(None, "Seed of all random numbers, for equal sound and motion; default: the face's own.")
     dictionary: Path | None = option(None, "Pronunciation dictionary that takes precedence over the built-in one.")
+    text_marks: Path | None = option(
+        None, "Table of emoji, emoticons, tags and actions that precede those of `text_marks.tsv`, and what they show."
+    )
     synthesis: str = option(
         "exemplar",
         "Method of lip synthesis: exemplar, or theobald2007 (the method as published).",

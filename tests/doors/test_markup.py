@@ -30,9 +30,9 @@ def test_options_name_every_markup() -> None:
     assert tuple(text_marks.MARKUPS) == get_args(Markup) == MARKUPS
 
 
-@pytest.mark.parametrize("markup", ["llm", "SSML", ""])
+@pytest.mark.parametrize("markup", ["html", "SSML", ""])
 def test_an_unknown_markup_is_refused(markup: str) -> None:
-    with pytest.raises(InputError, match=f"there is no markup '{markup}'; choose auto, plain or ssml"):
+    with pytest.raises(InputError, match=f"there is no markup '{markup}'; choose auto, plain, ssml or llm"):
         Request(text="a", markup=markup)
 
 
@@ -78,7 +78,7 @@ def test_the_service_says_in_a_header_what_is_not_followed(table: TableProcess, 
         assert {name: spoken_request[name] for name in ("text", *prosody)} == {"text": FRAGMENT, **prosody}
         named = client.post("/v1/clips", json={"text": "<speak><ж>a</ж></speak>", "format": "wav"})
         assert "<?> is not supported" in named.headers[ADJUSTED]
-        for name, value in (("markup", "llm"), ("voice_pitch", 13), ("voice_range", -0.1)):
+        for name, value in (("markup", "html"), ("voice_pitch", 13), ("voice_range", -0.1)):
             assert client.post("/v1/clips", json={"text": "a", name: value}).status_code == 422
 
 

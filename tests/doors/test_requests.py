@@ -54,7 +54,7 @@ CHANGES = {
     "expression": "happy=0.6@0.2-0.9",
 }
 # tests/doors/test_audio.py changes these; idle animation, delivery and markup below
-ELSEWHERE = {"audio", "audio_map", "idle", "partner", "plain_delivery", "markup"}
+ELSEWHERE = {"audio", "audio_map", "idle", "partner", "plain_delivery", "markup", "text_marks"}
 
 
 def test_an_option_of_a_source_is_a_field_of_one_with_the_same_default() -> None:
@@ -109,7 +109,10 @@ def test_a_markup_changes_what_is_spoken(session: Session) -> None:
     text = 'Bob <break time="1s"/> may move.'
     seconds = {markup: session.clip(text, markup=markup).speech.waveform.duration for markup in ("auto", "ssml")}
     assert seconds["ssml"] == pytest.approx(1.0 + session.clip("Bob may move.").speech.waveform.duration, abs=0.4)
-    assert seconds["auto"] > seconds["ssml"]  # the brackets and what is in them are spoken
+    assert seconds["auto"] == seconds["ssml"]
+    assert session.clip(text, markup="plain").speech.waveform.duration > seconds["ssml"]  # the tag is spoken
+    aside = "Bob may (happy) move."
+    assert digest(session.clip(aside, markup="llm")) != digest(session.clip(aside))
     assert digest(session.clip("Bob may [nod] move.", markup="plain")) != digest(session.clip("Bob may [nod] move."))
 
 

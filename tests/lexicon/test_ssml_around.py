@@ -244,7 +244,7 @@ def test_a_plain_text_has_no_marks(text: str) -> None:
 
 
 def test_an_unknown_markup_is_refused() -> None:
-    with pytest.raises(InputError, match="there is no markup 'html'; choose auto, plain, ssml"):
+    with pytest.raises(InputError, match="there is no markup 'html'; choose auto, plain, ssml, llm"):
         parse_marks("a", markup="html")
 
 

@@ -42,8 +42,8 @@ STATE_BYTES = 200_000  # of a stream between two pieces
 POLL_S = 0.005  # between turns of other requests, while gestures are drawn
 # Options that the key of a piece has by what they change: its sound, its times, its timeline or its lips.
 KEYED_OTHERWISE = {
-    *SOURCE_OPTIONS, "language", "dictionary", "synthesis", "context", "exemplars", "style", "gain", "expression",
-    "timeline", "gaze",
+    *SOURCE_OPTIONS, "language", "dictionary", "text_marks", "synthesis", "context", "exemplars", "style", "gain",
+    "expression", "timeline", "gaze",
 }  # fmt: skip
 KEYED = tuple(name for name in OPTIONS if name not in KEYED_OTHERWISE)
 Drawn = tuple[GestureValues, GestureStream | NoiseStream]  # gestures of a piece, and the stream for the piece after it

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
+from lexicon.mark_table import read_marks_table
 from lexicon.marked_text import GestureMark
 from lexicon.moods import is_auto
 from lexicon.pauses import pause_behind
-from lexicon.sentence_length import n_letters
 from lexicon.spoken_words import reading_notes
 from lexicon.ssml_leniency import nearest_style
 from lexicon.text_marks import parse_marks
@@ -32,10 +32,9 @@ from tts2face.models.face import Face
 from tts2face.models.talker import speech_channels
 from tts2face.request import Idle, Listening, Request, Spoken
 from tts2face.session.joining import END_S, JOIN_LEAD_S
-from tts2face.session.prepared import prepare
+from tts2face.session.prepared import PreparedRequest, gesture_of, prepare, unknown_styles
 from tts2face.session.recording import select_audio_map
 from tts2face.session.shared_models import SessionModels
-from tts2face.session.speech import gesture_of
 from tts2face.session.speech_stream import Piece, after_listening
 from tts2face.session.steps import pieces_from
 from tts2face.sound.features import FEATURE_RATE
@@ -269,6 +268,7 @@ class LiveSpeech:
         if not isinstance(request.source, Spoken) or request.source.text or request.timeline is not None:
             raise InputError("a live request has options only; send its text in parts")
         self._request, self._models = request, models
+        self._table = read_marks_table(request.text_marks)
         self._spoken = request.source
         self._silent = replace(request, source=Idle(UNUSED_IDLE_S), dictionary=None)
         self._layer = models.gesture_layer(prepare(self._silent))
@@ -279,6 +279,7 @@ class LiveSpeech:
         self._cues: list[float] = []  # seconds of the clip at which the face responds
         self._waiting: list[GestureMark] = []
         self._shown: list[ShownGesture] = []
+        self._notes: list[str] = []
         self._moves_until = 0.0  # seconds of the clip at which the last gesture ends
 
     @property
@@ -314,10 +315,9 @@ class LiveSpeech:
 
         Gestures of a text without words are those of the next piece.
         """
-        marked = parse_marks(text, self.language, self.markup)
-        alone = [mark for mark in marked.marks if isinstance(mark, GestureMark)]
-        if alone and not n_letters(marked.text):
-            return self.gesture(*alone)
+        marked = parse_marks(text, self.language, self.markup, table=self._table)
+        if text.strip() and not any(map(str.isalnum, marked.text)):
+            return self.gesture(*(mark for mark in marked.marks if isinstance(mark, GestureMark)))
         spoken = replace(self._spoken, text=text)
         spoken = after_listening(spoken) if self._has_listened else spoken
         self._has_listened = False
@@ -393,7 +393,7 @@ class LiveSpeech:
     def _append(
         self, request: Request, listening: Timeline | None = None, *, is_speech: bool = False
     ) -> Iterator[Piece]:
-        prepared = self._models.with_own_styles(prepare(request, self._models.person))
+        prepared = self._models.with_own_styles(self._without_unknown(prepare(request, self._models.person)))
         waiting = [*self._waiting]
         if is_speech:
             prepared = replace(prepared, text=replace(prepared.text, marks=(*waiting, *prepared.text.marks)))
@@ -406,6 +406,22 @@ class LiveSpeech:
             self._note_gestures(piece, waiting)
             waiting = []
             yield piece
+
+    def _without_unknown(self, prepared: PreparedRequest) -> PreparedRequest:
+        """A text without marks of styles that the palette lacks, which are noted."""
+        palette, text = self._models.palette, prepared.text
+        unknown = unknown_styles(text, palette.names) if palette is not None else ()
+        self._notes += [
+            f"there is no style {name[:40]!r}; its words keep the style around them"
+            for name in unknown
+            if name not in text.foreign_styles
+        ]
+        return replace(prepared, text=replace(text, foreign_styles=text.foreign_styles | {*unknown}))
+
+    def notes(self) -> list[str]:
+        """What of the marks since the last call is not followed, beside what the reading of the text notes."""
+        notes, self._notes = self._notes, []
+        return notes
 
     def _note_gestures(self, piece: Piece, waiting: Sequence[GestureMark]) -> None:
         """Note when gestures of a piece are made; those that waited do so no longer."""

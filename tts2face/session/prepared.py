@@ -10,27 +10,29 @@ from typing import TYPE_CHECKING, Any
 from lexicon.dictionary import read_dictionary
 from lexicon.errors import InputError
 from lexicon.foreign_words import make_readable
+from lexicon.gesture_names import GESTURES
 from lexicon.ipa import IpaPhone
 from lexicon.languages import language_code
-from lexicon.marked_text import PITCH_LIMITS, RANGE_LIMITS, RATE_LIMITS, VOLUME_LIMITS, MarkedText
+from lexicon.mark_table import read_marks_table
+from lexicon.marked_text import PITCH_LIMITS, RANGE_LIMITS, RATE_LIMITS, VOLUME_LIMITS, GestureMark, MarkedText
 from lexicon.moods import is_auto, with_moods
 from lexicon.scripts import check_readable
-from lexicon.sentence_length import check_silence
-from lexicon.sentences import Sentence, split_sentences
+from lexicon.sentence_length import check_silence, marked_silence_s
+from lexicon.sentences import MAX_LAST_GESTURE_S, Sentence, split_sentences
 from lexicon.sequence import PhoneSequence
 from lexicon.ssml_leniency import nearest_style
 from lexicon.ssml_prosody import semitones_factor
 from lexicon.text_marks import parse_marks
 from lexicon.values.checks import check_limits
 from lexicon.values.files import is_file
-from tts2face.gestures.elements import ExpressionSpan, Gains, ListeningSpan
+from tts2face.gestures.elements import ExpressionSpan, Gains, Gesture, ListeningSpan
 from tts2face.gestures.listening import CUE_RATE, cue_times, responses
 from tts2face.gestures.timeline import Timeline, parse_expressions, parse_gains, parse_style
 from tts2face.gestures.timeline_file import read_timeline
 from tts2face.lips.options import METHOD_OPTIONS, ExcludedToken, SynthesisOptions
 from tts2face.models.person import Person
 from tts2face.picture.options import Picture
-from tts2face.request import CAMERA, Listening, Recorded, Request, Source, Spoken, option_fields
+from tts2face.request import CAMERA, IDLE_LIMITS_S, Idle, Listening, Recorded, Request, Source, Spoken, option_fields
 from tts2face.session.corrections import SentenceEdges, StaleEdgesError
 from tts2face.session.joining import Excerpt
 from tts2face.sound.fitting import Fitting, fitting_voice
@@ -44,6 +46,7 @@ if TYPE_CHECKING:
 
 HEARING_STEPS, RECORDING_STEPS = 300, 700  # steps of progress of a recording: until its phones are known, and then
 IDLE_STEPS = 1000  # steps of progress of idle animation
+SILENT_S = 0.5  # of a text without words, as of the pause behind a sentence
 OF_VIDEO = "video"  # expression of the person in the video of a recording
 SMILE_S = 10.0  # of its beginning are read
 
@@ -147,10 +150,10 @@ def prepare(request: Request, person: Person | None = None) -> PreparedRequest:
     Raises
     ------
     InputError
-        The text has no word or characters that the language does not read, a mark or a gesture option is invalid, or
-        the recording does not exist.
+        There is no text, it has characters that the language does not read, a gesture option is invalid, or the
+        recording does not exist.
     DataError
-        The timeline file or the dictionary is invalid.
+        The timeline file, the dictionary or the table of marks is invalid.
     """
     source = request.source
     for path in recordings(source).values():
@@ -174,9 +177,30 @@ def prepare(request: Request, person: Person | None = None) -> PreparedRequest:
         return prepared
     check_readable(text, request.language)
     check_marks(written, request)
-    if next(prepared.sentences(), None) is None:
+    if next(prepared.sentences(), None) is not None:
+        return prepared
+    if isinstance(source, Recorded) or not source.text.strip():
         raise InputError(f"there is nothing to say in {source.text[:40]!r}; give at least one word")
-    return prepared
+    return _silent(prepared)
+
+
+def _silent(prepared: PreparedRequest) -> PreparedRequest:
+    """A request whose text has no word, as silence with the gestures and the pauses of its marks."""
+    request, source = prepared.request, prepared.request.source
+    gestures = [mark for mark in prepared.text.marks if isinstance(mark, GestureMark)]
+    moving_s = max((mark.seconds or GESTURES[mark.name].seconds for mark in gestures), default=0.0)
+    seconds = max(SILENT_S, min(moving_s, MAX_LAST_GESTURE_S), marked_silence_s(prepared.text))
+    timeline = Timeline(gestures=tuple(gesture_of(mark, 0.0) for mark in gestures))
+    silent = replace(source, then=None) if isinstance(source, Listening) else Idle(min(seconds, IDLE_LIMITS_S[1]))
+    return replace(
+        prepared, request=replace(request, source=silent), text=MarkedText(""),
+        listening=prepared.listening.merge(timeline),
+    )  # fmt: skip
+
+
+def gesture_of(mark: GestureMark, time: float) -> Gesture:
+    """The gesture of a mark, at a second."""
+    return Gesture(time, mark.name, mark.size, mark.seconds, mark.down_deg, mark.left_deg)
 
 
 def read_marks(request: Request, person: Person | None = None) -> MarkedText:
@@ -192,7 +216,8 @@ def read_marks(request: Request, person: Person | None = None) -> MarkedText:
         return usual_pitch_hz(named, language) * semitones_factor(pitch)
 
     language, has_emphasis = request.language, spoken is not None
-    return parse_marks(source.text, language, request.markup, has_emphasis=has_emphasis, voice_hz=voice_hz)
+    table = read_marks_table(request.text_marks)
+    return parse_marks(source.text, language, request.markup, has_emphasis=has_emphasis, voice_hz=voice_hz, table=table)
 
 
 def recordings(source: Source) -> dict[str, Path]:
@@ -262,6 +287,7 @@ def input_paths(request: Request, picture: Picture) -> dict[str, AnyPath]:
     return {
         **recordings(request.source),
         "dictionary": request.dictionary,
+        "text marks": request.text_marks,
         "timeline": request.timeline,
         "voice": voice,
         "voice settings": f"{voice}.json" if voice else None,
@@ -284,13 +310,21 @@ def marked_styles(text: MarkedText) -> tuple[str, ...]:
     return tuple(dict.fromkeys(style for styles in runs for style in innermost_styles(styles).values()))
 
 
+def unknown_styles(text: MarkedText, names: Sequence[str]) -> tuple[str, ...]:
+    """Styles in the marks of a text that a palette with these names lacks, and that stand for none of it."""
+    used = dict.fromkeys(name for run in text.runs for name in run.styles)
+    return tuple(
+        name for name in used if not all(style in names or nearest_style(style) for style in parse_style(name).values())
+    )
+
+
 def with_styles_of(prepared: PreparedRequest, names: Sequence[str]) -> PreparedRequest:
     """A request whose marks name styles of a palette, and not those of a speech service that are none of it."""
     text = prepared.text
     known = {
         name: name if name in names else nearest_style(name) or name
         for name in {name for run in text.runs for name in run.styles}
-        if name in names or name not in text.foreign_styles
+        if name in names or nearest_style(name) or name not in text.foreign_styles
     }
     runs = [replace(run, styles=tuple(known[name] for name in run.styles if name in known)) for run in text.runs]
     return replace(prepared, text=replace(text, runs=tuple(runs)))

@@ -25,7 +25,7 @@ FORMAT, VERSION = "tts2face project", 2
 FIRST_FACE = "head"  # that files of version 1 mean where they name none
 PROJECT_SUFFIX = ".json"
 # Options that name files; their paths are relative to the folder of the project.
-REQUEST_FILES = ("audio", "partner", "dictionary", "voice")
+REQUEST_FILES = ("audio", "partner", "dictionary", "text_marks", "voice")
 MODEL_FILES = ("talker", "face", "palette")
 PICTURE_FILES = ("background",)
 Options = TypeVar("Options", Request, Models, Picture)

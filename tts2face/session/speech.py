@@ -17,7 +17,7 @@ from lexicon.sentence_length import n_letters
 from lexicon.sentences import Phrase, Sentence, index_by_letters
 from lexicon.sequence import PhoneSequence, WordSpan
 from lexicon.sources import written_groups
-from tts2face.gestures.elements import Gesture, StyleSpan, span_weights
+from tts2face.gestures.elements import StyleSpan, span_weights
 from tts2face.gestures.timeline import Timeline
 from tts2face.numeric.arrays import FloatArray
 from tts2face.request import Request
@@ -42,7 +42,7 @@ from tts2face.session.phrase_delivery import (
     speak_phrase,
     text_of,
 )
-from tts2face.session.prepared import innermost_styles
+from tts2face.session.prepared import gesture_of, innermost_styles
 from tts2face.sound.delivery import sound_with
 from tts2face.sound.level import level_speech
 from tts2face.sound.voice import ExpectingVoice, Voice, apply_volume
@@ -335,11 +335,6 @@ def resolve_marks(
     gestures = tuple(gesture_of(mark, times.onset(mark.at)) for mark in marks if isinstance(mark, GestureMark))
     names = tuple(MarkTime(mark.name, times.onset(mark.at)) for mark in marks if isinstance(mark, NameMark))
     return Timeline(spans=tuple(spans), gestures=gestures), names
-
-
-def gesture_of(mark: GestureMark, time: float) -> Gesture:
-    """The gesture of a mark, at a second."""
-    return Gesture(time, mark.name, mark.size, mark.seconds, mark.down_deg, mark.left_deg)
 
 
 def resolve_recording_marks(

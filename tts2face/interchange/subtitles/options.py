@@ -23,6 +23,8 @@ class SubtitleOptions:
         Kinds of what is shown and not said that are spoken nevertheless, of `KINDS`.
     speakers
         Whether names before a colon are speakers; else they are words.
+    markup
+        Of the words, as of a request; tags of cues that are ``ssml`` are kept.
     fps
         Frames a second of times that are written in frames; None: as the file or its film says.
     track
@@ -41,6 +43,7 @@ class SubtitleOptions:
     language: str | None = None
     keep: tuple[str, ...] = ()
     speakers: bool = True
+    markup: str = "auto"
     fps: float | None = None
     track: str | None = None
     shift: float = 0.0

@@ -152,7 +152,9 @@ def _timed(
     cues: list[Cue] = []
     left_out: list[tuple[str, int, str]] = []
     for number, (cue, is_said) in enumerate(zip(written, said, strict=True)):
-        text = spoken_text(cue.text, cue.markup, keep=options.keep, speakers=speakers)
+        text = spoken_text(
+            cue.text, cue.markup, keep=options.keep, speakers=speakers, is_document=options.markup == "ssml"
+        )
         if is_said:
             left_out += [(kind, cue.line, words) for kind, words in text.left_out]
         else:

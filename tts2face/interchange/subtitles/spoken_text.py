@@ -4,7 +4,7 @@ import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from lexicon.text_marks import is_ssml
+from lexicon.text_marks import has_words, is_ssml
 from tts2face.interchange.subtitles.cues import CuePart
 from tts2face.interchange.subtitles.labels import divided_at_labels, split_label, without_manners
 from tts2face.interchange.subtitles.markup import SUBRIP_MARKUP, Markup, plain_text
@@ -71,6 +71,7 @@ def spoken_text(
     *,
     keep: Collection[str] = (),
     speakers: Collection[str] | None = None,
+    is_document: bool = False,
 ) -> SpokenText:
     """Divide the text of a cue into words, tags, noises, lyrics and speakers.
 
@@ -84,8 +85,10 @@ def spoken_text(
         Kinds of what is not said, annotations and lyrics, that are spoken nevertheless.
     speakers
         Keys of the labels of the file; None: names in capitals.
+    is_document
+        The text is SSML, also without ``<speak>`` around it.
     """
-    if markup.has_tags and is_ssml(written):
+    if markup.has_tags and (is_document or is_ssml(written)):
         document = " ".join(written.split())
         return SpokenText(document, " ".join(plain_text(written, markup).split()), (CuePart("", document),), ())
     is_dialogue = markup.has_tags and len({name.strip() for name in _VOICE.findall(written)}) > 1
@@ -103,7 +106,7 @@ def spoken_text(
             parts.append((speaker, []))
         parts[-1][1].append(rest)
     spoken = [CuePart(speaker, " ".join(" ".join(words).split())) for speaker, words in parts]
-    spoken = [part for part in spoken if any(character.isalnum() for character in part.text)]
+    spoken = [part for part in spoken if has_words(part.text)]
     shown = " ".join(re.sub(r"\x02[^\x02\x03]*\x03", "", plain).split())
     return SpokenText(" ".join(part.text for part in spoken), shown, tuple(spoken), left_out)
 

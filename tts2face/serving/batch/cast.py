@@ -43,7 +43,7 @@ NOT_IN_CAST: Mapping[str, str] = MappingProxyType({  # options, with the reason
     "expression": "its times are those of one clip", "lead": "the cues have their time",
 })  # fmt: skip
 REQUEST_NAMES = tuple(name for name in OPTIONS if name not in NOT_IN_CAST)
-PATH_NAMES = ("talker", "face", "palette", "voice", "dictionary")
+PATH_NAMES = ("talker", "face", "palette", "voice", "dictionary", "text_marks")
 MAX_CAST_BYTES = 1_000_000
 
 

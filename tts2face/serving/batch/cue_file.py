@@ -14,7 +14,8 @@ def read_cue_file(path: Path, options: BatchOptions, request: Request, track: Pa
     """Cues of a file; a recording of the whole file (`track`) gives the length of the film and its frames a second."""
     film = None if track is None else film_facts(track)
     # the default language says nothing about a file
-    return read_subtitles(path, options.encoding, options.subtitle_options(non_defaults(request).get("language"), film))
+    choices = options.subtitle_options(non_defaults(request).get("language"), film, request.markup)
+    return read_subtitles(path, options.encoding, choices)
 
 
 def left_out_cues(subtitles: Subtitles) -> list[Cue]:

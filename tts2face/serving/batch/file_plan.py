@@ -31,7 +31,7 @@ from tts2face.types import SOUND_RATE, exact_rate, first_sample
 
 MAX_IDLE_S = 20.0  # of one segment of silence
 MARGIN_S = 0.5  # around a cue, for speech of a dubbing track that begins early or ends late; half of shorter gaps
-NOT_WHEN_SILENT = {*SOURCE_OPTIONS, "dictionary", "language"}
+NOT_WHEN_SILENT = {*SOURCE_OPTIONS, "dictionary", "text_marks", "language"}
 PUNCTUATED_SHARE = 0.4  # of the cues of a file in capitals that end a sentence: then a missing end mark means something
 
 
@@ -384,7 +384,7 @@ class FilePlan:
     def _file_hashes(self, segment: Segment) -> Mapping[str, str]:
         if segment.audio_begin is not None:
             return segment.input_hashes()
-        names = ("audio", "dictionary", "voice", "style")
+        names = ("audio", "dictionary", "text_marks", "voice", "style")
         key = repr((segment.models, [segment.request.get(name) for name in names]))
         if key not in self._hashes:
             check_names(segment.models, segment.request)

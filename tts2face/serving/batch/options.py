@@ -11,7 +11,7 @@ from tts2face.interchange.exports.table import batch_format
 from tts2face.interchange.subtitles.film_track import Film
 from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.option import option
-from tts2face.request import option_fields
+from tts2face.request import AUTO_MARKUP, option_fields
 
 MOVIE_FORMATS = ("mp4", "webm", "mov", "none")
 CLIP_UNITS = ("cue", "scene", "file", "film")
@@ -95,12 +95,15 @@ class BatchOptions:
         if self.audio is not None and not self.audio.is_dir():
             raise InputError(f"there is no folder of recordings {self.audio}; check the path")
 
-    def subtitle_options(self, language: str | None = None, film: Film | None = None) -> SubtitleOptions:
-        """Choices of the reader of subtitles, with what is known besides: the language of the words, and their film."""
+    def subtitle_options(
+        self, language: str | None = None, film: Film | None = None, markup: str = AUTO_MARKUP
+    ) -> SubtitleOptions:
+        """Choices of the reader of subtitles, with what is known besides: how their words are read, and their film."""
         return SubtitleOptions(
             language=language,
             keep=self.keep,
             speakers=self.speakers,
+            markup=markup,
             fps=self.subtitle_fps or (None if film is None else film.fps),
             track=self.track,
             shift=self.shift,

@@ -22,7 +22,7 @@ MOVIE = "movie"
 ALPHA_MOVIE = "vp9"
 TRACK = "track"
 FILE_PREFIX = "file."  # of the medium of a whole clip in a format of `Session.stream_file`
-REQUEST_FILES = ("audio", "partner", "dictionary", "voice", "timeline")
+REQUEST_FILES = ("audio", "partner", "dictionary", "text_marks", "voice", "timeline")
 OPTIONAL = ("hair", "hair_color", "person")  # of models; not part of the addresses of segments without them
 
 

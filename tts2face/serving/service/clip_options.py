@@ -64,7 +64,7 @@ EXAMPLES: Mapping[str, Any] = MappingProxyType({
 # Options that a door does not take, with the reason.
 NOT_IN_CLIPS: Mapping[str, str] = MappingProxyType({
     "audio": "a part of the form", "partner": "a part of the form", "timeline": "a part of the form",
-    "renderer": "the operator's machine draws",
+    "renderer": "the operator's machine draws", "text_marks": "a file of the operator's",
 })  # fmt: skip
 COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
 MODEL_KINDS = ("talker", "face", "palette")

@@ -165,6 +165,8 @@ class LiveTask:
                 yield Event({"type": "note", "text": sentence, "message": note})
             for piece in self._speech.say(sentence):
                 begin = piece.begin + self._idle_s
+                for note in self._speech.notes():
+                    yield Event({"type": "note", "text": sentence, "message": note})
                 yield _speech_event(piece, begin)
                 yield from self._shown_gestures()
                 yield _sound(piece.clip)

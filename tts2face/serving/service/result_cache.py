@@ -26,6 +26,7 @@ FILE_FIELDS = (
     "partner",
     "timeline",
     "dictionary",
+    "text_marks",
     "background",
 )  # whose files are read while a result is made
 

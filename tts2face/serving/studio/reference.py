@@ -19,7 +19,7 @@ RECORDING = "recording"
 TAKE = "take"
 KINDS = (KEPT, SETTINGS, RECORDING, TAKE)
 NOT_SETTINGS = frozenset(
-    {"text", "audio", "idle", "listen", "partner", "timeline", "dictionary"}
+    {"text", "audio", "idle", "listen", "partner", "timeline", "dictionary", "text_marks"}
 )  # what is said stays the same
 MAX_LABEL = 100
 MAX_OFFSET_S = 3600.0

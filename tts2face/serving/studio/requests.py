@@ -24,7 +24,7 @@ from tts2face.session.named_models import Models
 from tts2face.session.project import Project
 from tts2face.session.project_file import parse_project, project_json
 
-FILE_OPTIONS = ("audio", "dictionary", "timeline")  # of a request
+FILE_OPTIONS = ("audio", "dictionary", "text_marks", "timeline")  # of a request
 TASKS = tuple(f"tts2face.serving.studio.{module}:TASKS" for module in ("tasks", "comparison_tasks", "style_tasks"))
 OPTION_PARTS = frozenset({"request", "models", "picture"})
 

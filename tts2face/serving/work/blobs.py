@@ -25,7 +25,7 @@ from tts2face.storage.user_folders import user_cache
 HASH = re.compile(r"[0-9a-f]{64}")
 CACHE_BYTES = 4 << 30  # of local copies of a bucket
 MODEL_PATHS = ("talker", "face", "palette", "hair", "dictionary")
-REQUEST_PATHS = ("audio", "timeline", "dictionary", "voice")
+REQUEST_PATHS = ("audio", "timeline", "dictionary", "text_marks", "voice")
 
 
 class MissingBlobError(BackendError):
