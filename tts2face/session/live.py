@@ -418,8 +418,8 @@ class LiveSpeech:
         ]
         return replace(prepared, text=replace(text, foreign_styles=text.foreign_styles | {*unknown}))
 
-    def notes(self) -> list[str]:
-        """What of the marks since the last call is not followed, beside what the reading of the text notes."""
+    def style_notes(self) -> list[str]:
+        """Styles in marks since the last call that the palette lacks."""
         notes, self._notes = self._notes, []
         return notes
 

@@ -165,7 +165,7 @@ class LiveTask:
                 yield Event({"type": "note", "text": sentence, "message": note})
             for piece in self._speech.say(sentence):
                 begin = piece.begin + self._idle_s
-                for note in self._speech.notes():
+                for note in self._speech.style_notes():
                     yield Event({"type": "note", "text": sentence, "message": note})
                 yield _speech_event(piece, begin)
                 yield from self._shown_gestures()
