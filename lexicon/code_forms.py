@@ -3,7 +3,7 @@
 import re
 
 from lexicon import written_forms as readings
-from lexicon.dictionary import cmudict_lookup, named_pronunciation, own_pronunciation
+from lexicon.dictionary import cmudict_lookup, named_pronunciation, own_pronunciation, word_set
 from lexicon.english import is_initialism
 from lexicon.informal_words import informal_word, is_common, plain_word, tag_words
 from lexicon.kept_signs import BACKSLASH, HOME, UNDERSCORE
@@ -28,6 +28,12 @@ FILE_ENDING = (
 _PIECE = re.compile(r"[^\W\d_]+|[0-9]+|[^\w\s]|_")
 _HUMP = re.compile(r"[A-Z]{2,}(?![a-z])|[A-Z]?[a-z]+|[A-Z]")
 _TAG_PIECE = re.compile(r"[A-Z]{2,}(?![a-z])|[A-Z]?[^\W\d_A-Z]+|[A-Z]|[0-9]+|[^\W\d_]+")
+# Last words of identifiers of two; other words with a capital inside are brands (DeepSeek), which are one word.
+_CODE_NOUNS = word_set(
+    "Error Exception Handler Manager Service Controller Factory Request Response Button View Test List Set Array Type "
+    "Class Object Event Listener Builder Model Config Context Client Server Provider Node Info Name Key Value Queue "
+    "Stream Reader Writer Parser Table Field Filter Thread Buffer Loader Helper Component"
+)
 KEYS = r"(?:[Cc]trl|CTRL|[Cc]ontrol|[Aa]lt|ALT|[Ss]hift|SHIFT|[Cc]md|CMD|[Cc]ommand|[Ww]in|[Ff]n|[Oo]ption|⌘)"
 _KEY_NAMES = {"ctrl": "control", "cmd": "command", "del": "delete", "esc": "escape", "ins": "insert", "win": "windows"}
 
@@ -142,7 +148,8 @@ def read_identifier(m: re.Match[str], _: str) -> str:
     if own_pronunciation(written) or named_pronunciation(written) or cmudict_lookup(written):
         return written
     humps = _HUMP.findall(written)
-    if len(humps) < 2 or "".join(humps) != written:
+    is_code = len(humps) > 2 or written[:1].islower() or humps[-1] in _CODE_NOUNS
+    if len(humps) < 2 or "".join(humps) != written or not is_code:
         return written
     words = [hump if is_initialism(hump) and len(hump) > 1 else informal_word(hump.lower()) for hump in humps]
     is_known = all(len(word) > 1 and (word.isupper() or is_common(word)) for word in words)

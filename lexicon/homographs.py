@@ -15,6 +15,7 @@ from lexicon.ipa import IpaPhone
 from lexicon.part_of_speech import tag_words
 from lexicon.pauses import MARKS
 from lexicon.verb_tense import tense_tag
+from lexicon.word_class import CLASSES, class_of_tag, class_probabilities
 from lexicon.word_parts import add_s
 
 NEAR_WORDS = 9  # words on each side that are searched for evidence
@@ -32,7 +33,7 @@ _BEFORE_VERB = word_set(
 )
 _ADVERBS = word_set("never always ever just not also still already often sometimes")
 _PRONOUNS, _HAVE = word_set("i you he she it we they"), word_set("have has had haven't hasn't hadn't")
-_BEFORE_NOUN = word_set("the a an this these those my your his her its our their every each no any some")
+_BEFORE_NOUN = word_set("the a an my your his its our their every no")
 _BEFORE_PREPOSITION = word_set("from due thanks according access addition next close back of")  # to is no infinitive's
 
 
@@ -91,26 +92,40 @@ def homograph_segments(words: Sequence[str], places: Iterable[int]) -> dict[int,
         if len(readings) > 1:
             tags = tags or tag_words(tuple(words))
             tense = tense_tag(tags, lower, at) if _is_past_like_present(readings) else ""
-            tag = tense or _likely_tag(tags[at], lower, at)
+            tag = tense or _likely_tag(tags, lower, at, _classes(readings))
             readings = (max(readings, key=lambda reading: _evidence(reading, lower, at, tag, is_sure=tense != "")),)
         if readings:
             found[at] = readings[0].segments
     return found
 
 
-def _likely_tag(tag: str, lower: Sequence[str], at: int) -> str:
-    """The tagger's tag, corrected where the word before allows only a verb or only a noun."""
+def _classes(readings: Sequence[Reading]) -> frozenset[str]:
+    """Classes to which the readings of a word belong; all if a reading has no tag."""
+    if not all(reading.tags for reading in readings):
+        return frozenset(CLASSES)
+    return frozenset(class_of_tag(tag) for reading in readings for tag in reading.tags)
+
+
+def _likely_tag(tags: Sequence[str], lower: Sequence[str], at: int, classes: frozenset[str]) -> str:
+    """The tagger's tag, or that of the class of the word that the words around it make likelier."""
+    tag = tags[at]
     place = at - 1
-    first = max(at - NEAR_WORDS, 0)
-    while place > first and (lower[place] in _ADVERBS or lower[place].endswith("ly")):
+    while place > max(at - NEAR_WORDS, 0) and (lower[place] in _ADVERBS or lower[place].endswith("ly")):
         place -= 1
     before, two_before = (lower[place] if place >= 0 else ""), (lower[place - 1] if place > 0 else "")
     if before in _HAVE or (before in _PRONOUNS and two_before in _HAVE):  # have never read, have you read
         return "VBN" if tag.startswith("VB") else tag
     is_infinitive = before != "to" or two_before not in _BEFORE_PREPOSITION
-    if before in _BEFORE_VERB and is_infinitive and not tag.startswith("VB"):
-        return "VB"
-    return "NN" if before in _BEFORE_NOUN and tag in {"VB", "VBP", "VBZ"} else tag
+    if before in _BEFORE_VERB and is_infinitive:
+        return tag if tag.startswith("VB") else "VB"
+    probabilities = class_probabilities(lower, tags, at)
+    if before in _BEFORE_NOUN:
+        classes = classes - {"VB"} or classes
+    probabilities *= [name in classes for name in CLASSES]
+    likeliest = CLASSES[int(probabilities.argmax())]
+    if likeliest == class_of_tag(tag):
+        return tag
+    return likeliest
 
 
 def _is_past_like_present(readings: Sequence[Reading]) -> bool:
@@ -123,7 +138,7 @@ def _evidence(reading: Reading, lower: Sequence[str], at: int, tag: str, *, is_s
     if is_sure:
         return score
     before = lower[at - 1] if at else "."
-    after = lower[at + 1] if at + 1 < len(lower) else "."
+    after = lower[at + 1].removesuffix("'s") if at + 1 < len(lower) else "."
     score += _NEIGHBOUR_WEIGHT * (
         (before in reading.before) + ((after if after not in MARKS else ".") in reading.after)
     )
