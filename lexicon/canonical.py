@@ -120,15 +120,19 @@ def canonical_text(text: str, *, keep_marks: bool = False) -> str:
     of `signs_before_vowels`.
     """
     text = _ABOUT.sub("about ", _AREA_CODE.sub(r"\1-", text))
+    text = text.translate(_translation_table()) if text.isascii() else _canonical_letters(text, keep_marks=keep_marks)
+    for pattern, replacement in _STEPS:
+        text = pattern.sub(replacement, text)
+    return _PUNCTUATION_RUN.sub(_strongest_mark, text).strip(" ,;:—").lstrip("… ")
+
+
+def _canonical_letters(text: str, *, keep_marks: bool) -> str:
+    """A text whose characters are canonical one by one: NFKC, and the table; of ASCII only the table is needed."""
     text = _SUPERSCRIPT.sub(lambda run: "^" + unicodedata.normalize("NFKC", run.group()).replace("−", "-"), text)
     text = _ANGLED.sub(r" \1 ", text)
     text = _VULGAR.sub(r" \1", text).translate(_translation_table())
     # translated before and after: NFKC itself makes characters of the table, and would lose superscripts
     text = unicodedata.normalize("NFKC", text).translate(_translation_table())
-    if not keep_marks:
-        text = unicodedata.normalize("NFKC", _MARKS.sub("", text)).translate(_translation_table())
-    else:
-        text = signs_before_vowels(text)
-    for pattern, replacement in _STEPS:
-        text = pattern.sub(replacement, text)
-    return _PUNCTUATION_RUN.sub(_strongest_mark, text).strip(" ,;:—").lstrip("… ")
+    if keep_marks:
+        return signs_before_vowels(text)
+    return unicodedata.normalize("NFKC", _MARKS.sub("", text)).translate(_translation_table())

@@ -4,7 +4,7 @@ import re
 
 from lexicon import written_forms as readings
 from lexicon.dictionary import cmudict_lookup, named_pronunciation, own_pronunciation, word_set
-from lexicon.english import is_initialism
+from lexicon.english import MAX_SPELLED_LETTERS, is_initialism
 from lexicon.informal_words import informal_word, is_common, plain_word, tag_words
 from lexicon.kept_signs import BACKSLASH, HOME, UNDERSCORE
 from lexicon.number_words import digit_words, number_words
@@ -72,7 +72,9 @@ def _spelled_or_word(text: str) -> str:
     small = text.lower()
     if small in _READ:
         return _READ[small]
-    return _letters(small) if _SPELLED.fullmatch(small) else _unambiguous(small)
+    if _SPELLED.fullmatch(small):
+        return _letters(small)
+    return _unambiguous(text if text.isupper() and len(text) <= MAX_SPELLED_LETTERS else small)
 
 
 def read_address(m: re.Match[str], _: str) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from lexicon import written_forms as readings
 from lexicon.dictionary import word_set
+from lexicon.informal_words import informal_word
 from lexicon.number_contexts import words_in_context
 from lexicon.number_words import cardinal_words, digit_words, number_words, ordinal_words, roman_value, year_words
 from lexicon.pauses import MARKS
@@ -74,9 +75,14 @@ def read_month_first(m: re.Match[str], _: str) -> str:
     month = readings.month_number(m["mf"])
     day = int(m["mfd"])
     last = m["mfy"] or ""
-    if 1 <= day <= 31:
+    if m["mfto"] and day < int(m["mfto"]) <= 31:
+        year = f", {year_words(int(last))}" if last else ""
+        return f"{readings.date_words(day, month, '')} to {ordinal_words(int(m['mfto']))}{year}"
+    if 1 <= day <= 31 and not m["mfto"]:
         return readings.date_words(day, month, last)
-    return f"{readings.MONTHS[month - 1]} {number_words(m['mfd'])}" + (f", {year_words(int(last))}" if last else "")
+    words = f"{readings.MONTHS[month - 1]} {number_words(m['mfd'])}"
+    words += f" to {number_words(m['mfto'])}" if m["mfto"] else ""
+    return words + (f", {year_words(int(last))}" if last else "")
 
 
 def read_month_year(m: re.Match[str], _: str) -> str:
@@ -190,8 +196,9 @@ def read_packs(m: re.Match[str], _: str) -> str:
 
 def read_per(m: re.Match[str], _: str) -> str:
     """The /kg of $3/kg is per kilogram."""
-    short = {"mo": "month", "wk": "week", "yr": "year"}
-    return f"per {readings.unit_words(m['per'], is_one=True) if m['per'] else short.get(m['perword'], m['perword'])}"
+    if m["per"]:
+        return f"per {readings.unit_words(m['per'], is_one=True)}"
+    return f"per {_RATES.get(m['perword'], m['perword'])}"
 
 
 def read_short_name(m: re.Match[str], _: str) -> str:
@@ -277,6 +284,10 @@ _SCORED = re.compile(
 )
 _OUT_OF = frozenset({"5", "10", "20", "50", "100"})  # of which marks are given
 _ALONE_AFTER = re.compile(r"\s*(?:[.,;:!?)]|\Z)|,? (?:on|in|for|from|by|and|but|at|with|to|so|because|this|last)\b")
+_PEOPLE_AFTER = re.compile(
+    r" (?!miles|cups|inches|feet|pounds|ounces|\w*spoons|acres|lit|met|pints|quarts|yards|hours|seconds|times)"
+    r"(?:people|men|women|children|[a-z]{3,}s)\b"
+)
 _EQUATION = re.compile(r"\s*[=+×÷*<>≤≥-]\s*[0-9a-z]")
 _PRESSURES = (range(60, 261), range(30, 161))  # mmHg, of the heart's beat and between two
 
@@ -302,6 +313,8 @@ def _relation(m: re.Match[str], top: int, bottom: int) -> str:
         return "over"
     if top >= 30 and bottom <= 10 and not _EQUATION.match(m.string, m.end()):
         return "for"
+    if m["bottom"] in _OUT_OF and top < bottom and _PEOPLE_AFTER.match(m.string, m.end()):
+        return "out of"
     is_mark = m["bottom"] in _OUT_OF and top < bottom and _ALONE_AFTER.match(m.string, m.end())
     return "out of" if is_mark and _SCORED.search(_before(m)) else ""
 
@@ -402,9 +415,30 @@ def read_slashed(m: re.Match[str], _: str) -> str:
     return known[m.group()]
 
 
+# Times behind a slash, by which something is counted.
+_RATES = {"mo": "month", "wk": "week", "yr": "year", "hr": "hour", "min": "minute", "sec": "second"}
+_RATES |= {name: name for name in ("day", "night", "person")}
+
+
 def read_either(m: re.Match[str], _: str) -> str:
-    """input/output is input output, AC/DC AC DC."""
-    return f"{m['either']} {m['other']}"
+    """Input/output is input output, AC/DC AC DC, bits/second bits per second."""
+    unit = _RATES.get(m["other"], m["other"])
+    if m["either"].endswith("s") and unit in _RATES.values():
+        return f"{m['either']} per {unit}"
+    third = f" {m['third'][1:]}" if m["third"] else ""
+    return f"{informal_word(m['either'])} {informal_word(m['other'])}{third}"
+
+
+def read_rate(m: re.Match[str], _: str) -> str:
+    """The mg/dL of "in mg/dL" is milligrams per deciliter."""
+    return readings.unit_words(m.group())
+
+
+def read_season(m: re.Match[str], _: str) -> str:
+    """2023/24 is twenty twenty-three twenty-four."""
+    year, following = int(m["year"]), int(m["next"])
+    is_next = following == (year + 1) % 100
+    return f"{year_words(year)}{' ' if is_next else ' over '}{cardinal_words(following)}"
 
 
 def read_unchanged(m: re.Match[str], _: str) -> str:

@@ -75,7 +75,7 @@ def read_stutter(m: re.Match[str], _: str) -> str:
     """W-w-what is what, I-I I I; t-test is none."""
     written = m.group()
     first, word = m["stutter"], m["stuttered"]
-    if written.lower() in _COMPOUNDS:
+    if written.lower() in _COMPOUNDS or word.lower().startswith("shape"):
         return written
     if word.lower() == first.lower():
         return f"{first} {word}" if first in {"I", "a"} else written

@@ -15,8 +15,8 @@ _SIGN_OF = MappingProxyType({
 })  # fmt: skip
 OVER = "∕"  # the bar of a fraction behind a bracket
 _WRITTEN = str.maketrans(dict(_SIGN_OF))
-_SIGNS = re.compile('["”″|★⭐\\\\*_−–—⁺⁻!/~-]')
-_ANY = re.compile(r"[\"”″|★⭐\\*]|[0-9a-zA-Z)°%]\)?\s?[-–—−!/]|~/|_|[⁺⁻]")
+_SIGNS = re.compile("['’`\"”″|★⭐\\*_−–—⁺⁻!/~-]")
+_ANY = re.compile(r"[0-9]['’]|`|[\"”″|★⭐\\*]|[0-9a-zA-Z)°%]\)?\s?[-–—−!/]|~/|_|[⁺⁻]")
 _DAY = r"(?:(?:Mon|Tues?|Wed|Thu(?:rs?)?|Fri|Sat|Sun)\b\.?|(?:Mon|Tues|Wednes|Thurs|Fri|Satur|Sun)days?\b)"
 _MONTH = (
     r"(?:(?:Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sept?|Oct|Nov|Dec)\b\.?|"
@@ -31,11 +31,13 @@ _SCORE = re.compile(
 )
 _RANGE_BEFORE = re.compile(
     r"\b(?:pages?|pp\.|chapters?|ages?|aged|grades?|weeks?|days?|years?|from|between|lines?|rows?|verses?|items?|steps?|"
-    r"floors?|rooms?|numbers?|sections?|parts?|vols?\.|nos?\.|figs?\.|\d\s?(?:[ap]m)?)\s*\Z",
+    r"floors?|rooms?|numbers?|sections?|parts?|vols?\.|nos?\.|figs?\.|(?:jan|feb|mar|apr|may|june?|july?|aug|sept?|oct|nov|dec)[a-z]*\.?|\d\s?(?:[ap]m)?)\s*\Z",
     re.IGNORECASE,
 )
 _PLAIN = str.maketrans("²³", "23")
 _CONTEXT = 60  # characters before a dash between spaces that decide what it is
+_SINGLE = re.compile("['’‘]")
+_ELISION = re.compile(r"(?:em|cause|til|tis|twas|bout|round|n)\b|[0-9]0s\b", re.IGNORECASE)
 _QUOTES = re.compile(r"[\"”″“]|''")
 
 
@@ -59,6 +61,21 @@ def _minus(m: re.Match[str]) -> str:
 
 def _charge(m: re.Match[str]) -> str:
     return m[1].translate(_PLAIN) + ("+" if m[2] == "⁺" else MINUS)
+
+
+def _without_closing_quotes(text: str) -> str:
+    """A text without the single quotes that end a quotation behind a number, which are no marks of feet."""
+    pieces, at, is_open = [], 0, False
+    for quote in _SINGLE.finditer(text):
+        before, after = text[quote.start() - 1 : quote.start()], text[quote.end() : quote.end() + 1]
+        if is_open and before.isalnum() and not after.isalnum():
+            is_open = False
+            if before.isdigit():
+                pieces += [text[at : quote.start()], " "]
+                at = quote.end()
+        elif not before.isalnum() and after.isalnum() and not _ELISION.match(text, quote.end()):
+            is_open = True
+    return "".join([*pieces, text[at:]])
 
 
 def _with_inches(text: str) -> str:
@@ -108,7 +125,7 @@ _STEPS: tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...]
     ),
     # x - 1, n-1, 2 - x
     (re.compile(r"(?<![\w'’.-])([kmnpqrtxyz]) [-–−] (?=[0-9(]|[a-z]\b)|(?<![\w'’.-])([kmnxyz])[-−](?=[0-9])"), _minus),
-    (re.compile(r"(?<=[0-9)]) ?[-−] ?(?=[kmnxyz]\b(?![-'’.]))"), f" {MINUS} "),
+    (re.compile(r"(?<=[0-9)])(?: [-−] (?=[kmnxyz]\b(?![-'’.]))|[-−](?=[knxyz]\b(?![-'’.])))"), f" {MINUS} "),
 )
 
 
@@ -116,6 +133,7 @@ def keep_signs(text: str) -> str:
     """An English text with stand-ins for the signs that are spoken; the text itself if it has none."""
     if not (_SIGNS.search(text) and _ANY.search(text)):
         return text
+    text = _without_closing_quotes(text.replace("`", " "))
     for pattern, replacement in _STEPS:
         text = pattern.sub(replacement, text)
     return _with_inches(text)

@@ -63,6 +63,12 @@ def _unit_pattern() -> str:
     return rf"(?:(?:{words})(?:/(?:{words}))?(?![\w^/'])|{signs})"
 
 
+def _rate_pattern() -> str:
+    """Two units with a slash, without a number: in mg/dL, km/h."""
+    words = "|".join(unit for unit in sorted(readings.read_table("units.tsv"), key=len, reverse=True) if unit.isalpha())
+    return rf"(?:{words})/(?:{words})(?![\w^/'-])"
+
+
 def _letter_unit_pattern() -> str:
     """Units with a letter that occurs in no English word (μm, kΩ)."""
     units = [unit for unit in readings.read_table("units.tsv") if len(unit) > 1 and set(unit) & set("μΩ")]
@@ -105,6 +111,15 @@ def _form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         ("file", "a0", rf"{_LABEL}\.{codes.FILE_ENDING}(?!\w|\.\w)", codes.read_path),
         ("tag", ".", r"[#@](?=[0-9_]{0,60}[^\W\d_])\w{1,140}", codes.read_hashtag),
         ("slashed", "a", r"and/or\b|w/o\b|w/(?= )|[nN]/[aA]\b|b/c\b|c/o\b", forms.read_slashed),
+        ("rate", "a", rf"{_START}{_rate_pattern()}", forms.read_rate),
+        ("parting", ".", r"(?<=[A-Z][0-9])/(?=[A-Z][0-9])", forms.read_nothing),
+        ("season", "0", r"(?P<year>(?:19|20)[0-9]{2})/(?P<next>[0-9]{2})(?![\w/])", forms.read_season),
+        (
+            "either",
+            "a",
+            r"(?<![/\w])(?!d[A-Za-z]/d)(?P<either>[^\W\d_]{2,30}|[A-Z])/(?P<other>[^\W\d_]{2,30}|[A-Z])(?P<third>/[^\W\d_]{2,30})?(?![\w/.-]\w|\w)",
+            forms.read_either,
+        ),
         (
             "path",
             "a.",
@@ -135,7 +150,7 @@ def _form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         (
             "digits",
             "0",
-            r"[0-9]{1,5}(?:-[0-9]{1,7}){3,4}(?:-X)?(?![\w-])|[0-9]{5}-[0-9]{4}(?![\w-])"
+            r"(?=(?:[0-9]-?){9}(?:[0-9]-?){0,3}[0-9X](?![\w-]))[0-9]{1,5}(?:-[0-9]{1,7}){2,4}(?:-X)?(?![\w-])|[0-9]{5}-[0-9]{4}(?![\w-])"
             r"|[0-9]{4}(?: [0-9]{4}){3}(?![0-9])|(?<=ISSN )[0-9]{4}-[0-9]{3}[0-9X](?!\w)|(?<=ISBN )[0-9]{9,13}X?(?!\w)",
             contexts.read_digits,
         ),
@@ -143,8 +158,8 @@ def _form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         (
             "monthday",
             "a",
-            rf"(?P<mf>{_MONTH}) (?P<mfd>[0-9]{{1,2}})(?:st|nd|rd|th)?(?![\w:/%-]|[.,][0-9])"
-            r"(?:,? (?P<mfy>[12][0-9]{3})(?![\w-]|[.,:][0-9]))?",
+            rf"(?P<mf>{_MONTH}) (?P<mfd>[0-9]{{1,2}})(?:st|nd|rd|th)?(?:[–-](?P<mfto>[0-9]{{1,2}})(?![0-9]))?"
+            r"(?![\w:/%-]|[.,][0-9])(?:,? (?P<mfy>[12][0-9]{3})(?![\w-]|[.,:][0-9]))?",
             forms.read_month_first,
         ),
         ("monthyear", "a", rf"(?P<my>{_MONTH}),? (?P<myy>[12][0-9]{{3}})(?![\w-]|[.,:][0-9])", forms.read_month_year),
@@ -271,7 +286,7 @@ def _form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         (
             "over",
             ".",
-            r"(?:(?<=[\s(+×=-][b-hj-z])|(?<=^[b-hj-z])|(?<=π))/(?=[0-9]|[b-hj-z]\b|delta\b|π)"
+            r"(?:(?<=[\s(+×=-][b-hj-z])|(?<=\bd[A-Za-z])(?=/d[a-z]\b)|(?<=^[b-hj-z])|(?<=π))/(?=[0-9]|d?[b-hj-z]\b|delta\b|π)"
             r"|(?<=[0-9])/(?=[kmnxyz]\b|π)",
             formulas.read_over,
         ),
@@ -336,12 +351,6 @@ def _form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
             "a",
             rf"{_START}(?=[A-Z]?[a-z]{{1,30}}[A-Z])[A-Za-z]{{4,60}}(?!\w|['-]\w)",
             codes.read_identifier,
-        ),
-        (
-            "either",
-            "a",
-            r"(?P<either>[^\W\d_]{2,30}|[A-Z])/(?P<other>[^\W\d_]{2,30}|[A-Z])(?![\w/.-]\w|\w)",
-            forms.read_either,
         ),
         ("word", "a", rf"{_LETTERS}(?:['-]{_LETTERS})*", codes.read_word),
         ("bar", ".", "∣", formulas.read_bar),
