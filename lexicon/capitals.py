@@ -37,7 +37,7 @@ _TITLES_ALONE = frozenset({"Dr", "Mr", "Mrs", "Ms", "St"})  # also without a nam
 _MAX_SPELLED_LETTERS = 3
 # Abbreviations of four letters and more that dictionaries read as words.
 READ_ACRONYMS = word_set(
-    "ADAC AIPAC ARPA ASCAP ASCII ASEAN AWACS AWOL BAFTA BIOS CERN CMOS COBOL COVID DARPA DEFCON DRAM EBITDA EPCOT ESPN "
+    "ADAC AIPAC ARPA ASCAP ASCII ASEAN AWACS AWOL BAFTA BIOS CERN CMOS COBOL COVID DARPA DEFCON EBITDA EPCOT ESPN "
     "FAFSA FEMA FICA FIFA FLOTUS FOMO GATT HAMAS HIPAA ICANN IKEA INTERPOL JPEG JSON LASER LEGO LIBOR LINUX MENSA MERS "
     "MPEG NAFTA NASCAR NASDAQ NIMBY NORAD OECD OPEC OSHA OXFAM PAYPAL POTUS RADAR RICO SARS SCOTUS SCUBA SONAR SONY "
     "SWAT UEFA UNESCO UNICEF UNIX USAID VISA YAML YMCA YOLO"
@@ -98,6 +98,7 @@ def is_word_in_capitals(word: str, before: str) -> bool:
         plain in _initialisms()
         or is_acronym(plain)
         or plain in READ_ACRONYMS
+        or plain in readings.read_table("informal_words.tsv")
         or (plain == "WHO" and before.lower() == "the")
     ):
         return False

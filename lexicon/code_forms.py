@@ -34,6 +34,7 @@ _CODE_NOUNS = word_set(
     "Class Object Event Listener Builder Model Config Context Client Server Provider Node Info Name Key Value Queue "
     "Stream Reader Writer Parser Table Field Filter Thread Buffer Loader Helper Component"
 )
+_CODE_SHORT = word_set("int str num obj idx len args img btn msg ctx src init func var")
 KEYS = r"(?:[Cc]trl|CTRL|[Cc]ontrol|[Aa]lt|ALT|[Ss]hift|SHIFT|[Cc]md|CMD|[Cc]ommand|[Ww]in|[Ff]n|[Oo]ption|⌘)"
 _KEY_NAMES = {"ctrl": "control", "cmd": "command", "del": "delete", "esc": "escape", "ins": "insert", "win": "windows"}
 
@@ -137,13 +138,6 @@ def read_color(m: re.Match[str], previous: str) -> str:
     return f"hash {read_hash(m, previous)}"
 
 
-def read_memory(m: re.Match[str], _: str) -> str:
-    """VRAM is V-RAM, EEPROM E-E-PROM."""
-    written = m.group()
-    first = written.removesuffix(m["memory"])
-    return f"{first}-{m['memory']}" if len(first) == 1 else f"{' '.join(first)} {m['memory']}"
-
-
 def read_identifier(m: re.Match[str], _: str) -> str:
     """Words of an identifier (NullPointerException) are its humps; names with capitals inside stay (YouTube)."""
     written = m.group()
@@ -154,7 +148,7 @@ def read_identifier(m: re.Match[str], _: str) -> str:
     if len(humps) < 2 or "".join(humps) != written or not is_code:
         return written
     words = [hump if is_initialism(hump) and len(hump) > 1 else informal_word(hump.lower()) for hump in humps]
-    is_known = all(len(word) > 1 and (word.isupper() or is_common(word)) for word in words)
+    is_known = all(len(word) > 1 and (word.isupper() or is_common(word) or word in _CODE_SHORT) for word in words)
     return " ".join(words) if is_known else written
 
 

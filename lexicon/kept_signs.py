@@ -115,7 +115,7 @@ _STEPS: tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...]
     (re.compile(r"\b((?:F|Cl|Br|I|OH|NO[₃3]))[-−](?= ions?\b)"), rf"\1{MINUS}"),
     (re.compile(rf"\b({_DAY}){_DASH}(?={_DAY})|\b({_MONTH}){_DASH}(?={_MONTH})"), _range),
     # 9am-5pm, 6-8pm, 10 %-15 %, $10-$15
-    (re.compile(rf"(?<=[0-9])( ?{_HALF}){_DASH}(?=[0-9])"), rf"\1 {RANGE} "),
+    (re.compile(rf"(?<=[0-9])( ?{_HALF}){_DASH}(?=[0-9]|noon\b|midnight\b)"), rf"\1 {RANGE} "),
     (re.compile(rf"(?<=[0-9]){_DASH}(?=[0-9]{{1,2}}(?::[0-9]{{2}})? ?{_HALF})"), f" {RANGE} "),
     (re.compile(rf"(?<=[0-9])( ?(?:%|°[CF]?)){_DASH}(?=[0-9])"), rf"\1 {RANGE} "),
     (re.compile(r"(?<=[0-9])( ?)[-–](?=[$£€][0-9.]{1,9} ?[-–])"), rf"\1{RANGE}"),

@@ -341,12 +341,6 @@ def _form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
             informal_words.read_stutter,
         ),
         (
-            "ram",
-            "a",
-            rf"{_START}(?!PROM{_STOP})[A-Z]{{1,3}}?(?P<memory>RAM|P?ROM|LAN){_STOP}(?!['-]\w)",
-            codes.read_memory,
-        ),
-        (
             "identifier",
             "a",
             rf"{_START}(?=[A-Z]?[a-z]{{1,30}}[A-Z])[A-Za-z]{{4,60}}(?!\w|['-]\w)",
