@@ -35,6 +35,7 @@ _CODE_NOUNS = word_set(
     "Stream Reader Writer Parser Table Field Filter Thread Buffer Loader Helper Component"
 )
 _CODE_SHORT = word_set("int str num obj idx len args img btn msg ctx src init func var")
+COLOR = r"#(?=[0-9]{0,5}[A-Fa-f])(?=[A-Fa-f]{0,5}[0-9])[0-9A-Fa-f]{6}(?!\w)"
 KEYS = r"(?:[Cc]trl|CTRL|[Cc]ontrol|[Aa]lt|ALT|[Ss]hift|SHIFT|[Cc]md|CMD|[Cc]ommand|[Ww]in|[Ff]n|[Oo]ption|⌘)"
 _KEY_NAMES = {"ctrl": "control", "cmd": "command", "del": "delete", "esc": "escape", "ins": "insert", "win": "windows"}
 
@@ -131,6 +132,11 @@ def _key(name: str) -> str:
 def read_hash(m: re.Match[str], _: str) -> str:
     """4f3c2a9 is four F three C two A nine, 0x1F zero X one F."""
     return " ".join(digit_words(sign) if sign.isdigit() else sign.upper() for sign in m.group() if sign.isalnum())
+
+
+def is_color(written: str) -> bool:
+    """Whether a word with # is a colour of hexadecimal digits (#FF8800), not a hashtag of letters (#facade)."""
+    return re.fullmatch(COLOR, written) is not None
 
 
 def read_color(m: re.Match[str], previous: str) -> str:

@@ -11,12 +11,14 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+from lexicon.code_forms import is_color
 from lexicon.dictionary import word_set
 from lexicon.directions import Direction, find_direction
 from lexicon.emoji import EMOJI, emoji_word
 from lexicon.emphasis import SPACED
 from lexicon.function_words import is_function_word
 from lexicon.gesture_marks import FIRST_WORDS, is_gesture
+from lexicon.informal_words import tag_words
 from lexicon.mark_table import MarkTable, TextMark
 from lexicon.markdown import PARAGRAPH_END, SENTENCE_END, Block, split_blocks
 
@@ -281,8 +283,12 @@ class _Scanner:
         said = html.unescape(match[0])
         return None if said == match[0] else Text(*match.span(), said.replace("\xa0", " "))
 
-    def _hashtag(self, match: "re.Match[str]") -> Part:
-        return Text(*match.span(), _CAMEL.sub(" ", match[0][1:]))
+    def _hashtag(self, match: "re.Match[str]") -> Part | None:
+        words = _CAMEL.sub(" ", match[0][1:])
+        if not self._rules.language.startswith("en"):
+            return Text(*match.span(), words)
+        # the front end reads #FF8800
+        return None if is_color(match[0]) else Text(*match.span(), " ".join(map(tag_words, words.split())))
 
     def _emoji(self, match: "re.Match[str]") -> Part:
         mark = self._rules.table.emoji(match[0])

@@ -107,7 +107,7 @@ def _form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         ),
         ("url", "a", rf"(?:(?:https?|ftp)://|www\.){_TAIL}", codes.read_address),
         ("host", "a0", rf"(?:{_LABEL}\.){{1,4}}{_TLD}\b(?![.]\w)(?:/(?:{_TAIL})?)?", codes.read_address),
-        ("color", ".", r"#(?=[0-9]{0,5}[A-Fa-f])(?=[A-Fa-f]{0,5}[0-9])[0-9A-Fa-f]{6}(?!\w)", codes.read_color),
+        ("color", ".", codes.COLOR, codes.read_color),
         ("file", "a0", rf"{_LABEL}\.{codes.FILE_ENDING}(?!\w|\.\w)", codes.read_path),
         ("tag", ".", r"[#@](?=[0-9_]{0,60}[^\W\d_])\w{1,140}", codes.read_hashtag),
         ("slashed", "a", r"and/or\b|w/o\b|w/(?= )|[nN]/[aA]\b|b/c\b|c/o\b", forms.read_slashed),
