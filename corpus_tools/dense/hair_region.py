@@ -53,6 +53,8 @@ EDGE_CELLS = 4
 MIN_ROW_CELLS = 20
 OFF_BACKGROUND = 0.6
 WALL_MM = 150.0
+# Where the picture cuts the crown off, hair is sought beside it, too: so far from the face, above the brows.
+BESIDE_MM = 36.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,13 +121,16 @@ def find_hair(portrait: Portrait, skin: FloatArray) -> SeenHair:
     unlike = difference_from_skin(colours - skin, DARKER)
     above = up - marks[FOREHEAD, 1]
     crown = (above > CROWN_MM) & (np.abs(across) < CROWN_HALF_MM) & (oval < -OFF_OVAL_MM)
+    top = crown & (above < 2 * CLOTHES_MM / 3) & (np.abs(across) < CROWN_HALF_MM / 2)
+    is_cut = 2 * (top & known).sum() < top.sum()
+    if is_cut:
+        crown |= (up > brow) & (oval < -OFF_OVAL_MM) & (oval > -BESIDE_MM)
     seen = crown & person & binary_erosion(person | ~known, iterations=INSIDE_CELLS)
     other, nothing = known & (~person | (unlike < IS_HAIR)), np.full(3, np.nan)
-    top = crown & (above < 2 * CLOTHES_MM / 3) & (np.abs(across) < CROWN_HALF_MM / 2)
-    if 2 * (top & known).sum() < top.sum():
-        return SeenHair(seen & False, other, nothing, np.nan)
     seed = seen & (unlike > IS_HAIR)
     hairy = float(seed.sum() / max(seen.sum(), 1))
+    if hairy < MIN_HAIRY and is_cut and (seen & (above > CROWN_MM)).sum() < MIN_SEEDS:
+        return SeenHair(seen & False, other, nothing, np.nan)
     if hairy < MIN_HAIRY:
         # shaved hair is darker than skin, gloss is lighter
         shaded = seen & (colours[..., 0] - skin[0] < -DARKER)

@@ -12,6 +12,7 @@ from corpus_tools.dense.hair_region import (
     CELL_MM,
     DARKER,
     FOREHEAD,
+    PERSON,
     UP_MM,
     Portrait,
     SeenHair,
@@ -46,7 +47,7 @@ SHADED_CROWN = 0.24  # share of a bald crown that is unlike skin: shaved hair; b
 # Median coherence of the directions of strands (Bigun and Granlund 1987) over 4.5 and 9 mm: afros and short curls .36
 # to .46 and .32 to .37, long curls .52 and .43, straight hair from .55 and .46, long and straight from .7 and .65.
 # above the brows, below them; of hair that falls
-CURLY = 0.48
+CURLY = 0.6
 CURLY_BELOW = 0.42
 CURLY_WIDE = 0.47
 WAVY_WIDE = 0.55
@@ -62,6 +63,11 @@ FINEST, INSIDE_CELLS = 100, 3  # cells that tell a texture, and their distance f
 # Curls are an afro where they end higher above the chin (from 106 mm; curls that fall 61 to 104) and are wider, from
 # the middle of the face (from 87; short curls 78 to 81), or very wide. With less at the temples hair is combed back.
 AFRO_MM, SLEEK_MM = (105.0, 84.0, 120.0), 28.0
+# Of the outline of a head: the second deepest hollow between skull and buns is 12 to 34 mm deep, of other hair to 9.
+KNOT_MM, HOLLOW_UNIT = 10.5, 256.0
+# rows below the lowest hair in which the picture ends; hair that it cuts is longer by about so much
+EDGE_ROWS, CUT_MM = 2, 20.0
+WIDE_SHARE, ROUND_MM = 0.95, -8.0  # rows of nearly the largest width; afros are widest 2 to 23 mm above the brows, curls 18 to 21 below
 TIED_MM = 105.0  # above `FOREHEAD`: what stands so high is tied
 FRINGED_MM = 88.0  # half width of short hair with a fringe that falls
 # share of the lower forehead under hair
@@ -88,6 +94,8 @@ class HairMeasures:
     fringe: float
     coherence: tuple[float, float, float, float]
     course: float
+    widest: float
+    knot: float
 
 
 def measure_hair(portrait: Portrait, hair: Mask) -> HairMeasures:
@@ -99,6 +107,7 @@ def measure_hair(portrait: Portrait, hair: Mask) -> HairMeasures:
     beside = [(hair & (side * ACROSS_MM > TEMPLE_MM)).sum(axis=1) * CELL_MM for side in (-1, 1)]
     ends = [UP_MM[np.flatnonzero(width >= MIN_LOCK_MM)].min(initial=forehead) for width in beside]
     falling = [end for end in ends if end < forehead - TEMPLE_HAIR_MM] or [forehead]
+    is_cut = any(_is_cut(portrait, hair & (side * ACROSS_MM > TEMPLE_MM)) for side in (-1, 1))
     if min(falling) < chin + ONE_SIDE_MM:
         falling = [min(falling)]
     middle = hair[:, np.abs(ACROSS_MM) < TEMPLE_MM]
@@ -106,16 +115,52 @@ def measure_hair(portrait: Portrait, hair: Mask) -> HairMeasures:
     temples = np.abs(UP_MM - (brow + 10.0)) < CELL_MM
     band = (ring_depth(marks, FACE_OVAL) > INSIDE_CELLS) & (np.abs(across) < FRINGE_HALF_MM)
     band &= (up > brow + FRINGE_FROM_MM) & (up < brow + FRINGE_FROM_MM + FRINGE_TO * (forehead - brow))
+    halves = [band & (side * across > 0) for side in (-1, 1)]
+    reach = np.where(hair & (up > chin), np.abs(across), 0.0).max(axis=1)
     above, below = (_coherence(portrait, hair, part) for part in (up > brow, up <= brow))
     return HairMeasures(
-        float(np.mean(falling)) - chin,
+        float(np.mean(falling)) - chin - CUT_MM * is_cut,
         float(np.median(tops)) - forehead if tops.size else 0.0,
         sum(float(width[temples].mean()) for width in beside),
-        float(np.abs(across[hair & (up > chin)]).max(initial=0.0)),
-        float((hair & band).sum() / max(band.sum(), 1)),
+        float(reach.max()),
+        min(float((hair & half).sum() / max(half.sum(), 1)) for half in halves),
         (*above[:2], *below[:2]),
         below[2],
+        float(UP_MM[reach > WIDE_SHARE * reach.max()].mean()) - brow,
+        knot_depth(portrait, hair),
     )
+
+
+def _is_cut(portrait: Portrait, hair: Mask) -> bool:
+    """Whether the edge of the picture lies below the lowest hair (R, C) of a side."""
+    wide = np.flatnonzero(hair.sum(axis=1) * CELL_MM >= MIN_LOCK_MM)
+    if not wide.size:
+        return False
+    low, columns = min(wide[-1] + EDGE_ROWS, len(UP_MM) - 1), hair[wide[-1]]
+    return bool(np.isnan(portrait.srgb[low, columns, 0]).mean() > 0.5)
+
+
+def knot_depth(portrait: Portrait, hair: Mask) -> float:
+    """Depth, mm, of the second deepest hollow in the outline of a head above the forehead: buns have two, at least.
+
+    An outline that the picture cuts stays convex, as pictures are.
+    """
+    import cv2
+
+    marks, above = portrait.marks, UP_MM[:, None] > portrait.marks[list(BROW_TOPS), 1].max()
+    known = np.isfinite(portrait.srgb[..., 0])
+    person = hair | (ring_depth(marks, FACE_OVAL) > 0)
+    if portrait.share is not None:
+        person |= np.nan_to_num(portrait.share) > PERSON
+    outlines, _ = cv2.findContours((person & above & known).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    outline = max(outlines, key=cv2.contourArea)
+    hollows = cv2.convexityDefects(outline, cv2.convexHull(outline, returnPoints=False))
+    if hollows is None:
+        return 0.0
+    at, depth = np.reshape(hollows, (-1, 4))[:, 2:].T
+    high = UP_MM[np.reshape(outline, (-1, 2))[at, 1]] > marks[FOREHEAD, 1]
+    deepest = np.sort(np.append(depth[high] / HOLLOW_UNIT, [0.0, 0.0]))
+    return float(deepest[-2]) * CELL_MM
 
 
 def _coherence(portrait: Portrait, hair: Mask, where: Mask) -> tuple[float, float, float]:
@@ -162,7 +207,7 @@ def name_hair(portrait: Portrait, hair: SeenHair, skin: FloatArray) -> str:
     seen = measure_hair(portrait, hair.region)
     if seen.end < LONG_MM[int(seen.half_width > LONG_WIDE_MM)]:
         return _long_name(seen)
-    is_curly = _strands(seen) < CURLY_WIDE
+    is_curly = _strands(seen) < WAVY_WIDE
     if seen.end < (CURLY_BOB_MM if is_curly else BOB_MM):
         plain = "bob with a fringe" if seen.fringe > FRINGE else "bob"
         return "wavy bob" if is_curly else plain
@@ -186,12 +231,11 @@ def _long_name(seen: HairMeasures) -> str:
 
 def _short_name(seen: HairMeasures, unlike: float) -> str:
     """Name of hair with free ears that differs from the skin by `unlike`."""
-    if seen.top > TIED_MM:
+    if seen.top > TIED_MM or seen.knot > KNOT_MM:
         return "tied back"
     if seen.top < FLAT_MM[0] and seen.half_width < FLAT_MM[1]:
         return "cropped" if seen.temples < CROPPED_MM[int(unlike < SEE_THROUGH)] else "flat"
     is_curly = seen.coherence[0] < CURLY or seen.coherence[2] < CURLY_BELOW
     if is_curly and seen.temples > SLEEK_MM:
-        is_round = seen.end > AFRO_MM[0] and seen.half_width > AFRO_MM[1]
-        return "afro" if is_round or seen.half_width > AFRO_MM[2] else "curly"
+        return "afro" if seen.widest > ROUND_MM else "curly"
     return "short with a fringe" if seen.fringe > FRINGE and seen.half_width > FRINGED_MM else "short"
