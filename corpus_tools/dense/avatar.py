@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from corpus_tools.dense.build_face import CONTENT, SOURCE_FACE, BuiltFace, fit_person, paint_person
+from corpus_tools.dense.light_colour import are_drawn
 from corpus_tools.dense.mesh_fit import align_to_head, face_landmarks
 from corpus_tools.dense.person_look import LookChoices, is_child
 from corpus_tools.dense.tracked_pictures import TrackedPictures
@@ -86,7 +87,8 @@ def build_avatar(  # noqa: PLR0913 - one parameter an option
     seen, neutral = _read(photos, head, model, on_warning)
     mirrored = [_mirrored(observed, mirror_table(head)) for observed in seen]
     person = np.mean(neutral, axis=0)
-    fitted = fit_person(_child_head(head) if is_child(person) else head, person)
+    is_drawn = are_drawn(seen[0].points[0])
+    fitted = fit_person(_child_head(head) if is_child(person, is_drawn=is_drawn) else head, person)
     face, look = paint_person(fitted, [*seen, *mirrored], lambda done, of: None, choices, model=model)
     face = replace(
         face,

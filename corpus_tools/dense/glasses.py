@@ -40,8 +40,13 @@ TEMPLE_MM = 74.0
 HALF_MM = ((19.0, 30.0), (14.0, 27.0))  # least and most half width and height of a rim
 # rims stand so far before the centre of the eyeball
 WIRE_MM = 1.2
-AHEAD_MM = 21.0
+AHEAD_MM, AHEAD = 21.0, np.array([0.0, 0.0, 1.0])
 BEHIND_EAR_MM = 9.0
+CLEAR_MM, MOST_SUNK_MM, N_SKIN = (
+    2.0,
+    14.0,
+    3,
+)  # of wire before the skin; by which it comes forward at most; nearest vertices
 WRAP_MM, SQUARE = 4.0, 0.85  # by which rims bend back at their outer side; exponent of their outline
 EAR_HIGH, EAR_DEEP = (0.0, 12.0), (-85.0, -55.0)
 MOST_LIGHT = 150.0  # of the colour of a frame, sRGB: lighter ones are gloss
@@ -179,14 +184,11 @@ def _frame(face: Face, glasses: Glasses) -> tuple[FloatArray, NDArray[np.int64]]
     """Points and triangles of rims, bridge and temples before a face's eyes."""
     skin = face.vertices[part_vertices(face, ("skin",))].astype(np.float64)
     half = np.ptp(glasses.rims, axis=1).mean(axis=0) / 2
-    tubes, inner = [], []
+    tubes, inner, rims = [], [], _rims(face, half)
+    rims = {sign: rim + AHEAD * max(_sunk(skin, one) for one in rims.values()) for sign, rim in rims.items()}
     for eye in sorted(face.eyes, key=lambda either: float(either.centre[0])):
         sign = float(np.sign(eye.centre[0]))
-        turn = np.linspace(0, 2 * np.pi, N_RIM, endpoint=False)
-        across, up = (np.sign(way) * np.abs(way) ** SQUARE for way in (np.cos(turn), np.sin(turn)))
-        back = WRAP_MM * np.clip(across, 0, 1) ** 2
-        middle = eye.centre + np.array([0.06 * sign * half[0], -0.12 * half[1], AHEAD_MM])
-        rim = middle + np.column_stack([sign * half[0] * across, half[1] * up, -back])
+        rim = rims[sign]
         tubes.append(tube(rim, WIRE_MM, is_closed=True))
         beside = skin[(skin[:, 0] * sign > 0) & (skin[:, 1] > EAR_HIGH[0]) & (skin[:, 1] < EAR_HIGH[1])]
         deep = beside[(beside[:, 2] > EAR_DEEP[0]) & (beside[:, 2] < EAR_DEEP[1])]
@@ -199,7 +201,28 @@ def _frame(face: Face, glasses: Glasses) -> tuple[FloatArray, NDArray[np.int64]]
         inner.append(rim[np.argmax(-sign * rim[:, 0] + 0.3 * rim[:, 1])])
     share = np.linspace(0, 1, N_RIM // 4)[:, None]
     arch = inner[0] + share * (inner[1] - inner[0]) + np.sin(np.pi * share) * [0.0, 3.0, 2.0]
-    tubes.append(tube(arch, WIRE_MM))
+    tubes.append(tube(arch + AHEAD * _sunk(skin, arch), WIRE_MM))
     starts = np.cumsum([0, *(len(points) for points, _ in tubes)])
     triangles = [corners + start for (_, corners), start in zip(tubes, starts, strict=False)]
     return np.concatenate([points for points, _ in tubes]), np.concatenate(triangles)
+
+
+def _rims(face: Face, half: FloatArray) -> dict[float, FloatArray]:
+    """Rims (N, 3) of a half width and height (2,) before a face's eyes, by the sign of their side."""
+    turn = np.linspace(0, 2 * np.pi, N_RIM, endpoint=False)
+    across, up = (np.sign(way) * np.abs(way) ** SQUARE for way in (np.cos(turn), np.sin(turn)))
+    back, found = WRAP_MM * np.clip(across, 0, 1) ** 2, {}
+    for eye in face.eyes:
+        sign = float(np.sign(eye.centre[0]))
+        middle = eye.centre + np.array([0.06 * sign * half[0], -0.12 * half[1], AHEAD_MM])
+        found[sign] = middle + np.column_stack([sign * half[0] * across, half[1] * up, -back])
+    return found
+
+
+def _sunk(skin: FloatArray, line: FloatArray) -> float:
+    """By how much (mm) a line (N, 3) has to come forward to lie before the skin (V, 3)."""
+    from scipy.spatial import cKDTree
+
+    front = skin[skin[:, 2] > line[:, 2].min() - MOST_SUNK_MM]
+    behind = front[cKDTree(front[:, :2]).query(line[:, :2], k=N_SKIN)[1], 2].max(axis=1)
+    return float(np.clip((behind + CLEAR_MM - line[:, 2]).max(), 0.0, MOST_SUNK_MM))

@@ -1,6 +1,6 @@
 """Which of the shipped haircuts hair in a picture is: its length, volume, fringe and texture."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +30,7 @@ HAIRCUTS: Mapping[str, str] = {
 }  # fmt: skip  # by what hair is called
 UNSEEN = "flat"  # where the top of the head is outside of the picture
 TEMPLE_MM, MIN_LOCK_MM = 36.0, 9.0  # hair beside the face, from the middle of it; thinner locks do not count
+NECK_HALF_MM = 50.0  # below the chin: the neck's shadow may be as dark as hair
 # Lowest hair beside the face above the chin, mean of both sides: haircuts with free ears 94 and higher, bobs 3 to 49,
 # long hair below -10. A side that shows none beside the temple does not count.
 # Hair that falls so low on one side lies in shadow or behind the shoulder on the other.
@@ -48,7 +49,6 @@ SHADED_CROWN = 0.24  # share of a bald crown that is unlike skin: shaved hair; b
 # to .46 and .32 to .37, long curls .52 and .43, straight hair from .55 and .46, long and straight from .7 and .65.
 # above the brows, below them; of hair that falls
 CURLY = 0.6
-CURLY_BELOW = 0.42
 CURLY_WIDE = 0.47
 WAVY_WIDE = 0.55
 # Mean resultant of these directions over 20 mm, of long hair below the brows, is .94 to .97 of straight hair, .90 to
@@ -64,14 +64,15 @@ FINEST, INSIDE_CELLS = 100, 3  # cells that tell a texture, and their distance f
 # the middle of the face (from 87; short curls 78 to 81), or very wide. With less at the temples hair is combed back.
 AFRO_MM, SLEEK_MM = (105.0, 84.0, 120.0), 28.0
 # Of the outline of a head: the second deepest hollow between skull and buns is 12 to 34 mm deep, of other hair to 9.
-KNOT_MM, HOLLOW_UNIT = 10.5, 256.0
+KNOT_MM, HOLLOW_UP_MM, HOLLOW_UNIT = 10.5, 20.0, 256.0  # least, above the forehead; in which OpenCV counts
 # rows below the lowest hair in which the picture ends; hair that it cuts is longer by about so much
 EDGE_ROWS, CUT_MM = 2, 20.0
-WIDE_SHARE, ROUND_MM = 0.95, -8.0  # rows of nearly the largest width; afros are widest 2 to 23 mm above the brows, curls 18 to 21 below
+# Rows of nearly the largest width: afros have theirs 2 to 23 mm above the brows, curls that hang 18 to 21 below.
+WIDE_SHARE, ROUND_MM = 0.95, -8.0
 TIED_MM = 105.0  # above `FOREHEAD`: what stands so high is tied
 FRINGED_MM = 88.0  # half width of short hair with a fringe that falls
-# share of the lower forehead under hair
-FRINGE = 0.42
+# least share of both halves of the lower forehead under hair
+FRINGE = 0.6
 FRINGE_HALF_MM = 48.0
 FRINGE_FROM_MM = 6.0
 FRINGE_TO = 0.55
@@ -92,7 +93,7 @@ class HairMeasures:
     temples: float
     half_width: float
     fringe: float
-    coherence: tuple[float, float, float, float]
+    coherence: tuple[float, float, float]
     course: float
     widest: float
     knot: float
@@ -104,10 +105,11 @@ def measure_hair(portrait: Portrait, hair: Mask) -> HairMeasures:
     chin = marks[CHIN, 1]
     forehead = marks[FOREHEAD, 1]
     brow = marks[list(BROW_TOPS), 1].max()
-    beside = [(hair & (side * ACROSS_MM > TEMPLE_MM)).sum(axis=1) * CELL_MM for side in (-1, 1)]
+    off_neck = np.where(up > chin, TEMPLE_MM, NECK_HALF_MM)
+    beside = [(hair & (side * across > off_neck)).sum(axis=1) * CELL_MM for side in (-1, 1)]
     ends = [UP_MM[np.flatnonzero(width >= MIN_LOCK_MM)].min(initial=forehead) for width in beside]
     falling = [end for end in ends if end < forehead - TEMPLE_HAIR_MM] or [forehead]
-    is_cut = any(_is_cut(portrait, hair & (side * ACROSS_MM > TEMPLE_MM)) for side in (-1, 1))
+    is_cut = any(_is_cut(portrait, hair & (side * across > off_neck)) for side in (-1, 1))
     if min(falling) < chin + ONE_SIDE_MM:
         falling = [min(falling)]
     middle = hair[:, np.abs(ACROSS_MM) < TEMPLE_MM]
@@ -117,14 +119,14 @@ def measure_hair(portrait: Portrait, hair: Mask) -> HairMeasures:
     band &= (up > brow + FRINGE_FROM_MM) & (up < brow + FRINGE_FROM_MM + FRINGE_TO * (forehead - brow))
     halves = [band & (side * across > 0) for side in (-1, 1)]
     reach = np.where(hair & (up > chin), np.abs(across), 0.0).max(axis=1)
-    above, below = (_coherence(portrait, hair, part) for part in (up > brow, up <= brow))
+    above, below, whole = _coherence(portrait, hair, (up > brow, up <= brow, up > -np.inf))
     return HairMeasures(
         float(np.mean(falling)) - chin - CUT_MM * is_cut,
         float(np.median(tops)) - forehead if tops.size else 0.0,
         sum(float(width[temples].mean()) for width in beside),
         float(reach.max()),
         min(float((hair & half).sum() / max(half.sum(), 1)) for half in halves),
-        (*above[:2], *below[:2]),
+        (whole[0], above[1], below[1]),
         below[2],
         float(UP_MM[reach > WIDE_SHARE * reach.max()].mean()) - brow,
         knot_depth(portrait, hair),
@@ -158,38 +160,43 @@ def knot_depth(portrait: Portrait, hair: Mask) -> float:
     if hollows is None:
         return 0.0
     at, depth = np.reshape(hollows, (-1, 4))[:, 2:].T
-    high = UP_MM[np.reshape(outline, (-1, 2))[at, 1]] > marks[FOREHEAD, 1]
+    high = UP_MM[np.reshape(outline, (-1, 2))[at, 1]] > marks[FOREHEAD, 1] + HOLLOW_UP_MM
     deepest = np.sort(np.append(depth[high] / HOLLOW_UNIT, [0.0, 0.0]))
     return float(deepest[-2]) * CELL_MM
 
 
-def _coherence(portrait: Portrait, hair: Mask, where: Mask) -> tuple[float, float, float]:
-    """Coherence of directions of strands over `NEAR_MM` and `WIDE_MM` in a part (R, C) of hair, and their course."""
+def _coherence(portrait: Portrait, hair: Mask, parts: Sequence[Mask]) -> list[tuple[float, float, float]]:
+    """Coherence of directions of strands over `NEAR_MM` and `WIDE_MM` in parts (R, C) of hair, and their course."""
     from scipy.ndimage import binary_erosion, gaussian_filter
 
     if portrait.fine is None:
-        return np.nan, np.nan, np.nan
+        return [(np.nan, np.nan, np.nan)] * len(parts)
     rows, columns = (np.minimum(np.arange(length) // 2, length // 2) for length in portrait.fine.shape[:2])
-    is_hair, is_part = (cells[np.ix_(rows, columns)] for cells in (hair, where))
+    is_hair = hair[np.ix_(rows, columns)]
     inner = binary_erosion(is_hair, iterations=INSIDE_CELLS)
-    is_part = is_part & inner
-    if is_part.sum() < FINEST:
-        return np.nan, np.nan, np.nan
     per_cell = 2.0 / CELL_MM
     light = np.where(is_hair, np.log(np.nan_to_num(portrait.fine) @ LUMINANCE + 8.0), 0.0)
-    near = gaussian_filter(is_hair.astype(np.float64), SHADE_MM * per_cell) + 1e-6
-    relief = np.where(is_hair, light - gaussian_filter(light, SHADE_MM * per_cell) / near, 0.0)
+    around = gaussian_filter(is_hair.astype(np.float64), SHADE_MM * per_cell) + 1e-6
+    relief = np.where(is_hair, light - gaussian_filter(light, SHADE_MM * per_cell) / around, 0.0)
     down, along = np.gradient(gaussian_filter(relief, FINE_MM * per_cell))
-    found, doubled = [], along + 1j * down
+    doubled = along + 1j * down
     power, square = np.abs(doubled) ** 2, doubled**2  # the structure tensor: its trace, and its direction, doubled
-    for reach in (WIDE_MM, NEAR_MM):
-        turned = _blurred(inner * square, reach * per_cell)
-        turned /= gaussian_filter(inner * power, reach * per_cell) + 1e-12
-        found.append(float(np.median(np.abs(turned)[is_part])))
-    turned = np.where(is_part, turned, 0.0)
-    course = np.abs(_blurred(turned, COURSE_MM * per_cell))
-    course /= gaussian_filter(np.abs(turned), COURSE_MM * per_cell) + 1e-9
-    return found[1], found[0], float(np.median(course[is_part]))
+    near, wide = (
+        _blurred(inner * square, reach * per_cell) / (gaussian_filter(inner * power, reach * per_cell) + 1e-12)
+        for reach in (NEAR_MM, WIDE_MM)
+    )
+    found = []
+    for part in parts:
+        is_part = part[np.ix_(rows, columns)] & inner
+        if is_part.sum() < FINEST:
+            found.append((np.nan, np.nan, np.nan))
+            continue
+        turned = np.where(is_part, near, 0.0)
+        course = np.abs(_blurred(turned, COURSE_MM * per_cell))
+        course /= gaussian_filter(np.abs(turned), COURSE_MM * per_cell) + 1e-9
+        medians = (float(np.median(values[is_part])) for values in (np.abs(near), np.abs(wide), course))
+        found.append(tuple(medians))
+    return found
 
 
 def _blurred(values: NDArray[np.complex128], spread: float) -> NDArray[np.complex128]:
@@ -216,7 +223,7 @@ def name_hair(portrait: Portrait, hair: SeenHair, skin: FloatArray) -> str:
 
 def _strands(seen: HairMeasures) -> float:
     """Coherence of the directions of strands of hair that falls, over 9 mm."""
-    below = seen.coherence[3]
+    below = seen.coherence[2]
     return (seen.coherence[1] + below) / 2 if np.isfinite(below) else seen.coherence[1]
 
 
@@ -235,7 +242,6 @@ def _short_name(seen: HairMeasures, unlike: float) -> str:
         return "tied back"
     if seen.top < FLAT_MM[0] and seen.half_width < FLAT_MM[1]:
         return "cropped" if seen.temples < CROPPED_MM[int(unlike < SEE_THROUGH)] else "flat"
-    is_curly = seen.coherence[0] < CURLY or seen.coherence[2] < CURLY_BELOW
-    if is_curly and seen.temples > SLEEK_MM:
+    if seen.coherence[0] < CURLY and seen.temples > SLEEK_MM:
         return "afro" if seen.widest > ROUND_MM else "curly"
     return "short with a fringe" if seen.fringe > FRINGE and seen.half_width > FRINGED_MM else "short"

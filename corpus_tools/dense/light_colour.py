@@ -12,6 +12,7 @@ from tts2face.models.landmarks import LID_RINGS
 from tts2face.numeric.arrays import (
     LUMINANCE,
     FloatArray,
+    Mask,
     decode_srgb,
     encode_light,
     encode_srgb,
@@ -34,7 +35,12 @@ PUPIL = 0.25  # of the light of the ring's brighter cells: less is a wide pupil,
 OFF_IRIS, OFF_LIDS = 1.35, 0.18  # of the radius: what is white of the eye, and how far lids reach into it
 # Drawn eyes are open by so many radii of what the tracker takes for the iris (2.0 to 2.35; people by 1.4 to 1.8), which
 # is their pupil; the coloured part lies beyond it, lit below.
-DRAWN_OPEN, DRAWN_RING = 1.9, (0.4, 1.5)
+DRAWN_OPEN, DRAWN_REACH = 1.9, 1.9
+OFF_WHITE, BRIGHT_RIM = 0.3, 1  # most light of a drawn iris, of the white's; samples around white and catchlights
+DRAWN_BRIGHT, DRAWN_PUPIL = (
+    0.95,
+    0.4,
+)  # quantile of the brightest drawn iris, and the light of it that a pupil has at most
 IRIS_MIX_PX = 0.5  # over the radius: share of the surroundings' light; rendered eyes have .05 to .1 at 5 px
 MIN_OWN_LIGHT = 0.5  # of what is seen
 # quantiles of luminance: white without shadow, that of a whole drawn eye, iris without catchlights
@@ -52,12 +58,16 @@ EYE_GRID = (41, 25)  # samples across and down an eye
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EyeColours:
-    """Colours (3,), `log_colour`, of skin, white of the eye and iris; those that are not seen are NaN; radius in px."""
+    """Colours (3,), `log_colour`, of skin, white of the eye and iris; those that are not seen are NaN; radius in px.
+
+    `is_drawn` where the eyes are open as drawn people's are.
+    """
 
     skin: FloatArray
     sclera: FloatArray
     iris: FloatArray
     radius_px: float
+    is_drawn: bool = False
 
 
 def log_colour(srgb: NDArray[np.floating]) -> FloatArray:
@@ -85,31 +95,60 @@ def sample_eyes(picture: NDArray[np.uint8], points: NDArray[np.floating]) -> Eye
     places = points[:, :2].astype(np.float64)
     skin = np.median(log_colour(sample_picture(picture, places[list(SKIN_LANDMARKS)])[0]), axis=0)
     whites, irises, radii = [], [], []
-    for (centre, rim), lids in zip(IRISES, LID_RINGS, strict=True):
-        middle, opening = places[centre], places[list(lids)]
-        radius = float(np.linalg.norm(places[list(rim)] - middle, axis=1).mean())
+    for number, lids in enumerate(LID_RINGS):
+        middle, opening, radius = places[IRISES[number][0]], places[list(lids)], _radius(places, number)
         low, high = opening.min(axis=0), opening.max(axis=0)
         across, down = (np.linspace(low[axis], high[axis], EYE_GRID[axis]) for axis in (0, 1))
         grid = np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 2)
         colours = log_colour(sample_picture(picture, grid)[0])
         off = np.linalg.norm(grid - middle, axis=1) / radius
         is_open = polygon_depth(grid, opening, radius) > OFF_LIDS * radius
-        is_drawn = high[1] - low[1] > DRAWN_OPEN * radius
-        inner, outer = DRAWN_RING if is_drawn else IRIS_RING
-        top = 0.0 if is_drawn else IRIS_TOP * radius
-        ring = (off > inner) & (off < outer) & (grid[:, 1] > middle[1] - top)
-        white = is_open & (is_drawn | (off > OFF_IRIS))
-        whites.append(_median_between(colours[white], DRAWN_WHITE if is_drawn else BRIGHT_WHITE))
-        irises.append(_median_between(_without_pupil(colours[is_open & ring], is_drawn=is_drawn), PLAIN_IRIS))
+        is_drawn = _is_drawn(opening, radius)
+        if is_drawn:
+            white = _median_between(colours[is_open], DRAWN_WHITE)
+            ring = _drawn_ring(colours, is_open & (off < DRAWN_REACH), float(white[0]))
+            whites.append(white)
+        else:
+            ring = is_open & (off > IRIS_RING[0]) & (off < IRIS_RING[1]) & (grid[:, 1] > middle[1] - IRIS_TOP * radius)
+            whites.append(_median_between(colours[is_open & (off > OFF_IRIS)], BRIGHT_WHITE))
+        irises.append(_median_between(_without_pupil(colours[ring], is_drawn=is_drawn), PLAIN_IRIS))
         radii.append(radius)
-    return EyeColours(skin, _mean_known(whites), _mean_known(irises), float(np.mean(radii)))
+    return EyeColours(skin, _mean_known(whites), _mean_known(irises), float(np.mean(radii)), are_drawn(points))
+
+
+def are_drawn(points: NDArray[np.floating]) -> bool:
+    """Whether both eyes of landmarks (478, 3) in pixels are open as drawn people's are."""
+    places = points[:, :2].astype(np.float64)
+    return all(_is_drawn(places[list(lids)], _radius(places, number)) for number, lids in enumerate(LID_RINGS))
+
+
+def _radius(places: FloatArray, number: int) -> float:
+    """Radius of an iris, px, in landmarks (478, 2)."""
+    centre, rim = IRISES[number]
+    return float(np.linalg.norm(places[list(rim)] - places[centre], axis=1).mean())
+
+
+def _is_drawn(opening: FloatArray, radius: float) -> bool:
+    """Whether lids (N, 2) are open as a drawn eye's, whose iris the tracker reads with such a radius, px."""
+    return bool(np.ptp(opening[:, 1]) > DRAWN_OPEN * radius)
+
+
+def _drawn_ring(colours: FloatArray, near: Mask, white: float) -> Mask:
+    """(N,) samples of a drawn eye that may be iris: off the white, of a luminance (logarithm), and off catchlights."""
+    from scipy.ndimage import binary_dilation
+
+    is_bright = (colours[:, 0] > white + np.log(OFF_WHITE)).reshape(EYE_GRID[::-1])
+    return np.asarray(near & ~binary_dilation(is_bright, iterations=BRIGHT_RIM).ravel())
 
 
 def _without_pupil(ring: FloatArray, *, is_drawn: bool) -> FloatArray:
     """Colours (N, 3) of a ring of the iris that are not as dark as a pupil beside its brighter ones."""
     if not len(ring):
         return ring
-    bright: FloatArray = ring[ring[:, 0] > np.quantile(ring[:, 0], PLAIN_IRIS[1]) + np.log(PUPIL)]
+    brightest = DRAWN_BRIGHT if is_drawn else PLAIN_IRIS[1]
+    bright: FloatArray = ring[
+        ring[:, 0] > np.quantile(ring[:, 0], brightest) + np.log(DRAWN_PUPIL if is_drawn else PUPIL)
+    ]
     # where few cells are so bright, they are reflections in a dark iris
     return bright if is_drawn or len(bright) > MIN_BRIGHT * len(ring) else ring
 
@@ -132,11 +171,17 @@ def median_eyes(seen: list[EyeColours]) -> EyeColours:
     skin, sclera, iris = (
         _median_known([getattr(observed, name) for observed in seen]) for name in ("skin", "sclera", "iris")
     )
-    return EyeColours(skin, sclera, iris, float(np.median([observed.radius_px for observed in seen])))
+    radius = float(np.median([observed.radius_px for observed in seen]))
+    return EyeColours(skin, sclera, iris, radius, 2 * sum(observed.is_drawn for observed in seen) > len(seen))
 
 
 def clear_iris(eyes: EyeColours) -> FloatArray:
-    """Colour (3,), `log_colour`, of the iris without the light of skin and white that a small picture mixes into it."""
+    """Colour (3,), `log_colour`, of the iris without the light of skin and white that a small picture mixes into it.
+
+    Samples of drawn irises lie off both.
+    """
+    if eyes.is_drawn:
+        return eyes.iris
     share = IRIS_MIX_PX / eyes.radius_px
     around = linear_light(eyes.skin)
     if np.isfinite(eyes.sclera).all():

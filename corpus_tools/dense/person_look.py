@@ -55,6 +55,7 @@ CHILD_BROWN = 0.5  # least log R/G of a child's hair
 # Heights of eyes above chin and base of the nose, of the distance of the outer eye corners, summed: a child of
 # nine 1.67, adults 1.75 (a broad smile, no teeth) to 1.99.
 CHILD = 1.71
+DRAWN_CHILD = 1.4  # the same of drawn people: a girl to 1.37, a young woman 1.43, others from 1.47
 NEUTRAL_IRIS = EYE_COLOURS["brown"]
 # least luminance; up to which irises are brown
 IRIS_LIGHT = 0.012
@@ -185,7 +186,7 @@ class LookSampler:
             if length == "cropped":
                 seen, most = seen + SEEN_SKIN * (seen - eyes.skin), eyes.skin[0] + CROPPED_LIGHT
             seen = without_gloss_of_dark(neutral(seen, cast), eyes.skin)
-            colour = hair_colour(seen, most, CHILD_BROWN if is_child(self.fit.marks) else 0.0)
+            colour = hair_colour(seen, most, CHILD_BROWN if is_child(self.fit.marks, is_drawn=eyes.is_drawn) else 0.0)
             code = "#{:02x}{:02x}{:02x}".format(*srgb_colour(colour).tolist())
         notes = [] if length else ["top of the head not seen"]
         length = length or UNSEEN
@@ -216,11 +217,11 @@ def neutral(colour: FloatArray, cast: FloatArray) -> FloatArray:
     return clean
 
 
-def is_child(marks: FloatArray) -> bool:
-    """Whether landmarks (468, 3) of a head are a child's."""
+def is_child(marks: FloatArray, *, is_drawn: bool = False) -> bool:
+    """Whether landmarks (468, 3) of a head, of a drawn person or another, are a child's."""
     outer = marks[[EYE_OUTER_RIGHT, EYE_OUTER_LEFT]]
     heights = outer[:, 1].mean() - marks[[CHIN, NOSE_BASE], 1]
-    return bool(heights.sum() < CHILD * np.linalg.norm(outer[0] - outer[1]))
+    return bool(heights.sum() < (DRAWN_CHILD if is_drawn else CHILD) * np.linalg.norm(outer[0] - outer[1]))
 
 
 def without_gloss_of_dark(hair: FloatArray, skin: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from cli.main import run
 from corpus_tools.dense.hair_region import ACROSS_MM, CELL_MM, UP_MM, Portrait, find_hair, portrait_grid
-from corpus_tools.dense.hairdo import name_hair
+from corpus_tools.dense.hairdo import KNOT_MM, knot_depth, name_hair
 from corpus_tools.dense.light_colour import (
     GLOSSY,
     EyeColours,
@@ -187,11 +187,26 @@ def test_a_wall_in_the_colour_of_the_hair_is_no_long_hair(head: Face) -> None:
     assert name_of(portrait) in SHORT
 
 
-def test_a_head_cut_by_the_pictures_edge_has_no_length(head: Face) -> None:
+@pytest.mark.parametrize(("above_mm", "names"), [(8.0, SHORT), (-60.0, ("",))])
+def test_hair_of_a_head_cut_by_the_pictures_edge_is_that_beside_it(
+    head: Face, above_mm: float, names: tuple[str, ...]
+) -> None:
     portrait = painted_portrait(head, (70, 120, 170), (60, 42, 30), -95.0, 75.0)
     cut = portrait.srgb.copy()
-    cut[portrait.marks[10, 1] + 8 < UP_MM] = np.nan
-    assert name_of(replace(portrait, srgb=cut)) == ""
+    cut[portrait.marks[10, 1] + above_mm < UP_MM] = np.nan
+    assert name_of(replace(portrait, srgb=cut)) in names
+
+
+def test_hollows_beside_a_bun_are_seen(head: Face) -> None:
+    portrait = painted_portrait(head, (70, 120, 170), (60, 42, 30), 45.0, 55.0)
+    across, up = np.meshgrid(ACROSS_MM, UP_MM - portrait.marks[10, 1])
+    plain = np.hypot(across / 80, (up + 15) / 75) < 1
+    bun = np.hypot(across, up - 75) < 26
+    assert knot_depth(portrait, plain) < KNOT_MM / 2
+    assert knot_depth(portrait, plain | bun) > KNOT_MM
+    cut = portrait.srgb.copy()
+    cut[up > 40] = np.nan
+    assert knot_depth(replace(portrait, srgb=cut), plain | bun) < KNOT_MM / 2
 
 
 @pytest.mark.parametrize("name", HAIR_COLOURS)
@@ -213,6 +228,15 @@ def test_children_are_told_by_their_proportions() -> None:
         entry for entry in (None, *(one.name for one in identities())) if is_child(_marks(read_face(path, entry)))
     ]
     assert children == ["nia"]
+
+
+@pytest.mark.build
+def test_drawn_people_are_children_from_larger_eyes_on() -> None:
+    """Drawn adults have the proportions of children."""
+    marks = _marks(read_face(find_file("head", "face"), "nia"))
+    assert not is_child(marks, is_drawn=True)
+    lower = np.where(np.isin(np.arange(len(marks)), (33, 263))[:, None], (1.2, 1.0, 1.0), 1.0)
+    assert is_child(marks * lower, is_drawn=True)
 
 
 def _marks(face: Face) -> np.ndarray:

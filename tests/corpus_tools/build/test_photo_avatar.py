@@ -1,5 +1,6 @@
 """Heads of people in pictures have the landmarks and colours of the pictures."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -71,16 +72,14 @@ def test_avatars_of_real_people_are_nearest_to_their_own_pictures(
 
 
 def check_likeness(photos: list[Path], avatars: list[Path], face_model: Path) -> None:
-    """Landmarks within 1.5 % of the width of the face, skin within a CIEDE2000 of 7 (medians), no other is nearer."""
+    """Landmarks within 1.5 % of the width of the face, skin within a CIEDE2000 of 6 (medians), no other is nearer."""
     tracker, reader = FaceTracker(face_model), PhotoReader(face_model)
     shown = [reader.read(photo) for photo in photos]
     pictures = [see_picture(one.picture.pixels, one.found) for one in shown]
     heads = [see_head(load_face(str(path)), one, tracker)[1] for path, one in zip(avatars, shown, strict=True)]
     pairs = list(zip(heads, pictures, strict=True))
     assert np.median([marks_apart(*pair) for pair in pairs]) < 0.015
-    assert (
-        np.median([colours_apart(*pair, SKIN) for pair in pairs]) < 7.0
-    )  # noor 6.4: 4.1 with the shade of hair and glasses
+    assert np.median([colours_apart(*pair, SKIN) for pair in pairs]) < 6.0
     assert nearest(heads, pictures) == list(range(len(pairs)))
 
 
@@ -127,7 +126,7 @@ def test_eyes_have_the_colour_that_is_chosen_and_wrinkles_stay_on_request(
     built = build_avatar([photos["noor"]], path, consent="nobody", eye_color="blue", age_keep=True, model=face_model)
     chosen, usual = load_face(str(path)), load_face(str(avatars["noor"]))
     assert "eyes: blue" in built.look.summary()
-    assert "brown" in str(usual.metadata["look"])
+    assert re.match("hair: tied back, (white|grey); eyes: .*brown", str(usual.metadata["look"]))
     shown, before = (part_colour(face, "iris") for face in (chosen, usual))
     assert shown[2] > shown[0] + 10
     assert before[0] > before[2]
