@@ -49,7 +49,9 @@ SHADED_CROWN = 0.24  # share of a bald crown that is unlike skin: shaved hair; b
 # to .46 and .32 to .37, long curls .52 and .43, straight hair from .55 and .46, long and straight from .7 and .65.
 # above the brows, below them; of hair that falls
 CURLY = 0.6
-CURLY_WIDE = 0.47
+# Of long hair, that sum with how vertical strands are below the brows (-1 to 1): long curls .63 to .82, waves from .89.
+CURLS_FALL = 0.85
+UNKNOWN_STRANDS = (np.nan, np.nan, np.nan, np.nan)
 WAVY_WIDE = 0.55
 # Mean resultant of these directions over 20 mm, of long hair below the brows, is .94 to .97 of straight hair, .90 to
 # .93 of waves, whose coherence is .58 to .68; less of straight locks side by side, whose coherence is more.
@@ -66,7 +68,7 @@ AFRO_MM, SLEEK_MM = (105.0, 84.0, 120.0), 28.0
 # Of the outline of a head: the second deepest hollow between skull and buns is 12 to 34 mm deep, of other hair to 9.
 KNOT_MM, HOLLOW_UP_MM, HOLLOW_UNIT = 10.5, 20.0, 256.0  # least, above the forehead; in which OpenCV counts
 # rows below the lowest hair in which the picture ends; hair that it cuts is longer by about so much
-EDGE_ROWS, CUT_MM = 2, 20.0
+EDGE_ROWS, CUT_MM = 2, 30.0
 # Rows of nearly the largest width: afros have theirs 2 to 23 mm above the brows, curls that hang 18 to 21 below.
 WIDE_SHARE, ROUND_MM = 0.95, -8.0
 TIED_MM = 105.0  # above `FOREHEAD`: what stands so high is tied
@@ -95,6 +97,7 @@ class HairMeasures:
     fringe: float
     coherence: tuple[float, float, float]
     course: float
+    fall: float
     widest: float
     knot: float
 
@@ -110,7 +113,7 @@ def measure_hair(portrait: Portrait, hair: Mask) -> HairMeasures:
     ends = [UP_MM[np.flatnonzero(width >= MIN_LOCK_MM)].min(initial=forehead) for width in beside]
     falling = [end for end in ends if end < forehead - TEMPLE_HAIR_MM] or [forehead]
     is_cut = any(_is_cut(portrait, hair & (side * across > off_neck)) for side in (-1, 1))
-    if min(falling) < chin + ONE_SIDE_MM:
+    if is_cut or min(falling) < chin + ONE_SIDE_MM:
         falling = [min(falling)]
     middle = hair[:, np.abs(ACROSS_MM) < TEMPLE_MM]
     tops = UP_MM[np.argmax(middle[:, middle.any(axis=0)], axis=0)]
@@ -127,7 +130,7 @@ def measure_hair(portrait: Portrait, hair: Mask) -> HairMeasures:
         float(reach.max()),
         min(float((hair & half).sum() / max(half.sum(), 1)) for half in halves),
         (whole[0], above[1], below[1]),
-        below[2],
+        *below[2:],
         float(UP_MM[reach > WIDE_SHARE * reach.max()].mean()) - brow,
         knot_depth(portrait, hair),
     )
@@ -165,19 +168,14 @@ def knot_depth(portrait: Portrait, hair: Mask) -> float:
     return float(deepest[-2]) * CELL_MM
 
 
-def _coherence(portrait: Portrait, hair: Mask, parts: Sequence[Mask]) -> list[tuple[float, float, float]]:
-    """Coherence of directions of strands over `NEAR_MM` and `WIDE_MM` in parts (R, C) of hair, and their course."""
-    from scipy.ndimage import binary_erosion, gaussian_filter
+def _coherence(portrait: Portrait, hair: Mask, parts: Sequence[Mask]) -> list[tuple[float, float, float, float]]:
+    """Coherence of strands over `NEAR_MM` and `WIDE_MM` in parts (R, C) of hair, their course, and how they fall."""
+    from scipy.ndimage import gaussian_filter
 
     if portrait.fine is None:
-        return [(np.nan, np.nan, np.nan)] * len(parts)
-    rows, columns = (np.minimum(np.arange(length) // 2, length // 2) for length in portrait.fine.shape[:2])
-    is_hair = hair[np.ix_(rows, columns)]
-    inner = binary_erosion(is_hair, iterations=INSIDE_CELLS)
+        return [UNKNOWN_STRANDS] * len(parts)
+    inner, relief, fine = _relief(portrait, hair)
     per_cell = 2.0 / CELL_MM
-    light = np.where(is_hair, np.log(np.nan_to_num(portrait.fine) @ LUMINANCE + 8.0), 0.0)
-    around = gaussian_filter(is_hair.astype(np.float64), SHADE_MM * per_cell) + 1e-6
-    relief = np.where(is_hair, light - gaussian_filter(light, SHADE_MM * per_cell) / around, 0.0)
     down, along = np.gradient(gaussian_filter(relief, FINE_MM * per_cell))
     doubled = along + 1j * down
     power, square = np.abs(doubled) ** 2, doubled**2  # the structure tensor: its trace, and its direction, doubled
@@ -187,16 +185,50 @@ def _coherence(portrait: Portrait, hair: Mask, parts: Sequence[Mask]) -> list[tu
     )
     found = []
     for part in parts:
-        is_part = part[np.ix_(rows, columns)] & inner
+        is_part = part[fine] & inner
         if is_part.sum() < FINEST:
-            found.append((np.nan, np.nan, np.nan))
+            found.append(UNKNOWN_STRANDS)
             continue
         turned = np.where(is_part, near, 0.0)
         course = np.abs(_blurred(turned, COURSE_MM * per_cell))
         course /= gaussian_filter(np.abs(turned), COURSE_MM * per_cell) + 1e-9
         medians = (float(np.median(values[is_part])) for values in (np.abs(near), np.abs(wide), course))
-        found.append(tuple(medians))
+        found.append((*medians, float(square.real[is_part].sum() / (power[is_part].sum() + 1e-12))))
     return found
+
+
+def _relief(portrait: Portrait, hair: Mask) -> tuple[Mask, FloatArray, tuple[NDArray[np.int64], ...]]:
+    """Fine cells off the outline of hair (R, C), light of its strands in them, and cells of (R, C) that they are in."""
+    from scipy.ndimage import binary_erosion, gaussian_filter
+
+    if portrait.fine is None:
+        raise ValueError("a portrait without a fine picture has no strands")
+    fine = np.ix_(*(np.minimum(np.arange(length) // 2, length // 2) for length in portrait.fine.shape[:2]))
+    is_hair, reach = hair[fine], SHADE_MM * 2.0 / CELL_MM
+    light = np.where(is_hair, np.log(np.nan_to_num(portrait.fine) @ LUMINANCE + 8.0), 0.0)
+    around = gaussian_filter(is_hair.astype(np.float64), reach) + 1e-6
+    relief = np.where(is_hair, light - gaussian_filter(light, reach) / around, 0.0)
+    return np.asarray(binary_erosion(is_hair, iterations=INSIDE_CELLS)), relief, fine
+
+
+def strand_relief(portrait: Portrait, hair: Mask, part: Mask) -> float:
+    """Deviation of the logarithm of light from strand to strand in a part (R, C) of hair; infinite if not seen."""
+    if portrait.fine is None:
+        return np.inf
+    inner, relief, fine = _relief(portrait, hair)
+    seen = relief[part[fine] & inner]
+    return float(seen.std()) if len(seen) >= FINEST else np.inf
+
+
+def name_below_hat(portrait: Portrait, hair: SeenHair) -> str:
+    """Name of the hair below a hat, which lies over the region."""
+    seen = measure_hair(portrait, hair.region)
+    strands = seen.coherence[2]
+    if seen.end < LONG_MM[int(seen.half_width > LONG_WIDE_MM)]:
+        return "long and wavy" if strands < WAVY_WIDE else "long"
+    if seen.end < BOB_MM:
+        return "wavy bob" if strands < WAVY_WIDE else "bob"
+    return UNSEEN
 
 
 def _blurred(values: NDArray[np.complex128], spread: float) -> NDArray[np.complex128]:
@@ -229,7 +261,7 @@ def _strands(seen: HairMeasures) -> float:
 
 def _long_name(seen: HairMeasures) -> str:
     strands = _strands(seen)
-    if strands < CURLY_WIDE:
+    if strands + np.nan_to_num(seen.fall) < CURLS_FALL:
         return "long and curly"
     if strands < WAVY_WIDE or (strands < WAVY_COHERENT and WAVY_COURSE[0] < seen.course < WAVY_COURSE[1]):
         return "long and wavy"

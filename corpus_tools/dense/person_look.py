@@ -16,7 +16,8 @@ from corpus_tools.dense.hair_region import (
     find_hair,
     portrait_grid,
 )
-from corpus_tools.dense.hairdo import HAIRCUTS, UNSEEN, name_hair
+from corpus_tools.dense.hairdo import HAIRCUTS, UNSEEN, name_below_hat, name_hair
+from corpus_tools.dense.hats import HAIR_LINE, below_hat
 from corpus_tools.dense.light_colour import (
     MIN_IRIS_PX,
     EyeColours,
@@ -46,9 +47,8 @@ HAIR_LIGHT = (0.005, 0.6)  # luminance of the darkest and lightest hair
 CROPPED_LIGHT = -1.3  # most luminance of cropped hair, of the skin's, logarithm: what is seen is hair and skin mixed
 SEEN_SKIN = 0.4  # of what differs from skin, which cropped hair lets through: rendered heads of three tones
 SHINE = 0.5  # logarithm by which hair in a picture is lighter than its strands and brows; median of rendered haircuts
-# Natural hair lies on a line of log R/G and B/G, from black and grey to brown and blond: browner by so much bluer less.
-# Casts of cameras and walls lead off it; what is further off than these is dyed or red.
-HAIR_LINE, NATURAL = np.array([1.0, -0.9]), (0.4, 0.7)
+# Casts of cameras and walls lead off the line of natural hair; what is further off than these is dyed or red.
+NATURAL = (0.4, 0.7)
 GREY = 0.35  # log R/G below which hair is rather grey in yellowish light than blond
 BLACK_SHINE, DARK_GREY = 1.0, (0.9, 1.6)  # logarithms: of shine on black hair, which is so much darker than skin
 CHILD_BROWN = 0.5  # least log R/G of a child's hair
@@ -179,7 +179,9 @@ class LookSampler:
         cast = estimate_cast(eyes)
         hair = find_hair(portrait, eyes.skin)
         self.hair = hair.region
-        length = name_hair(portrait, hair, eyes.skin)
+        hatted = below_hat(portrait, hair, cast)
+        length = name_hair(portrait, hair, eyes.skin) if hatted is None else name_below_hat(portrait, hatted)
+        hair = hatted or hair
         colour, code = log_colour(255.0 * parse_hair_colour(UNSEEN_HAIR)), UNSEEN_HAIR
         if np.isfinite(hair.colour).all():
             seen, most = hair.colour, 0.0
@@ -189,6 +191,7 @@ class LookSampler:
             colour = hair_colour(seen, most, CHILD_BROWN if is_child(self.fit.marks, is_drawn=eyes.is_drawn) else 0.0)
             code = "#{:02x}{:02x}{:02x}".format(*srgb_colour(colour).tolist())
         notes = [] if length else ["top of the head not seen"]
+        notes += [] if hatted is None else ["a hat, left off"]
         length = length or UNSEEN
         is_visible = eyes.radius_px >= MIN_IRIS_PX and np.isfinite(eyes.iris).all()
         iris = srgb_colour(iris_colour(eyes, cast)) if is_visible else parse_hex(NEUTRAL_IRIS)
