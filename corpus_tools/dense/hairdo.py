@@ -48,7 +48,7 @@ SHADED_CROWN = 0.24  # share of a bald crown that is unlike skin: shaved hair; b
 # Median coherence of the directions of strands (Bigun and Granlund 1987) over 4.5 and 9 mm: afros and short curls .36
 # to .46 and .32 to .37, long curls .52 and .43, straight hair from .55 and .46, long and straight from .7 and .65.
 # above the brows, below them; of hair that falls
-CURLY = 0.6
+CURLY = 0.57
 # Of long hair, that sum with how vertical strands are below the brows (-1 to 1): long curls .63 to .82, waves from .89.
 CURLS_FALL = 0.85
 UNKNOWN_STRANDS = (np.nan, np.nan, np.nan, np.nan)

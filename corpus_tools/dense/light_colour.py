@@ -36,7 +36,8 @@ OFF_IRIS, OFF_LIDS = 1.35, 0.18  # of the radius: what is white of the eye, and 
 # Drawn eyes are open by so many radii of what the tracker takes for the iris (2.0 to 2.35; people by 1.4 to 1.8), which
 # is their pupil; the coloured part lies beyond it, lit below.
 DRAWN_OPEN, DRAWN_REACH = 1.9, 1.9
-OFF_WHITE, BRIGHT_RIM = 0.3, 1  # most light of a drawn iris, of the white's; samples around white and catchlights
+LIT_WHITE, OFF_WHITE = 0.97, 0.3  # quantile of luminance that is white or catchlight; most light of an iris, of that
+BRIGHT_RIM = 1  # samples around both, which are mixed
 DRAWN_BRIGHT, DRAWN_PUPIL = (
     0.95,
     0.4,
@@ -105,9 +106,8 @@ def sample_eyes(picture: NDArray[np.uint8], points: NDArray[np.floating]) -> Eye
         is_open = polygon_depth(grid, opening, radius) > OFF_LIDS * radius
         is_drawn = _is_drawn(opening, radius)
         if is_drawn:
-            white = _median_between(colours[is_open], DRAWN_WHITE)
-            ring = _drawn_ring(colours, is_open & (off < DRAWN_REACH), float(white[0]))
-            whites.append(white)
+            ring = _drawn_ring(colours, is_open, off < DRAWN_REACH)
+            whites.append(_median_between(colours[is_open], DRAWN_WHITE))
         else:
             ring = is_open & (off > IRIS_RING[0]) & (off < IRIS_RING[1]) & (grid[:, 1] > middle[1] - IRIS_TOP * radius)
             whites.append(_median_between(colours[is_open & (off > OFF_IRIS)], BRIGHT_WHITE))
@@ -133,12 +133,13 @@ def _is_drawn(opening: FloatArray, radius: float) -> bool:
     return bool(np.ptp(opening[:, 1]) > DRAWN_OPEN * radius)
 
 
-def _drawn_ring(colours: FloatArray, near: Mask, white: float) -> Mask:
-    """(N,) samples of a drawn eye that may be iris: off the white, of a luminance (logarithm), and off catchlights."""
+def _drawn_ring(colours: FloatArray, is_open: Mask, is_near: Mask) -> Mask:
+    """(N,) samples near the middle of a drawn eye that may be iris, off the white and off catchlights."""
     from scipy.ndimage import binary_dilation
 
+    white = np.quantile(colours[is_open, 0], LIT_WHITE) if is_open.any() else 0.0
     is_bright = (colours[:, 0] > white + np.log(OFF_WHITE)).reshape(EYE_GRID[::-1])
-    return np.asarray(near & ~binary_dilation(is_bright, iterations=BRIGHT_RIM).ravel())
+    return np.asarray(is_open & is_near & ~binary_dilation(is_bright, iterations=BRIGHT_RIM).ravel())
 
 
 def _without_pupil(ring: FloatArray, *, is_drawn: bool) -> FloatArray:

@@ -66,6 +66,7 @@ PALE_IRIS, PALE_BROWN_FROM = 0.11, 0.6  # luminance from which irises are hazel 
 IRIS_WHITE = np.array([0.08, 0.0])  # log R/G and B/G of the white of the eye, beside which irises are measured
 BROWN_SLOPE, BROWN_LIGHT = -0.8, 0.035  # of B/G: their least R/G; usual luminance
 WHITE_SHARE, OFF_SKIN = 0.7, (0.05, 0.3)  # of the white's cast; log R/G by which it must be less red than the skin
+DRAWN_CHROMA = 0.7  # painted brown is more vivid than irises: their log R/G and B/G, of its
 AMBER = -0.9  # log B/G up to which more yellow is redder; irises beyond are amber
 BROW_LIGHT = -1.9  # most luminance of brows, of the skin's, logarithm
 ROOT_MM, LASH_MM = 0.7, 10.0  # off the skin: roots of lashes, and lashes that are shown
@@ -259,7 +260,7 @@ def iris_colour(eyes: EyeColours, cast: FloatArray) -> FloatArray:
     if np.isfinite(eyes.sclera).all():
         trust = WHITE_SHARE * smoothstep(eyes.skin[1] - eyes.sclera[1], *OFF_SKIN)
         hue = hue + trust * (clear[1:] - eyes.sclera[1:] + IRIS_WHITE - hue)
-    red, blue = hue
+    red, blue = hue * (DRAWN_CHROMA if eyes.is_drawn and hue[0] > 0 else 1.0)
     if light < np.log(DARK_IRIS):
         return np.array([light, *DARK_IRIS_HUE])
     if red > (PALE_BROWN_FROM if light > np.log(PALE_IRIS) else BROWN_FROM) and blue < BROWN_BLUE:
