@@ -29,10 +29,10 @@ BROW_HALF_MM, BROW_DOWN_MM, BROW_DARK = 6.0, 4.0, 0.3  # cells about a brow, of 
 BROW_SHINE = np.array([0.5, 0.0, 0.0])  # logarithm by which hair is lighter than brows
 
 
-def off_natural(hue: FloatArray) -> float:
-    """Distance of log R/G and B/G (2,) from those of natural hair."""
-    brown = max(float(hue @ HAIR_LINE / (HAIR_LINE @ HAIR_LINE)), 0.0)
-    return float(np.linalg.norm(hue - brown * HAIR_LINE))
+def off_natural(hue: FloatArray) -> FloatArray:
+    """Distance (...) of log R/G and B/G (..., 2) from those of natural hair."""
+    brown = np.maximum(hue @ HAIR_LINE / (HAIR_LINE @ HAIR_LINE), 0.0)
+    return np.asarray(np.linalg.norm(hue - brown[..., None] * HAIR_LINE, axis=-1))
 
 
 def below_hat(portrait: Portrait, hair: SeenHair, cast: FloatArray) -> SeenHair | None:
@@ -50,6 +50,7 @@ def below_hat(portrait: Portrait, hair: SeenHair, cast: FloatArray) -> SeenHair 
         return None
     below = hair.region & (up < portrait.marks[FOREHEAD, 1])
     below &= np.linalg.norm(colours[..., 1:] - usual[1:], axis=-1) > OFF_HAT
+    below &= off_natural(colours[..., 1:] - cast) < UNNATURAL
     if below.sum() >= MIN_CELLS:
         return replace(hair, colour=np.median(colours[below], axis=0))
     tops = portrait.marks[list(BROW_TOPS), :2] - (0.0, BROW_DOWN_MM)

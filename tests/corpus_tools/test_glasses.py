@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from corpus_tools.dense.glasses import Glasses, covered_skin, find_glasses, wear_glasses
-from corpus_tools.dense.mesh_fit import face_landmarks
+from corpus_tools.dense.mesh_fit import face_landmarks, part_vertices
 from corpus_tools.dense.texture import without_covered
 from lexicon.errors import DataError
 from tts2face.models.face import Face
@@ -110,3 +111,16 @@ def test_other_faces_with_more_vertices_take_no_haircut(head: Face) -> None:
     other = replace(worn, parts=(*worn.parts[:-1], replace(worn.parts[-1], name="hat")))
     with pytest.raises(DataError, match="fits heads of"):
         attach_hair(other, load_hair("bob02"), "brown")
+
+
+def test_wires_lie_before_the_skin_of_round_cheeks(head: Face) -> None:
+    turn = np.linspace(0, 2 * np.pi, 64, endpoint=False)
+    half = np.array([24.0, 22.0])
+    rims = np.array([eye.centre[:2] + half * np.column_stack([np.cos(turn), np.sin(turn)]) for eye in head.eyes])
+    worn = wear_glasses(head, Glasses(rims, np.zeros((0, 2)), FRAME))
+    points = worn.vertices[len(head.vertices) :].astype(float)
+    ahead = points[(np.abs(points[:, 0]) < 45) & (points[:, 2] > points[:, 2].max() - 25)]
+    skin = head.vertices[part_vertices(head, ("skin",))].astype(float)
+    skin = skin[skin[:, 2] > ahead[:, 2].min() - 15]
+    under = skin[cKDTree(skin[:, :2]).query(ahead[:, :2])[1], 2]
+    assert (ahead[:, 2] > under).all()

@@ -13,13 +13,16 @@ from scipy.spatial.transform import Rotation
 
 from cli.main import run
 from corpus_tools.dense.hair_region import ACROSS_MM, CELL_MM, UP_MM, Portrait, find_hair, portrait_grid
-from corpus_tools.dense.hairdo import KNOT_MM, knot_depth, name_hair
+from corpus_tools.dense.hairdo import HAIRCUTS, KNOT_MM, knot_depth, name_below_hat, name_hair
+from corpus_tools.dense.hats import below_hat
 from corpus_tools.dense.light_colour import (
     GLOSSY,
+    IRISES,
     EyeColours,
     estimate_cast,
     log_colour,
     remove_cast,
+    sample_eyes,
     skin_texture,
     srgb_colour,
     without_gloss,
@@ -45,7 +48,7 @@ from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import read_face
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_names import BALD
-from tts2face.models.landmarks import N_LANDMARKS, N_MESH_LANDMARKS
+from tts2face.models.landmarks import LID_RINGS, N_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.models.named_colours import EYE_COLOURS, HAIR_COLOURS, parse_eye_colour, parse_hair_colour
 from tts2face.numeric.arrays import decode_srgb, encode_srgb
 from tts2face.picture.camera import camera_matrices
@@ -195,6 +198,46 @@ def test_hair_of_a_head_cut_by_the_pictures_edge_is_that_beside_it(
     cut = portrait.srgb.copy()
     cut[portrait.marks[10, 1] + above_mm < UP_MM] = np.nan
     assert name_of(replace(portrait, srgb=cut)) in names
+
+
+@pytest.mark.parametrize("is_smooth", [True, False])
+def test_a_hat_is_smooth_and_not_of_a_natural_colour(head: Face, *, is_smooth: bool) -> None:
+    """Green hair in which strands are seen is dyed; of a green hat the hair below it has the colour."""
+    portrait = painted_portrait(head, (70, 120, 170), (60, 42, 30), -95.0, 75.0)
+    above = portrait.marks[10, 1] - 3 < UP_MM
+    green, size = np.array((30.0, 140.0, 60.0)), (2 * len(UP_MM) - 1, 2 * len(ACROSS_MM) - 1)
+    region = find_hair(portrait, log_colour(SKIN)).region
+    srgb = np.where((region & above[:, None])[..., None], green, portrait.srgb)
+    strands = gaussian_filter(np.random.default_rng(3).normal(size=size), (8.0, 0.8))
+    fine = np.repeat((90 + (0.5 if is_smooth else 14) * strands / strands.std())[..., None], 3, axis=2)
+    hatted = replace(portrait, srgb=srgb, fine=fine)
+    found = below_hat(hatted, replace(find_hair(portrait, log_colour(SKIN)), region=region), np.zeros(2))
+    assert (found is not None) == is_smooth
+    if found is not None:
+        np.testing.assert_allclose(srgb_colour(found.colour), (60, 42, 30), atol=3)
+        assert name_below_hat(hatted, found) in HAIRCUTS
+
+
+def test_a_drawn_iris_is_read_off_pupil_white_and_catchlight() -> None:
+    """An eye as drawn people have it: a wide pupil, a coloured ring around it, a large catchlight."""
+    size, middle, radius = 240, np.array([(70.0, 60.0), (170.0, 60.0)]), 12.0
+    rows, columns = np.mgrid[:120, :size].astype(float)
+    picture = np.full((120, size, 3), SKIN)
+    points = np.zeros((478, 3))
+    points[:, :2] = (120.0, 100.0)
+    for (x, y), (centre, rim), lids in zip(middle, IRISES, LID_RINGS, strict=True):
+        off = np.hypot(columns - x, rows - y)
+        is_open = np.hypot((columns - x) / 28, (rows - y) / 26) < 1
+        for colour, inside in (((235, 232, 228), is_open), ((70, 105, 140), off < 22), ((5, 5, 5), off < radius)):
+            picture[is_open & inside] = colour
+        picture[np.hypot(columns - x + 9, rows - y + 8) < 5] = 250
+        points[centre, :2] = (x, y)
+        points[list(rim), :2] = (x, y) + radius * np.array([(1, 0), (0, -1), (-1, 0), (0, 1)])
+        turn = np.linspace(0, 2 * np.pi, len(lids), endpoint=False)
+        points[list(lids), :2] = np.array((x, y)) + np.column_stack([28 * np.cos(turn), 26 * np.sin(turn)])
+    eyes = sample_eyes(np.rint(picture).astype(np.uint8), points)
+    assert eyes.is_drawn
+    np.testing.assert_allclose(srgb_colour(eyes.iris), (70, 105, 140), atol=6)
 
 
 def test_hollows_beside_a_bun_are_seen(head: Face) -> None:
