@@ -45,9 +45,8 @@ FLAT_MM = (62.0, 80.0)  # hair above `FOREHEAD`, and its half width: less of bot
 # to this difference from skin.
 SEE_THROUGH, CROPPED_MM = 4.5, (7.5, 13.5)
 SHADED_CROWN = 0.24  # share of a bald crown that is unlike skin: shaved hair; bald people have less
-# Median coherence of the directions of strands (Bigun and Granlund 1987) over 4.5 and 9 mm: afros and short curls .36
-# to .46 and .32 to .37, long curls .52 and .43, straight hair from .55 and .46, long and straight from .7 and .65.
-# above the brows, below them; of hair that falls
+# Median coherence of the directions of strands (Bigun and Granlund 1987) over 4.5 mm: afros and short curls .35 to .55,
+# short straight hair from .59 (crops .65 to .8); over 9 mm: waves .34 to .54 (some to .7), bobs from .62.
 CURLY = 0.57
 # Of long hair, that sum with how vertical strands are below the brows (-1 to 1): long curls .63 to .82, waves from .89.
 CURLS_FALL = 0.85
@@ -62,12 +61,10 @@ COURSE_MM = 20.0
 FINE_MM = 1.5
 SHADE_MM = 6.0
 FINEST, INSIDE_CELLS = 100, 3  # cells that tell a texture, and their distance from the outline in fine cells
-# Curls are an afro where they end higher above the chin (from 106 mm; curls that fall 61 to 104) and are wider, from
-# the middle of the face (from 87; short curls 78 to 81), or very wide. With less at the temples hair is combed back.
-AFRO_MM, SLEEK_MM = (105.0, 84.0, 120.0), 28.0
+SLEEK_MM = 28.0  # curls of less width at the temples are combed back
 # Of the outline of a head: the second deepest hollow between skull and buns is 12 to 34 mm deep, of other hair to 9.
-KNOT_MM, HOLLOW_UP_MM, HOLLOW_UNIT = 10.5, 20.0, 256.0  # least, above the forehead; in which OpenCV counts
-# rows below the lowest hair in which the picture ends; hair that it cuts is longer by about so much
+KNOT_MM, HOLLOW_UP_MM, HOLLOW_UNIT = 10.5, 20.0, 256.0  # least depth, and height above the forehead; OpenCV's unit
+# Rows below the lowest hair in which the picture ends, and by how much hair that it cuts is taken to be longer.
 EDGE_ROWS, CUT_MM = 2, 30.0
 # Rows of nearly the largest width: afros have theirs 2 to 23 mm above the brows, curls that hang 18 to 21 below.
 WIDE_SHARE, ROUND_MM = 0.95, -8.0
@@ -85,9 +82,10 @@ class HairMeasures:
     """Measures of hair, mm: heights of its lowest ends above the chin, and of its top above the forehead.
 
     ``temples`` is its width on both sides beside the brows, ``half_width`` that from the middle of the face above the
-    chin. ``fringe`` is the share of the lower forehead under it, and ``coherence`` that of the directions of its
-    strands over 4 and 9 mm above the brows, then below; ``course`` is how far they stay the same over 20 mm, below.
-    NaN where too little is seen.
+    chin, ``widest`` the height of that width above the brows. ``fringe`` is the share of the lower forehead under it,
+    of the half with less, and ``knot`` the depth of hollows of its outline. ``coherence`` is that of the directions of
+    strands over 4 mm, then over 9 mm above and below the brows; ``course`` is how far they stay the same over 20 mm
+    below the brows, and ``fall`` how vertical they are there, -1 to 1. NaN where too little is seen.
     """
 
     end: float
@@ -178,12 +176,15 @@ def _coherence(portrait: Portrait, hair: Mask, parts: Sequence[Mask]) -> list[tu
     per_cell = 2.0 / CELL_MM
     down, along = np.gradient(gaussian_filter(relief, FINE_MM * per_cell))
     doubled = along + 1j * down
-    power, square = np.abs(doubled) ** 2, doubled**2  # the structure tensor: its trace, and its direction, doubled
+    power, square = (
+        np.abs(doubled) ** 2,
+        np.asarray(doubled**2, np.complex128),
+    )  # the structure tensor: its trace, and its direction, doubled
     near, wide = (
         _blurred(inner * square, reach * per_cell) / (gaussian_filter(inner * power, reach * per_cell) + 1e-12)
         for reach in (NEAR_MM, WIDE_MM)
     )
-    found = []
+    found: list[tuple[float, float, float, float]] = []
     for part in parts:
         is_part = part[fine] & inner
         if is_part.sum() < FINEST:
@@ -192,8 +193,9 @@ def _coherence(portrait: Portrait, hair: Mask, parts: Sequence[Mask]) -> list[tu
         turned = np.where(is_part, near, 0.0)
         course = np.abs(_blurred(turned, COURSE_MM * per_cell))
         course /= gaussian_filter(np.abs(turned), COURSE_MM * per_cell) + 1e-9
-        medians = (float(np.median(values[is_part])) for values in (np.abs(near), np.abs(wide), course))
-        found.append((*medians, float(square.real[is_part].sum() / (power[is_part].sum() + 1e-12))))
+        fall = float(np.sum(square.real * is_part) / (np.sum(power * is_part) + 1e-12))
+        medians = [float(np.median(values[is_part])) for values in (np.abs(near), np.abs(wide), course)]
+        found.append((medians[0], medians[1], medians[2], fall))
     return found
 
 

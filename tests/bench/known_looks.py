@@ -17,7 +17,7 @@ from tts2face.models.face import Face, Texture
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_names import BALD, haircut_names
 from tts2face.models.face_tint import _part_texel_levels
-from tts2face.models.hair import attach_hair
+from tts2face.models.hair import Hair, attach_hair
 from tts2face.models.hair_file import load_hair
 from tts2face.models.light import Lamps
 from tts2face.models.named_colours import EYE_COLOURS, HAIR_COLOURS
@@ -137,7 +137,9 @@ def _person(look: KnownLook, rng: np.random.Generator) -> Face:
         glasses = Glasses(np.array(rims), np.zeros((0, 2)), np.array(look.frame, float))
         face = wear_glasses(load_face(HEAD, look.identity, hair=BALD), glasses)
         if look.haircut != BALD:
-            face = attach_hair(face, load_hair(str(look.haircut)), str(look.colour))
+            cards = load_hair(str(look.haircut))
+            assert isinstance(cards, Hair)
+            face = attach_hair(face, cards, str(look.colour))
     if look.hat:
         face = _wear_hat(face, look.hat, rng)
     return _with_eyes(face, look.eyes)
@@ -224,4 +226,4 @@ def _wall(kind: str, rng: np.random.Generator, side: int) -> FloatArray:
     for _ in range(12 * (kind == "sharp")):
         x, y = rng.integers(0, side), rng.integers(0, side)
         wall[y : y + rng.integers(10, side // 2), x : x + rng.integers(5, side // 3)] = rng.integers(0, 255, 3)
-    return np.clip(wall, 0, 255)
+    return np.asarray(np.clip(wall, 0, 255), np.float64)
