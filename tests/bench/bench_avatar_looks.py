@@ -1,6 +1,6 @@
 """Hair and eyes of avatars beside those in their pictures: python -m tests.bench.bench_avatar_looks [FIRST LAST].
 
-Looks of even numbers may choose limits; those of odd ones, 1 to 95, are the figures of docs/photo.md.
+Looks of even numbers and those to 139 chose limits; odd ones from 141 to 195 are the figures of docs/photo.md.
 """
 
 import sys
@@ -35,7 +35,7 @@ def hair_apart(look: KnownLook, found: PersonLook) -> float:
 
 def main() -> None:
     """Print a row a picture and the sums."""
-    numbers = range(int(sys.argv[1]), int(sys.argv[2]) + 1, 2) if len(sys.argv) > 2 else range(1, 97, 2)
+    numbers = range(int(sys.argv[1]), int(sys.argv[2]) + 1, 2) if len(sys.argv) > 2 else range(141, 197, 2)
     right, apart = Counter[str](), []
     with TemporaryDirectory() as folder:
         for number in numbers:
