@@ -80,6 +80,9 @@ class Scanner:
             yield from self.romans
 
 
+_VULGAR = r"[\u00bc-\u00be\u2150-\u215e]"
+_FRACTION = rf"(?: ?(?P<vulgar>{_VULGAR})| (?P<top>[0-9]{{1,3}})/(?P<bottom>[0-9]{{1,3}})(?![\w/]))"
+_ALONE = rf"(?P<sign>{_VULGAR})|(?P<first>[0-9]{{1,3}})/(?P<second>[0-9]{{1,3}})(?![\w/])"
 # Names in angle quotes are parts of `_parts`; a form with a part that the language lacks is left out.
 _NUMBER_FORMS: tuple[tuple[str, Reader], ...] = (
     (r"(?P<year>[0-9]{4})-(?P<month>[0-9]{2})-(?P<day>[0-9]{2})(?![\w-])", dates.read_numeric_date),
@@ -124,16 +127,8 @@ _NUMBER_FORMS: tuple[tuple[str, Reader], ...] = (
         counted.read_money,
     ),
     (r"(?P<amount>‹amount›)(?:[-–](?=[0-9])| – (?=[0-9]))(?!‹amount›[-–][0-9])", counted.read_range),
-    (
-        r"(?:(?P<integer>[0-9]{1,4}) ?)?(?P<vulgar>[\u00bc-\u00be\u2150-\u215e])(?P<top>(?!))?(?P<bottom>(?!))?"
-        r"(?: (?P<noun>‹letter›{1,24}))?",
-        fractions.read_fraction,
-    ),
-    (
-        r"(?:(?P<integer>[0-9]{1,4}) )?(?P<top>[0-9]{1,3})/(?P<bottom>[0-9]{1,3})(?![\w/])(?P<vulgar>(?!))?"
-        r"(?: (?P<noun>‹letter›{1,24}))?",
-        fractions.read_fraction,
-    ),
+    (rf"(?P<integer>[0-9]{{1,4}}){_FRACTION} (?P<noun>‹letter›{{3,24}})", fractions.read_divided),
+    (rf"(?:(?P<integer>[0-9]{{1,4}}){_FRACTION}|{_ALONE})(?: (?P<noun>‹unit›)(?!‹letter›))?", fractions.read_fraction),
     (
         r"‹signed›(?: ?(?P<magnitude>‹magnitude›))?(?: ?|-)(?P<unit>‹unit›)(?:/(?P<per>‹unit›))?‹end›‹tail›",
         counted.read_measure,

@@ -10,6 +10,7 @@ from lexicon.locales.tables import Row
 from lexicon.sentence_ends import ends_sentence
 
 _CONTEXT = 40
+_SILENT = frozenset("<>~·*")  # where they stand between no numbers
 
 
 def read_abbreviation(place: Place) -> str | None:
@@ -83,7 +84,7 @@ def read_sign(place: Place) -> str | None:
     before = place.text[max(place.match.start() - 2, 0) : place.match.start()].rstrip(" ")[-1:]
     after = place.text[place.match.end() : place.match.end() + 2].lstrip(" ")[:1]
     if "number" in row.details and not (_is_term(after) and (_is_term(before) or row.details.get("number") == "sign")):
-        return None
+        return " " if place.match.group() in _SILENT else row.spoken
     if "math" in row.details and not (_is_term(before) and _is_term(after) and _has_equals(place)):
         return None
     if "unit" in row.details and not _stands_between_units(place):

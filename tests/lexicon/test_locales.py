@@ -1,8 +1,12 @@
 """Numbers, dates, abbreviations and signs of languages with a table, as words."""
 
+import random
+import re
+
 import pytest
 
 from lexicon.g2p import languages
+from lexicon.locales.reading import read_forms
 from lexicon.normalize import spoken_form
 from lexicon.pronounce import pronounce
 from lexicon.spoken_words import pronounce_marked
@@ -57,3 +61,26 @@ def test_minus_is_a_word_in_languages_without_a_table(language: str, text: str, 
 
 def test_every_language_of_the_table_of_minus_is_one_of_espeak() -> None:
     assert read_table("minus_words.tsv").keys() <= languages().keys()
+
+
+PIECES = (
+    "5", "3,5", "1.000", "1 234 567", "12\u00a0500", "0,05", "007", "1998", "-5", "−5 °C", "20 %", "20%", "€ 5", "5 €",
+    "$20", "3,50 €", "½", "2½", "3/4", "10-15", "10–15 km", "3.5.2024", "3/5/2024", "2024-05-03", "14:30", "8:05",
+    "XIV", "XL", "MIX", "II.", "5.", "№ 5", "§ 7", "5 × 3 = 15", "2 + 2", "+49 30 123456", "1.2.3", "COVID-19", "A4",
+    "5km", "100 km/h", "m²", "info@a.de",
+    "٣٫٥", "५", "word", "(", ")", ",", "?", "Dr.", "z. B.", "т. е.", "1er", "2e", "1.º",
+    "5-го", "7!", "~5", "&", "3:1", "#1", "°", "%", "€", "@", "1/2/3", "99999999999999999999",
+)  # fmt: skip
+NEVER = re.compile(r"[0-9€$£%½−+=×§&@°²]")
+
+
+@pytest.mark.parametrize("language", ["de", "fr-fr", "es", "it", "pt-br", "nl", "pl", "ru", "tr", "el"])
+def test_only_words_are_left_of_any_text(language: str) -> None:
+    chance = random.Random(language)
+    for _ in range(200):
+        text = " ".join(chance.choice(PIECES) for _ in range(chance.randint(1, 8)))
+        forms = read_forms(text, language)
+        assert "".join(form.source for form in forms) == text
+        said = spoken_form(text, language)
+        assert not NEVER.search(said), (text, said)
+        assert spoken_form(said, language) == said
