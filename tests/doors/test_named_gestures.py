@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from lexicon.gesture_names import GESTURES
+from tests.golden.requests import starter_with_pictures
 from tests.world import World
 from tts2face.face.gestures import gesture_face
 from tts2face.face.landmarks import moved_landmarks
@@ -14,6 +15,7 @@ from tts2face.models.face_loading import load_face
 from tts2face.models.palette_file import load_palette
 from tts2face.request import Request
 from tts2face.session.session import Session
+from tts2face.sound.voice_pool import VoicePool
 from tts2face.types import Clip
 
 BILABIAL = frozenset("pbm")
@@ -112,3 +114,13 @@ def test_the_timeline_is_the_text(world: World, tmp_path: Path) -> None:
     (tmp_path / "t.json").write_text(json.dumps({"gestures": [gesture]}))
     painted = world.session().clip(Request(text="One, two, three.", timeline=tmp_path / "t.json"))
     np.testing.assert_allclose(marked.head.values, painted.head.values, atol=1e-5)
+
+
+def test_a_talkers_own_face_shows_what_its_video_allows(voices: VoicePool) -> None:
+    own = Session(starter_with_pictures(), "self", voices=voices)
+    plain = own.clip(TEXT)
+    made = own.clip(" ".join(f"[{name}]" for name in GESTURES) + TEXT)
+    assert made.motion.columns(["lids"]).max() > 0.9
+    happy = made.motion.columns(["happy"]) - plain.motion.columns(["happy"])[: len(made.motion)]
+    assert happy.max() > 0.4
+    assert not made.head.values.any()

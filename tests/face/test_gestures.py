@@ -193,6 +193,17 @@ def test_lids_close_by_their_share_for_any_gaze(name: str, down: float, mood: di
     assert (np.diff(opening, axis=0) < 0).all()
 
 
+@pytest.mark.parametrize("name", FACES)
+def test_a_laugh_opens_closed_lips_as_far_as_it_says(name: str) -> None:
+    face, still = prepared_face(name), silence(load_face(name), 3)
+    opened = np.array([[0.0], [3.0], [6.0]], np.float32)
+    middle = gaps(face.face, face.perform(still, {"mouth": opened}).motion.values)[:, 5]
+    assert middle[1:] - middle[0] == pytest.approx([3.0, 6.0], abs=0.6)
+    squinting = face.perform(still, {"squint": np.eye(3, 2, dtype=np.float32)}).motion
+    left, right = (squinting.columns([f"cheekSquint{side}"])[:, 0] for side in ("Left", "Right"))
+    assert (left[0] - left[2], right[1] - right[2]) == pytest.approx((1.0, 1.0), abs=0.05)
+
+
 def test_one_eye_winks_and_a_negative_share_opens_wider() -> None:
     face = prepared_face("head")
     weights = face.perform(silence(load_face("head")), {"blink": np.array([[1, -0.3]], np.float32)}).motion.values

@@ -43,6 +43,7 @@ SMILE_UNEVENNESS = (0.03, 0.08)  # sides of smiles differ by 6 to 16 %: posed sy
 DEFAULT_GAZE_TURN = 0.4  # rad per weight of a gaze shape on a face whose eyes are part of its shapes
 
 JAW_SHAPE, SQUINT_SHAPES = "jawOpen", ("cheekSquintLeft", "cheekSquintRight")
+LEAST_OPENING_MM = 1.0  # of the lips by a shape at weight 1; less is none of a jaw
 # Channels that only gestures with names have: mm by which the lips part, and weights of the squints of both cheeks.
 MOUTH_CHANNELS: Mapping[str, tuple[str, ...]] = MappingProxyType({"mouth": ("gap",), "squint": EYE_CHANNELS})
 
@@ -139,12 +140,17 @@ class GestureFace:
         return self.mouth.amplify(speech, jaw, lips)
 
     def _open_mouth(self, speech: FloatArray, features: Mapping[str, FloatArray]) -> FloatArray:
-        """Speech weights (T, K) with a jaw that opens the lips by the mm of ``mouth``, within its limit."""
+        """Speech weights (T, K) with a jaw that opens the lips by the mm of ``mouth``, within its limit.
+
+        A face without `JAW_SHAPE` opens them by the one of its own shapes that does so most, as of the vowel aa.
+        """
         if "mouth" not in features:
             return speech
-        column = self.face.shape_names.index(JAW_SHAPE)
-        opened = float(self.mouth.gaps[MIDDLE_PAIR, column])
-        if opened <= 0.0:
+        own = self.face.shape_names[: self.n_speech_shapes]
+        gaps = self.mouth.gaps[MIDDLE_PAIR]
+        column = own.index(JAW_SHAPE) if JAW_SHAPE in own else int(gaps[: len(own)].argmax())
+        opened = float(gaps[column])
+        if opened < LEAST_OPENING_MM:
             return speech
         parted = speech.copy()
         highest = np.maximum(float(self.face.limits[column, 1]), speech[:, column])
