@@ -5,6 +5,7 @@
 
 import argparse
 import csv
+import json
 import re
 import runpy
 import tempfile
@@ -22,12 +23,15 @@ from corpus_tools.studies.gestures.analysis import StudyOptions
 from corpus_tools.studies.gestures.write import write_gestures
 from corpus_tools.studies.similarity.analysis import SimilarityOptions
 from corpus_tools.studies.similarity.write import write_similarity
+from lexicon.gesture_names import GESTURES
 from lexicon.phones import ipa_to_arpabet
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face import export
 from tts2face.face.expressions import add_expression_shapes
 from tts2face.face.landmarks import landmark_positions
 from tts2face.face.stand_in import VISEME_PREFIX, viseme_table
+from tts2face.gestures.elements import Gesture
+from tts2face.gestures.movements import TimedGesture
 from tts2face.interchange.characters.families import FOLDER, general_family, program_families
 from tts2face.interchange.characters.importing import import_face
 from tts2face.interchange.characters.landmark_table import landmark_table
@@ -59,6 +63,7 @@ MOUTH_PIXELS = 800  # side of the pictures from which the mouths are cut
 MOUTHS = {"0,0,600": (240, 408), "38,0,600": (20, 408)}  # left upper corner of the mouth in each view
 MOOD_TEXT = "I have a lot to tell you, so please sit down and listen while I explain what happened yesterday."
 N_MOOD_FRAMES = 6
+GESTURES_FACE, GESTURE_GAP_S, GESTURE_COLUMNS = "tomas", 4.5, 8
 DRAWN = ("ada", "ben", "noor", "zuri")
 LIT = (*DRAWN, "mara", "tomas")
 DYED = {
@@ -228,6 +233,32 @@ def moods_sheet() -> Image.Image:
         at = np.linspace(0, len(clip.motion) - 1, N_MOOD_FRAMES + 2).round().astype(int)[1:-1]
         pictures += [labelled(renderer.frame(clip, int(number)), style) for number in at]
     return sheet(pictures, N_MOOD_FRAMES)
+
+
+def named_gestures_sheet() -> Image.Image:
+    """Each named gesture at its peak, in silence; cells of half a side."""
+    with tempfile.TemporaryDirectory() as folder:
+        timeline = Path(folder) / "gestures.json"
+        begins = {name: GESTURE_GAP_S * (number + 0.5) for number, name in enumerate(GESTURES)}
+        elements = [{"time": begin, "name": name} for name, begin in begins.items()]
+        timeline.write_text(json.dumps({"gestures": elements}), encoding="utf-8")
+        session = Session(face=GESTURES_FACE)
+        clip = session.clip("", idle=GESTURE_GAP_S * len(begins) + 1.0, timeline=timeline, gaze="camera", gain="blink=0")
+    renderer = session.renderer(Picture(size=f"{SIDE}x{SIDE}"))
+    cells = []
+    for name, begin in begins.items():
+        frame = renderer.frame(clip, round((begin + peak_s(name)) * clip.fps))
+        cells.append(labelled(frame, name.replace("_", " "), 2 * WORD_PIXELS))
+    whole = sheet(cells, GESTURE_COLUMNS)
+    return whole.resize((whole.width // 2, whole.height // 2), Image.Resampling.LANCZOS)
+
+
+def peak_s(name: str) -> float:
+    """Second of a gesture at which its movements together are largest."""
+    timed = TimedGesture.of(Gesture(0.0, name))
+    times = np.arange(0.0, timed.duration, 0.02)
+    moved = [np.abs(movement.values(times, keys)) for movement, keys in timed.movements]
+    return float(times[np.sum([values / values.max() for values in moved], axis=0).argmax()])
 
 
 def photo_sheet() -> Image.Image:
@@ -425,6 +456,7 @@ SHEETS = {
     "families": families_sheet,
     "hair": hair_sheet,
     "moods": moods_sheet,
+    "named_gestures": named_gestures_sheet,
     "shapes": shapes_sheet,
     "statues": statues_sheet,
 }

@@ -2,6 +2,7 @@
 
 import re
 
+from lexicon.gesture_names import GESTURES
 from tests.docs.blocks import DOCS, README
 from tts2face.interchange.exports.table import FORMATS
 from tts2face.request import OWN_FACE
@@ -31,11 +32,22 @@ def test_the_readme_counts_what_is_shipped() -> None:
         f"`{talker.name}`: lip motion of {talker.n_utterances} recorded sentences",
         f"{NUMBERS[len(moods)]} moods derived from it",
         f"some {len(catalogue.languages()) // 10 * 10} languages",
+        f"{NUMBERS[len(GESTURES)]} [gestures with names]",
     ]
     stated += [f"`{one.name}`" for one in faces]
     text = " ".join(README.read_text(encoding="utf-8").partition("## What is shipped")[2].split()).lower()
     missing = [one for one in stated if one.lower() not in text]
     assert not missing, f"README.md, What is shipped: write {', '.join(missing)}"
+
+
+def test_the_page_of_gestures_has_a_row_for_each_name() -> None:
+    page = (DOCS / "gestures.md").read_text(encoding="utf-8").partition("## Named gestures")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| `(\w+)` \| (.+?) \| ([\d.]+) \| ?(.*?) ?\|$", page, re.MULTILINE)
+    directions = {"none": "", "side": "left, right", "any": "any"}
+    assert rows == [
+        (name, gesture.shown, f"{gesture.seconds:g}", directions[gesture.directions])
+        for name, gesture in GESTURES.items()
+    ]
 
 
 def test_the_page_of_exports_has_a_row_for_each_format() -> None:
