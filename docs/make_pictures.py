@@ -243,7 +243,9 @@ def named_gestures_sheet() -> Image.Image:
         elements = [{"time": begin, "name": name} for name, begin in begins.items()]
         timeline.write_text(json.dumps({"gestures": elements}), encoding="utf-8")
         session = Session(face=GESTURES_FACE)
-        clip = session.clip("", idle=GESTURE_GAP_S * len(begins) + 1.0, timeline=timeline, gaze="camera", gain="blink=0")
+        clip = session.clip(
+            "", idle=GESTURE_GAP_S * len(begins) + 1.0, timeline=timeline, gaze="camera", gain="blink=0"
+        )
     renderer = session.renderer(Picture(size=f"{SIDE}x{SIDE}"))
     cells = []
     for name, begin in begins.items():

@@ -16,7 +16,7 @@ _SEPARATORS = re.compile(r"[\s_-]+")
 
 @dataclass(frozen=True, slots=True)
 class GestureName:
-    """What a gesture shows, its usual seconds, and which directions it has: none, a side, or any."""
+    """Movement that a gesture shows, its usual seconds, and its directions: none, a side, or any."""
 
     shown: str
     seconds: float

@@ -24,13 +24,15 @@ AUTO_STYLE = "auto"  # the style that follows the words
 MOODS: Mapping[str, str] = MappingProxyType(
     {"happy": "happy", "sad": "sad", "angry": "angry", "frustrated": "disgruntled", "surprised": "surprised"}
 )
-LEAST, LEAST_OF_HINTS, MARGIN = 2.0, 3.0, 0.5  # of the sum of a mood, of hints alone, and above the next one
+LEAST, LEAST_OF_HINTS = 2.0, 3.0  # sum of the weights of a mood, and of hints alone
+MARGIN = 0.5  # by which it is above the next mood
 MAX_WORDS = 4  # of a phrase
-CLAUSE_WORDS = 16  # before a word that are looked at
+CLAUSE_WORDS = 16  # before a word, by which it is weighted
 NEGATION_WORDS = 4  # within which a negation reaches what follows it
 OPPOSITE = 0.75  # of a negated joy, which is sad; other negated moods are none
 INTENSIFIED, WEAKENED = 1.5, 0.5  # by a word before
-EXCLAIMED, ASKED, SUPPOSED = 1.25, 0.5, 0.25  # of a sentence, a question, and a clause with if
+EXCLAIMED, ASKED = 1.25, 0.5  # factors of an exclamation, and of a question
+SUPPOSED = 0.25  # of a clause with if
 LEFT_BEHIND = 0.5  # of what stands before "but"
 NEGATIONS = word_set("not never no without hardly barely neither nor nothing nobody none stopped")
 INTENSIFIERS = word_set(
@@ -76,14 +78,14 @@ def sentence_mood(sentence: str) -> Mood:
     words = _words(sentence)
     found = [*_weighted(words, sentence)]
     sums: dict[str, float] = {}
-    for one in found:
-        sums[one.mood] = sums.get(one.mood, 0.0) + one.weight
+    for part in found:
+        sums[part.mood] = sums.get(part.mood, 0.0) + part.weight
     best, *others = sorted(sums, key=lambda mood: -sums[mood]) or [""]
     second = sums[others[0]] if others else 0.0
-    strongest = max((one.strength for one in found if one.mood == best), default=0.0)
+    strongest = max((part.strength for part in found if part.mood == best), default=0.0)
     if sums.get(best, 0.0) < (LEAST if strongest > 1.0 else LEAST_OF_HINTS) or sums[best] - second < MARGIN:
         return Mood(None)
-    return Mood(best, tuple((one.words, one.weight) for one in found if one.mood == best))
+    return Mood(best, tuple((part.words, part.weight) for part in found if part.mood == best))
 
 
 def is_auto(style: str | None) -> bool:
@@ -119,7 +121,7 @@ def _painted(runs: Sequence[StyleRun], span: tuple[int, int], style: str, length
     """Runs of a text of some characters, of which those without a style have one within a span."""
     start, end = span
     found: list[StyleRun] = []
-    for run, following in zip(runs, [*(one.start for one in runs[1:]), length], strict=True):
+    for run, following in zip(runs, [*(run.start for run in runs[1:]), length], strict=True):
         places = sorted({run.start, *(place for place in span if run.start < place < following)})
         for place in places:
             is_within = start <= place < end and not run.styles

@@ -308,8 +308,7 @@ class Request:
     )
     style: str | None = option(
         None,
-        "Style of the gestures: one name, one for each feature (brows=annoyed,head=delighted), or auto: the mood of "
-        "each English sentence by its words.",
+        "Style of the gestures: a name, one for each feature (brows=annoyed,head=delighted), or auto: by the words.",
     )
     gain: str | None = option(
         None, "Gain of each feature's motion, 0 to 3: head=1.5,blink=0.8; jaw and lips too; all sets every gesture."

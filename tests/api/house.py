@@ -46,7 +46,7 @@ WRONG_NAMES = {
     "works for tasks": re.compile(r"(?:^|_)works(?:$|_)", re.IGNORECASE),
     "one as a name": re.compile(r"^one$"),
 }
-EYES = re.compile(r"gaze|listening|presentation|timeline|gestures/stream")  # files in which eyes look
+EYES = re.compile(r"gaze|gesture_marks|listening|presentation|timeline|gestures/stream")  # files in which eyes look
 BUILDERS = re.compile(r"corpus_tools/(?:shipped|dense)/")  # a look is how a person is drawn
 
 

@@ -157,7 +157,7 @@ def timed(gestures: Iterable[Gesture], times: FloatArray) -> list[TimedGesture]:
     if not len(times):
         return []
     begun = [TimedGesture.of(gesture) for gesture in gestures if gesture.time <= times[-1]]
-    return [one for one in begun if one.gesture.time + one.duration > times[0]]
+    return [moving for moving in begun if moving.gesture.time + moving.duration > times[0]]
 
 
 def channel_values(gestures: Sequence[TimedGesture], channel: str, times: FloatArray, side: float = 0.0) -> FloatArray:
@@ -166,15 +166,15 @@ def channel_values(gestures: Sequence[TimedGesture], channel: str, times: FloatA
     Parameters
     ----------
     side
-        1 and -1 for the own left and right eye, of which only gestures of that side move one.
+        1 and -1 for the own left and right eye, of which only gestures of that side move it.
     """
     high, low = np.zeros(len(times)), np.zeros(len(times))
-    for one in gestures:
-        moved = one.share(channel, times)
-        if moved is None or (side and one.side != side):
+    for moving in gestures:
+        moved = moving.share(channel, times)
+        if moved is None or (side and moving.side != side):
             continue
         # roll is positive to the own right (`tts2face.video.pose.head_angles`)
-        signed = one.gesture.size * moved * (-one.side if channel == "head_roll" else 1.0)
+        signed = moving.gesture.size * moved * (-moving.side if channel == "head_roll" else 1.0)
         # overlapping gestures are not added: a sum of nods would be a bow
         high, low = np.maximum(high, signed), np.minimum(low, signed)
     return high + low
@@ -189,18 +189,18 @@ def pair_values(gestures: Sequence[TimedGesture], channel: str, times: FloatArra
 def turned_gaze(gestures: Sequence[TimedGesture], times: FloatArray, gaze: FloatArray) -> FloatArray:
     """(T, 2) gaze in radians down and left of the scene, moved to the directions of gestures."""
     moved = np.array(gaze, np.float64)
-    for one in gestures:
-        share = one.share("gaze", times)
+    for moving in gestures:
+        share = moving.share("gaze", times)
         if share is not None:
-            moved += share[:, None] * (np.radians(one.direction) * one.gesture.size - moved)
+            moved += share[:, None] * (np.radians(moving.direction) * moving.gesture.size - moved)
     return moved
 
 
 def head_turn(gestures: Sequence[TimedGesture], times: FloatArray) -> FloatArray:
     """(T, 3) radians of pitch, yaw and roll that gestures add to the head."""
     found = np.stack([channel_values(gestures, f"head_{name}", times) for name in ("pitch", "yaw", "roll")], axis=1)
-    for one in gestures:
-        share = one.share("head_share", times)
+    for moving in gestures:
+        share = moving.share("head_share", times)
         if share is not None:
-            found[:, :2] += share[:, None] * np.array(one.direction) * one.gesture.size
+            found[:, :2] += share[:, None] * np.array(moving.direction) * moving.gesture.size
     return np.asarray(np.radians(found), np.float64)

@@ -84,7 +84,7 @@ def _parse_part(part: str, content: Any, place: str) -> Any:
         )
     if part in EARLIER:
         instants = checked(_INSTANTS, content, place)
-        return tuple(_earlier(one, EARLIER[part], f"{place}[{at}]") for at, one in enumerate(instants))
+        return tuple(_earlier(instant, EARLIER[part], f"{place}[{at}]") for at, instant in enumerate(instants))
     if part in KINDS:
         elements: Any = GenericAlias(tuple, (KINDS[part].record, ...))
         return checked(elements, content, place)

@@ -174,8 +174,8 @@ class GestureLayer:
     def key(self, times: NDArray[np.float64], sound: Waveform, timeline: Timeline, plan: SpeechPlan = NO_PLAN) -> bytes:
         """Digest of everything on which the gestures of a piece, after those before it, depend."""
         here = timeline.restrict(times[0] - REACH_S, times[-1] + REACH_S)
-        moving = tuple(one.gesture for one in timed(timeline.gestures, times))
-        here = replace(here, gestures=moving, edits=())  # edits are a later step
+        gestures = tuple(moving.gesture for moving in timed(timeline.gestures, times))
+        here = replace(here, gestures=gestures, edits=())  # edits are a later step
         elements = [
             (name, kind.lane(part), interpolate_keys(times, part.keys).tobytes()) if kind.shape == "curve" else part
             for name, kind in KINDS.items()

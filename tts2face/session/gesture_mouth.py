@@ -1,4 +1,4 @@
-"""What gestures add to mouth, cheeks and breath of a piece: a laugh opens the mouth between contacts of the lips."""
+"""Mouth, cheeks and breath of gestures in a piece: a laugh opens the mouth between contacts of the lips."""
 
 import numpy as np
 

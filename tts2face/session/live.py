@@ -25,14 +25,14 @@ from lexicon.ssml_leniency import nearest_style
 from lexicon.text_marks import parse_marks
 from tts2face.gestures.elements import ListeningSpan
 from tts2face.gestures.listening import LASTS_S, responses
-from tts2face.gestures.movements import gesture_end
 from tts2face.gestures.timeline import Timeline
 from tts2face.lips.performer import PerformerRetargeter, build_performer_retargeter
 from tts2face.models.face import Face
 from tts2face.models.talker import speech_channels
 from tts2face.request import Idle, Listening, Request, Spoken
 from tts2face.session.joining import END_S, JOIN_LEAD_S
-from tts2face.session.prepared import PreparedRequest, gesture_of, prepare, unknown_styles
+from tts2face.session.live_gestures import WaitingGestures
+from tts2face.session.prepared import PreparedRequest, prepare, unknown_styles
 from tts2face.session.recording import select_audio_map
 from tts2face.session.shared_models import SessionModels
 from tts2face.session.speech_stream import Piece, after_listening
@@ -240,14 +240,6 @@ class LiveLips:
         return self._face.motion_of_parameters(Trajectory(self._channels, parameters, self.fps))
 
 
-@dataclass(frozen=True, slots=True)
-class ShownGesture:
-    """A gesture that was asked for while a clip grows, and the second of the clip at which it begins."""
-
-    name: str
-    time: float
-
-
 class LiveSpeech:
     """A clip without an end: `say` appends speech, `idle` and `listen` silence with a living face.
 
@@ -277,10 +269,8 @@ class LiveSpeech:
         self._has_listened = False
         self._rate = exact_rate(request.fps)
         self._cues: list[float] = []  # seconds of the clip at which the face responds
-        self._waiting: list[GestureMark] = []
-        self._shown: list[ShownGesture] = []
+        self.gestures = WaitingGestures()
         self._notes: list[str] = []
-        self._moves_until = 0.0  # seconds of the clip at which the last gesture ends
 
     @property
     def seconds(self) -> float:
@@ -307,7 +297,7 @@ class LiveSpeech:
         return float(n_frames / self._rate)
 
     def notes_on(self, text: str) -> tuple[str, ...]:
-        """What of a text is read otherwise than written, and its moods with the style auto; raises as `parse_marks`."""
+        """Notes on a text: what is read otherwise than written, moods of the style auto; raises as `parse_marks`."""
         return reading_notes(text, self.language, self.markup, self._request.style)
 
     def say(self, text: str) -> Iterator[Piece]:
@@ -353,22 +343,12 @@ class LiveSpeech:
 
         Of two with one name that wait, the later one is made.
         """
-        for gesture in gestures:
-            self._waiting = [one for one in self._waiting if one.name != gesture.name] + [replace(gesture, at=0)]
+        self.gestures.add(gestures)
 
     @property
     def has_gestures(self) -> bool:
         """Whether a gesture waits or is being made."""
-        return bool(self._waiting) or self._moves_until > self.seconds
-
-    def forget_gestures(self) -> None:
-        """Make none of the gestures that wait."""
-        self._waiting.clear()
-
-    def shown_gestures(self) -> list[ShownGesture]:
-        """Gestures that are made since the last call, with the second of the clip at which they begin."""
-        shown, self._shown = self._shown, []
-        return shown
+        return self.gestures.move_at(self.seconds)
 
     def change_style(self, style: str) -> None:
         """From the next word or the next silence on, the face and its voice have another style.
@@ -394,17 +374,13 @@ class LiveSpeech:
         self, request: Request, listening: Timeline | None = None, *, is_speech: bool = False
     ) -> Iterator[Piece]:
         prepared = self._models.with_own_styles(self._without_unknown(prepare(request, self._models.person)))
-        waiting = [*self._waiting]
-        if is_speech:
-            prepared = replace(prepared, text=replace(prepared.text, marks=(*waiting, *prepared.text.marks)))
-        else:
-            now = Timeline(gestures=tuple(gesture_of(mark, 0.0) for mark in waiting))
-            prepared = replace(prepared, listening=now if listening is None else now.merge(listening))
+        gestures, waiting = self.gestures, self.gestures.waiting
+        prepared = gestures.in_speech(prepared) if is_speech else gestures.in_silence(prepared, listening)
         models = self._models.for_request(prepared)
         for piece in pieces_from(prepared, models, self._layer, self._n_frames, ends_on_frame=True):
             self._n_frames += len(piece.clip.motion)
-            self._note_gestures(piece, waiting)
-            waiting = []
+            gestures.note(piece, waiting)
+            waiting = ()
             yield piece
 
     def _without_unknown(self, prepared: PreparedRequest) -> PreparedRequest:
@@ -422,12 +398,3 @@ class LiveSpeech:
         """Styles in marks since the last call that the palette lacks."""
         notes, self._notes = self._notes, []
         return notes
-
-    def _note_gestures(self, piece: Piece, waiting: Sequence[GestureMark]) -> None:
-        """Note when gestures of a piece are made; those that waited do so no longer."""
-        self._waiting = [one for one in self._waiting if one not in waiting]
-        for gesture in piece.timeline.gestures:
-            self._moves_until = max(self._moves_until, gesture_end(gesture))
-        for mark in waiting:
-            begins = [one.time for one in piece.timeline.gestures if one.name == mark.name]
-            self._shown.append(ShownGesture(mark.name, min(begins, default=piece.begin)))

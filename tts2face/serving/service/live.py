@@ -112,7 +112,7 @@ class LiveTask:
             yield from self._curves.of_clip(piece.clip, piece.begin + self._idle_s)
 
     def _shown_gestures(self) -> Iterator[Event]:
-        for shown in self._speech.shown_gestures():
+        for shown in self._speech.gestures.shown():
             yield Event({"type": "gesture", "name": shown.name, "at": round(shown.time + self._idle_s, 4)})
 
     def _change_style(self, style: str) -> Event:
@@ -204,7 +204,7 @@ class LiveTask:
         self._n_cancels += 1
         self._began = self._clock() - self._seconds  # what follows is due now
         self._speech.rest()
-        self._speech.forget_gestures()
+        self._speech.gestures.clear()
         after_ms = 1000 * (self._clock() - arrived)
         yield Event({"type": "cancelled", "at": round(self._seconds, 4), "after_ms": round(after_ms, 1)})
 

@@ -117,9 +117,10 @@ def _remove_gesture(project: Project, given: Edit, _: Sentences) -> Project:
 
 def _without_gesture(project: Project, time: float, name: str) -> tuple[Gesture, ...]:
     """Gestures but the nearest one of a name within `NEAR_S`: a page knows times to the pixel."""
-    near = [one for one in project.timeline.gestures if one.name == name and abs(one.time - time) < NEAR_S]
-    gone = min(near, key=lambda one: abs(one.time - time), default=None)
-    return tuple(one for one in project.timeline.gestures if one is not gone)
+    gestures = project.timeline.gestures
+    near = [gesture for gesture in gestures if gesture.name == name and abs(gesture.time - time) < NEAR_S]
+    gone = min(near, key=lambda gesture: abs(gesture.time - time), default=None)
+    return tuple(gesture for gesture in gestures if gesture is not gone)
 
 
 def _place(kind: ElementKind, project: Project, given: Edit, _: Sentences) -> Project:
