@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 
-from lexicon.normalize import normalize
+from lexicon.normalize import normalize, spoken_form
 from lexicon.pronounce import pronounce
 from lexicon.sentences import split_sentences
 from lexicon.text_marks import parse_marks
@@ -15,6 +15,8 @@ SENTENCE = (
 GERMAN = "Schöne Grüße aus München, zwölf Boxkämpfer jagen Viktor quer über den großen Sylter Deich. "
 # Texts of 100 KB whose first piece is hard to end: amounts, digits, symbols, letters, and abbreviations.
 HARD = ("$1,234,567.89 ", "1234567890", "👍🏽", "a", "Mr. ")
+
+HARD_NUMBERS = ("1/2/", "-5", "½", "€", "1,", "XIV ", "3,5 km ", "1 234 ", "Dr. ")
 
 
 def _report(name: str, text: str, work: Callable[[str], object]) -> None:
@@ -45,6 +47,13 @@ def main() -> None:
         for size in (10_000, 30_000, 100_000):
             _report(f"first piece of {piece!r}", (piece * size)[:size], _first_piece)
             _report(f"all pieces of {piece!r}", (piece * size)[:size], _all_pieces)
+    for language in ("de", "ru", "tr"):
+        spoken_form("5", language)
+        for piece in (GERMAN, *HARD_NUMBERS):
+            text = (piece * 100_000)[:100_000]
+            _report(
+                f"words, {language}, {piece[:12]!r}", text, lambda text, language=language: spoken_form(text, language)
+            )
     pronounce("warm")
     for size in (200, 10_000, 100_000):
         _report("pronounce en-us", SENTENCE * max(1, size // len(SENTENCE)), pronounce)
