@@ -35,6 +35,16 @@ def _all_pieces(text: str) -> None:
         pass
 
 
+def _report_languages() -> None:
+    for language in ("de", "ru", "tr"):
+        spoken_form("5", language)
+        for piece in (GERMAN, *HARD_NUMBERS):
+            text = (piece * 100_000)[:100_000]
+            _report(
+                f"words, {language}, {piece[:12]!r}", text, lambda text, language=language: spoken_form(text, language)
+            )
+
+
 def main() -> None:
     """Print one line a measurement."""
     normalize("warm")
@@ -47,13 +57,7 @@ def main() -> None:
         for size in (10_000, 30_000, 100_000):
             _report(f"first piece of {piece!r}", (piece * size)[:size], _first_piece)
             _report(f"all pieces of {piece!r}", (piece * size)[:size], _all_pieces)
-    for language in ("de", "ru", "tr"):
-        spoken_form("5", language)
-        for piece in (GERMAN, *HARD_NUMBERS):
-            text = (piece * 100_000)[:100_000]
-            _report(
-                f"words, {language}, {piece[:12]!r}", text, lambda text, language=language: spoken_form(text, language)
-            )
+    _report_languages()
     pronounce("warm")
     for size in (200, 10_000, 100_000):
         _report("pronounce en-us", SENTENCE * max(1, size // len(SENTENCE)), pronounce)
