@@ -78,13 +78,7 @@ def to_kana(text: str) -> str:
 
 
 def japanese_phrases(text: str) -> tuple[JapanesePhrase, ...]:
-    """Accent phrases of a text in order.
-
-    Raises
-    ------
-    BackendError
-        The text has Chinese characters, and the library that reads them is not installed.
-    """
+    """Accent phrases of a text in order; Chinese characters need the library that reads them."""
     if not has_kanji(text) and not has_reader():
         return tuple(_plain_phrases(text))
     read = load_reader().run_frontend

@@ -2,7 +2,6 @@
 
 pypinyin reads the text by its dictionary of phrases. A character that espeak-ng 1.52 reads otherwise (还 in 还钱) is
 replaced by one with the wanted reading alone (环); syllables that it lacks (xiong, qiong, jiong) by two characters.
-
 ``mandarin.tsv`` has, by syllable with tone: the characters for it, and those of more than one reading that espeak-ng
 reads so; the row ``-`` those that it reads otherwise in any context. It was made of the readings of pypinyin 0.55
 (MIT) and of espeak-ng 1.52 for the 6,763 characters of GB 2312 and the 5,401 common ones of Big5.
@@ -35,7 +34,7 @@ def _readings() -> _Readings:
 
 @functools.lru_cache(maxsize=256)
 def espeak_characters(text: str) -> tuple[str, ...]:
-    """What espeak-ng reads of each character of a text."""
+    """For each character of a text, those that espeak-ng is given."""
     homophone, said = _readings()
     if said.keys().isdisjoint(text):
         return tuple(text)

@@ -42,7 +42,7 @@ def is_unspaced(language: str) -> bool:
 
 
 def espeak_text(text: str, language: str) -> str:
-    """What espeak-ng reads of a text: Japanese in kana, Mandarin in characters of the reading that is wanted.
+    """Text that espeak-ng is given for a text: Japanese in kana, Mandarin in characters of the reading that is wanted.
 
     Raises
     ------

@@ -39,13 +39,13 @@ def _forms(locale: Locale, key: object) -> tuple[str, ...]:
 
 def _scaled(locale: Locale, many: int, scale: int, is_oblique: bool) -> str:
     """Thousands and more: ألف، ألفان، ثلاثة آلاف، خمسة عشر ألفا، مئة ألف."""
-    one, two, two_oblique, few, accusative = _forms(locale, scale)
+    singular, dual, dual_oblique, plural, accusative = _forms(locale, scale)
     if many == 1:
-        return one
+        return singular
     if many == 2:
-        return two_oblique if is_oblique else two
+        return dual_oblique if is_oblique else dual
     last = many % 100
-    noun = few if 3 <= last <= 10 else accusative if last > 10 else one
+    noun = plural if 3 <= last <= 10 else accusative if last > 10 else singular
     return f"{arabic_number(locale, many, 'cardinal', False, is_oblique)} {noun}"
 
 
