@@ -1,7 +1,7 @@
 """Words of a ``<say-as>`` element: a text read as a number, a date, letters and so on.
 
-All kinds are supported in English. In other languages, where espeak-ng reads numbers itself, only kinds that need no
-words of the language are: letters, digits, telephone and cardinal numbers.
+All kinds are supported in English, most in languages with a table (`lexicon.locales`). In others, where espeak-ng reads
+numbers itself, only kinds that need no words of the language are: letters, digits, telephone and cardinal numbers.
 """
 
 import re
@@ -10,6 +10,10 @@ from types import MappingProxyType
 
 from lexicon import written_forms as readings
 from lexicon.errors import InputError
+from lexicon.locales.kinds import KINDS as LOCAL_KINDS
+from lexicon.locales.kinds import read_date, read_ordinal
+from lexicon.locales.reading import read
+from lexicon.locales.tables import Locale, find_locale
 from lexicon.normalize import normalize
 from lexicon.number_words import cardinal_words, digit_words, number_words, ordinal_words, roman_value
 
@@ -52,14 +56,36 @@ def say_as(kind: str, text: str, written_format: str, language: str) -> str:
         raise InputError(f"<say-as> needs 1 to {MAX_CHARACTERS} characters, not {len(content)}")
     if language.partition("-")[0] == "en":
         return KINDS[kind](content, written_format.strip())
-    if kind not in _OTHER_LANGUAGES:
-        raise InputError(f"<say-as> supports {kind} in English only, not in {language}; write it in words")
-    return _OTHER_LANGUAGES[kind](content)
+    if kind in _OTHER_LANGUAGES:
+        return _OTHER_LANGUAGES[kind](content)
+    locale = find_locale(language)
+    if locale is None or kind not in LOCAL_KINDS:
+        raise InputError(f"<say-as> does not support {kind} in {language}; write it in words")
+    return _of_locale(kind, content, written_format.strip(), locale)
 
 
 def reads_kind(kind: str, language: str) -> bool:
     """Whether texts of a language are read as a kind (`say_as`)."""
-    return kind in (KINDS if language.partition("-")[0] == "en" else _OTHER_LANGUAGES)
+    if language.partition("-")[0] == "en":
+        return kind in KINDS
+    return kind in _OTHER_LANGUAGES or (kind in LOCAL_KINDS and find_locale(language) is not None)
+
+
+def _of_locale(kind: str, text: str, written_format: str, locale: Locale) -> str:
+    """Words of a text in a language with a table."""
+    try:
+        if kind == "ordinal":
+            return read_ordinal(locale, text)
+        if kind == "date" and written_format:
+            order = _SAME_LETTERS.sub(r"\1", written_format.lower())
+            return read_date(locale, _date_parts(text, order))
+    except (KeyError, ValueError, IndexError) as wrong:
+        raise _reading_error(text, f"a {kind}", "12/31/1999 for mdy") from wrong
+    is_currency = kind in {"currency", "money"} and written_format
+    words = read(f"{text} {written_format.upper()}" if is_currency else text, locale.language)
+    if words == text or any(character.isdigit() for character in words):
+        raise _reading_error(text, f"a {kind}", "its usual form in the language")
+    return words
 
 
 def _reading_error(text: str, what: str, example: str) -> InputError:
