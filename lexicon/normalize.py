@@ -25,6 +25,7 @@ from lexicon.scripts import name_foreign_letters, name_letters_in_words
 from lexicon.sources import written_groups
 from lexicon.vowels import add_vowels
 from lexicon.written_forms import WrittenForm
+from lexicon.written_words import spaced_words
 
 _START, _STOP = r"(?<![^\W\d_])", r"(?![^\W\d_])"  # no letter before, after
 _FULL_MONTH = "|".join(readings.MONTHS)
@@ -447,7 +448,7 @@ def _readable(spoken: str, language: str) -> str:
 def written_pieces(text: str, language: str) -> list[tuple[str, str]]:
     """Words of a text that is not English as they are written (3,50 €), and the punctuation after each."""
     forms = spoken_forms(text, language)
-    pieces = "".join(form.spoken for form in forms).split()
+    pieces = spaced_words("".join(form.spoken for form in forms), language)
     found: list[tuple[str, str]] = []
     for written, at in written_groups(pieces, forms):
         last = pieces[at.stop - 1]

@@ -22,6 +22,7 @@ from lexicon.pauses import SIMPLE_MARKS
 from lexicon.phones import PHONES, nearest_phones
 from lexicon.pronounce import Word, has_dictionary
 from lexicon.values.json_text import read_json
+from lexicon.written_words import espeak_text
 from tts2face.numeric.telemetry import disable_telemetry
 from tts2face.sound.aligned_speech import AlignedWord, aligned_speech
 from tts2face.sound.alignment import Align, Aligner
@@ -240,7 +241,7 @@ class PiperVoice:
             return [(word.text, [tuple(word.phones)]) for word in words], sentences
         spoken = [SpokenWord(word.text, word_segments(word), word.mark) for word in words]
         if isinstance(content, str):
-            text = self._insert_own_words(spoken_form(content, self._language))
+            text = self._insert_own_words(espeak_text(spoken_form(content, self._language), self._language))
         else:
             text = " ".join(map(self._bracketed_ipa, spoken))
         aligned = [(word.text, [tuple(segment.phone for segment in word.segments)]) for word in spoken]
