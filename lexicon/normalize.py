@@ -45,6 +45,7 @@ _STATE = "|".join(readings.read_table("states.tsv"))
 _PART = r"[\w+-]{1,64}(?:\.[\w+-]{1,32}){0,4}"  # of a path
 _CLUSTER = "th|sh|ch|wh|st|pl|pr|br|cr|dr|fr|gr|tr|bl|cl|fl|gl|sl|sp|sk|sc|sm|sn|sw|tw|kn|wr|qu|[a-z]"  # of a stutter
 _ELEMENT = f"(?:{'|'.join(sorted(formulas.ELEMENTS, key=len, reverse=True))})"
+_TWO_LETTERS = f"(?:{'|'.join(symbol for symbol in sorted(formulas.ELEMENTS) if len(symbol) > 1)})"
 _METAL = "(?:Cl|Br|Fe|Ca|Mg|Na|Cu|Zn|Al|Pb|Ag|Hg|Li)"
 _PER = "(?:mo|month|wk|week|yr|year|day|night|person|head|hour|minute|second|acre|gallon|page|item|user|share|ton)"
 _SINGLE_LETTER = re.compile(rf"{_START}[^\W\d_]{_STOP}")
@@ -328,7 +329,7 @@ def _form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         (
             "chemical",
             "a",
-            rf"{_START}(?=[A-Za-z]{{0,24}}[a-z0-9+∸])(?:(?:{_ELEMENT}[0-9]{{0,3}}){{2,12}}|{_METAL}[0-9]{{1,2}}|{_ELEMENT}(?=[0-9]?[+∸]))(?:[0-9]?[+∸])?"
+            rf"{_START}(?=[A-Za-z]{{0,24}}[a-z0-9+∸])(?:(?:{_ELEMENT}[0-9]{{0,3}}){{2,12}}|{_METAL}[0-9]{{1,2}}|(?:{_TWO_LETTERS}|[HKFI])(?=[0-9]?[+∸]))(?:[0-9]?[+∸])?"
             r"(?![\w+]|['-]\w)(?<=[0-9a-z+∸FIOSHN])",
             formulas.read_chemical,
         ),
