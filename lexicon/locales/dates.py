@@ -101,14 +101,19 @@ def read_weekdays(place: Place) -> str | None:
     if not place.match["last"] and place.after[:1].isupper():
         return None
     rows = place.locale.rows("weekday")
-    days = [rows[day].spoken for day in (place.match["first"], place.match["last"]) if day]
-    return f" {place.locale.setting('to')} ".join(days).replace("  ", " ")
+    first, last = place.match["first"], place.match["last"]
+    if not last:
+        return rows[first].spoken
+    end = rows[last].details.get("genitive", rows[last].spoken)
+    return " ".join(part for part in (rows[first].spoken, place.locale.setting("to"), end) if part)
 
 
 def read_year(place: Place) -> str | None:
     """A year with the word for it, which says its case: в 2024 году, w 2024 r."""
     locale = place.locale
     row = locale.rows("year_word")[place.match["word"]]
+    if (place.match["suffix"] or "").endswith("х"):  # 1990-х гг.
+        row = locale.rows("year_word")["годов"]
     case = row.details.get(place.before.lower()) or row.details.get("case", "")
     grammar = Grammar(row.details.get("gender", ""), case)
     word = row.details.get(f"word {case}") or row.spoken
@@ -121,7 +126,7 @@ def read_time(place: Place) -> str | None:
     locale, match = place.locale, place.match
     hour, minute = int(match["hour"]), int(match["minute"] or 0)
     is_dotted = match["sign"] == "."
-    if hour > 24 or minute > 59 or (is_dotted and not (match["word"] or _is_after_time_word(place))):
+    if hour > 24 or minute > 59 or (is_dotted and not (match["word"] or match["tail"] or _is_after_time_word(place))):
         return None
     if match["minute"] and len(match["minute"]) != 2:
         return None

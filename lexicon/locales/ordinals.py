@@ -33,7 +33,7 @@ def read_dotted_ordinal(place: Place) -> str | None:
     gender = gender_of(locale, following)
     case = grammar.case
     own = locale.rows("case").get(f"ordinal {place.before.lower()} {gender}")
-    return ordinal(locale, int(place.match["digits"]), Grammar(gender if not case else "", own.spoken if own else case))
+    return ordinal(locale, int(place.match["digits"]), Grammar(gender, own.spoken if own else case))
 
 
 def read_first_day(place: Place) -> str | None:

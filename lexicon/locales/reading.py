@@ -3,6 +3,7 @@
 import re
 import unicodedata
 
+from lexicon.locales.harmony import with_tail
 from lexicon.locales.place import Place
 from lexicon.locales.scanner import PLACE, scanner
 from lexicon.locales.tables import Locale, find_locale
@@ -103,7 +104,7 @@ def _read(locale: Locale, text: str, place: re.Match[str], said: str) -> tuple[r
             found = Place(locale, text, match, said)
             spoken = form.reader(found)
             if spoken is not None:
-                spoken += match.groupdict().get("tail") or ""
+                spoken = with_tail(spoken, match.groupdict().get("tail") or "")
                 ends = match.group().endswith(".") and spoken[-1:].isalnum() and found.is_last
                 return match, f"{spoken}." if ends else spoken
     return None, None

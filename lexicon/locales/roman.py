@@ -75,6 +75,7 @@ def _by_word(place: Place, value: int, word: str) -> str:
     is_after = word.startswith("+")
     before = place.before.lower() if is_after else ""
     case = row.details.get(before) or row.details.get("case") or place.grammar("ordinal").case
+    case = case or (row.details.get("noun", "") if before and place.before.islower() else "")
     return ordinal(locale, value, Grammar(row.details.get("gender") or gender_of(locale, word.lstrip("+")), case))
 
 

@@ -114,8 +114,8 @@ _NUMBER_FORMS: tuple[tuple[str, Reader], ...] = (
         digit_groups.read_telephone,
     ),
     (
-        r"(?P<hour>[0-9]{1,2}) ?(?P<sign>‹hour sign›) ?(?P<minute>[0-9]{2})?(?!‹letter›|[0-9])(?P<second>(?!))?"
-        r"(?P<word>(?!))?",
+        r"(?P<hour>[0-9]{1,2}) ?(?P<sign>‹hour sign›) ?(?P<minute>[0-9]{2})?(?: ?min)?(?!‹letter›|[0-9])"
+        r"(?P<second>(?!))?(?P<word>(?!))?",
         dates.read_time,
     ),
     (r"[0-9]{1,12}(?:[ ./-][0-9]{1,12}){0,6}(?![\w])", digit_groups.read_named_telephone),
@@ -136,7 +136,7 @@ _NUMBER_FORMS: tuple[tuple[str, Reader], ...] = (
     (r"‹signed› ?(?P<magnitude>‹magnitude›)‹end›", counted.read_magnitude),
     (r"(?P<digits>[0-9]{1,4})\.(?= ‹letter›)", ordinals.read_dotted_ordinal),
     (r"(?![0-9]{1,3}(?:\.[0-9]{3})+(?![0-9.]))[0-9]{1,4}(?:\.[0-9]{1,4}){2,6}(?!\w)", digit_groups.read_version),
-    (r"[0-9]{1,4}‹other decimal›(?:[0-9]{1,2}|[0-9]{4})(?![0-9.])", digit_groups.read_version),
+    (r"[0-9]{1,4}‹other decimal›(?:[0-9]{1,2}|[0-9]{4})(?![0-9]|\.[0-9])", digit_groups.read_version),
     (r"(?P<first>[0-9]{1,3}):(?P<second>[0-9]{1,3})(?![0-9:])", digit_groups.read_score),
     (r"‹signed›‹tail›", counted.read_number),
 )
@@ -212,7 +212,7 @@ def _money_before(locale: Locale, currencies: str) -> str:
     other = r"\." if locale.setting("decimal", ",") == "," else ","  # $5.99
     return (
         rf"(?P<minus>(?!))?(?P<currency>{currencies}) ?"
-        rf"(?P<amount>-?(?:[0-9]{{1,7}}{other}[0-9]{{2}}(?![0-9{other}])|{amount_pattern(locale)}))(?:,[-–—]{{1,2}})?"
+        rf"(?P<amount>-?(?:[0-9]{{1,7}}{other}[0-9]{{2}}(?![0-9]|{other}[0-9])|{amount_pattern(locale)}))(?:,[-–—]{{1,2}})?"
         rf"(?: ?(?P<magnitude>{magnitude})(?!{LETTER}))?(?P<tail>(?!))?"
     )
 
@@ -251,7 +251,7 @@ def _forms_by_word(locale: Locale) -> dict[str, tuple[Form, ...]]:
     months = dates.month_names(locale)
     of = locale.setting("date_of")
     link = f"(?:(?:{of}) )?" if of else ""
-    add(months, rf"(?P<month>{{}})\.? {link}(?P<year>[12][0-9]{{3}})(?![0-9])", dates.read_month_year)
+    add(months, rf"(?P<month>{{}})\.?(?:/| {link})(?P<year>[12][0-9]{{3}})(?![0-9])", dates.read_month_year)
     add((word.lower() for word in locale.rows("word")), rf"(?:{{}}){end}(?!-{letter})", words.read_word, re.IGNORECASE)
     add(
         (unit for unit in locale.rows("unit") if "alone" in locale.rows("unit")[unit].details),

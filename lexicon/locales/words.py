@@ -102,7 +102,8 @@ def _has_equals(place: Place) -> bool:
 
 
 def _stands_between_units(place: Place) -> bool:
-    return bool(place.said) and place.after in place.locale.rows("unit")
+    """Whether a slash stands directly behind what is counted, and before a word: 5 €/Monat."""
+    return bool(place.said and place.after) and not place.text[place.match.start() - 1].isspace()
 
 
 def read_unit_alone(place: Place) -> str:

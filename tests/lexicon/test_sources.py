@@ -1,0 +1,43 @@
+"""Written forms of spoken words."""
+
+import pytest
+
+from lexicon.locales.harmony import with_tail
+from lexicon.normalize import spoken_forms, written_pieces
+from lexicon.sources import sources_of, written_groups
+from lexicon.written_forms import WrittenForm
+
+
+@pytest.mark.parametrize(
+    ("language", "text", "pieces"),
+    [
+        ("fr-fr", "Il a 1 234 567 € et 2 2 pommes.", "Il|a|1 234 567 €|et|2|2|pommes."),
+        ("de", "Vom 3.-5. Mai, d. h. 10-15 km.", "Vom|3.-5. Mai,|d. h|10-15 km."),
+        ("fr-fr", "L'1 et l'an 2000 !", "L'1|et|l'an|2000|!"),
+        ("sv", "Det är 1 234 kr.", "Det|är|1|234|kr."),
+        ("de", "Ohne Zahlen, ganz so.", "Ohne|Zahlen,|ganz|so."),
+    ],
+)
+def test_pieces_are_those_of_the_text(language: str, text: str, pieces: str) -> None:
+    assert "|".join(written + after for written, after in written_pieces(text, language)) == pieces
+
+
+def test_words_of_another_text_have_no_written_forms() -> None:
+    forms = spoken_forms("Es sind 5 km.", "de")
+    assert sources_of(["Es", "sind", "sechs", "Kilometer"], forms) is None
+    assert written_groups(["ganz", "anders"], forms) == [("ganz", range(1)), ("anders", range(1, 2))]
+    assert sources_of([], []) is None
+
+
+def test_forms_side_by_side_are_one_word() -> None:
+    forms = [WrittenForm("a ", "a "), WrittenForm("10-", "ten to "), WrittenForm("15", "fifteen")]
+    assert written_groups(["a", "ten", "to", "fifteen"], forms) == [("a", range(1)), ("10-15", range(1, 4))]
+
+
+@pytest.mark.parametrize(
+    ("said", "tail", "joined"),
+    [("lira", "ye", "liraya"), ("kuruş", "dir", "kuruşdur"), ("dört", "te", "dörtte"), ("yirmi", "si", "yirmisi"),
+     ("beş", "", "beş"), ("", "e", "e")],
+)  # fmt: skip
+def test_endings_follow_the_last_vowel(said: str, tail: str, joined: str) -> None:
+    assert with_tail(said, tail) == joined
