@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import FloatArray, IntArray, Mask, Pixels, points_in_polygon, smoothstep
-from tts2face.photo.lines import LidLines
+from tts2face.photo.lines import LidLines, colours_at
 from tts2face.photo.mesh import grid_triangles
 
 IRISES = ((468, 469, 470, 471, 472), (473, 474, 475, 476, 477))  # middle and edge of the irises, right and left
@@ -64,6 +64,10 @@ class EyePatch:
     turning: FloatArray
     triangles: IntArray
     ahead_mm: float = 0.0
+
+    def colours(self) -> FloatArray:
+        """(N, 3) colours of the picture at the places."""
+        return colours_at(self.picture.astype(np.float64), self.places - self.corner)
 
 
 def eye_patches(pixels: Pixels, landmarks: FloatArray, lids: LidLines, scale: float) -> list[list[EyePatch]]:

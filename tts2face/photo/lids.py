@@ -30,7 +30,7 @@ LIKE_SKIN = np.array([45.0, 14.0, 14.0])  # of Lab in 8 bits: glasses, hair and 
 LEAST_LIKE, LEAST_SHARE = 1e-3, 0.2  # weight of what is unlike, and the mean weight from which the rows above count
 RIDGE = np.array([1e-3, 0.05, 0.2])  # of a line of colours along the lid, of second order
 LOWER_SHARE = (0.0, 0.8)  # of the way down, over which the colours become those below the eye
-LASH_SHADE, ROUND_LIGHT = 0.18, 0.03  # of the light: lost towards the lashes, and won in the middle of the lid
+LASH_SHADE, ROUND_LIGHT = 0.22, 0.03  # of the light: lost towards the lashes, and won in the middle of the lid
 LINE_WIDTH, LINE_LEAST_PX = 0.010, 0.7  # of the shadow between shut lids
 LINE_TAPER = 0.12  # of the width of the eye, over which it begins and ends
 LINE_DARKNESS = (0.2, 0.8)  # limits of its share of the light
@@ -41,7 +41,15 @@ LASHES_TAPER = 0.1  # of the width of the eye, at either side
 GRAIN_FROM = 0.30
 GRAIN_BLUR = 0.012
 MOST_GRAIN = 2.5
-LID_MEETING = 0.05  # of the opening of an eye from its lower lid, where the lids meet
+LID_MEETING = 0.0  # of the opening of an eye from its lower lid, where the lids meet
+FOLD_AT, MOST_FOLD_SHADE = (
+    (0.0, 0.03),
+    0.35,
+)  # above the lashes, of the eye distance: the fold; and the most shade there
+SHADED_ABOVE, SHADED_BELOW = (
+    (0.2, 0.9),
+    (0.0, 0.8),
+)  # of the ways from the top and down the eye, over which shade varies
 FORWARD_MM, EYE_FORWARD_MM = 8.0, 10.0  # way of a sheet in a whole blink, over skin and over the eye
 LASHES_MM = 0.4  # behind the skin, in which the lashes that move lie at rest
 LASHES_INTO = 0.006  # of the eye distance, by which their picture is taken from above the margin, beside the eye
@@ -140,23 +148,32 @@ class LidFrame:
 class ShutEye:
     """Pictures of an eye that is shut and of its lashes, and the change (R, 25, 3) of their colours on their way there.
 
-    Rows of lashes are those of `BAND_ROWS` from above, and the margin.
+    Rows of lashes are those of `BAND_ROWS` from above, and the margin. The lid is as dark as its fold above the open
+    eye; in a whole blink it gains ``light`` (h, w, 3).
     """
 
     picture: LidPicture
     lashes: LidPicture
     change: FloatArray
+    light: FloatArray
+
+    def light_at(self, places: FloatArray) -> FloatArray:
+        """(N, 3) what the lid gains at pixels (N, 2)."""
+        return colours_at(self.light, places - self.picture.corner)
 
 
 def shut_eye(pixels: Pixels, frame: LidFrame) -> ShutEye:
     """An eye of a picture (H, W, 3), shut."""
     view = _View(pixels, frame)
     skin = view.skin()
-    picture = view.over(skin * view.line_between()[..., None], view.share_of_lid())
+    share = view.share_of_lid()
+    light = share[..., None] * view.fold_shade(skin)[..., None] * skin
+    shut = view.over(skin * view.line_between()[..., None], share)
+    picture = np.rint(shut - light).clip(0, 255).astype(np.uint8)
     lashes = view.over(skin, view.share_above_lashes())
     places = frame.upper + (np.array([*BAND_ROWS[::-1], 0.0])[:, None] * frame.lashes)[..., None] * frame.up
     here, there = (colours_at(skin, places + way - view.corner) for way in (0.0, frame.meeting - frame.upper))
-    return ShutEye(LidPicture(picture, view.corner), LidPicture(lashes, view.corner), there - here)
+    return ShutEye(LidPicture(picture, view.corner), LidPicture(lashes, view.corner), there - here, light)
 
 
 class _View:
@@ -207,6 +224,18 @@ class _View:
         beside = np.maximum(-self._at / outer, (self._at - self._wide) / inner)
         found: FloatArray = np.minimum(*ends) * (1 - smoothstep(beside, 0.2, 1.0))
         return found
+
+    def fold_shade(self, skin: FloatArray) -> FloatArray:
+        """(h, w) share of the light that a lid lacks while it is folded: that of its fold above the lashes."""
+        over = (self.above - self.along(self._frame.lashes)) / self._frame.scale
+        inside = (self._at > 0) & (self._at < self._wide)
+        fold = inside & (over > FOLD_AT[0]) & (over < FOLD_AT[1])
+        if not fold.any():
+            return np.zeros(fold.shape)
+        lack = 1 - float(np.median(self._part[fold].mean(axis=1)) / max(np.median(skin[fold].mean(axis=1)), 1.0))
+        from_top = smoothstep(1 - self.above / self.along(self._frame.top), *SHADED_ABOVE)
+        found: FloatArray = from_top * (1 - smoothstep(-self.above / self._opening, *SHADED_BELOW))
+        return float(np.clip(lack, 0.0, MOST_FOLD_SHADE)) * found
 
     def share_above_lashes(self) -> FloatArray:
         """(h, w) 1 above the lashes of the upper lid and at their ends, falling to 0 among them."""

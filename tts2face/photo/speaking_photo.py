@@ -68,6 +68,7 @@ from tts2face.photo.teeth import OwnTeeth, find_teeth, teeth_and_tongue
 
 SMILE_KEPT = 0.6  # of a smile with parted lips, while they speak
 INTO_LIP = 0.012  # of the eye distance, by which the edges of parted lips are taken from within the lip
+SHADE_MM, EYE_SHADE = 2.0, 0.5  # way back of an eye in a blink, and the share of its light that the lids take
 N_NEAR = 6  # vertices of the skin around a place behind it
 FOLLOW_STEPS = 255  # of the share of the head's motion, as files hold it
 
@@ -153,27 +154,35 @@ def _lay_surface(face: Pictured) -> Laid:
     mesh, pages, surface = face.mesh, face.pages, PhotoSurface()
     surface.add(face.skin, uv=pages.uv(_shown_places(mesh, face.person)))
     surface.parts.append((SKIN, mesh.triangles))
-    lashes = [_add_lids(face, surface, eye) for eye in (0, 1)]
-    eyes, corners_of = [], iter(pages.patch_corners[2 * len(lashes) :])
+    of_lids = [rows for eye in (0, 1) for rows in _add_lids(face, surface, eye)]
+    shaded = []
+    eyes, corners_of = [], iter(pages.patch_corners[2 * len(face.shut) :])
     for eye, parts in enumerate(face.patches):
         for patch in parts:
             vertices = _eye_vertices(face, patch.places, patch.ahead_mm)
             for name, way in gaze_shapes(face.model.head, patch.turning, eye).items():
                 vertices.shapes[face.model.names.index(name)] = way
+            way = np.tile((0.0, 0.0, -SHADE_MM), (len(patch.places), 1))
+            _blink(face, vertices, eye, way)
             rows = surface.add(vertices, uv=pages.uv(patch.places, next(corners_of)))
+            shaded.append(Changing(rows, way, -EYE_SHADE * patch.colours()))
             surface.parts.append((EYES, rows[_before_person(patch, face.seen.picture)]))
             if patch is parts[0]:  # the others are catchlights before it
                 eyes.append((patch, rows))
     margins = [_add_margin(face, surface, eye) for eye in (0, 1)]
     corners, weights = place_landmarks(mesh, face.landmarks, eyes, margins)
-    joined = Changing(*(np.concatenate([getattr(rows, column.name) for rows in lashes]) for column in fields(Changing)))
+    joined = Changing(
+        *(np.concatenate([getattr(rows, column.name) for rows in (*of_lids, *shaded)]) for column in fields(Changing))
+    )
     return after(Laid, face, surface=surface, corners=corners, weights=weights, lashes=joined)
 
 
-def _add_lids(face: Pictured, surface: PhotoSurface, eye: int) -> Changing:
-    """Add what comes over an eye that shuts; returns the vertices of its lashes."""
+def _add_lids(face: Pictured, surface: PhotoSurface, eye: int) -> list[Changing]:
+    """Add what comes over an eye that shuts; returns vertices of lid and lashes, whose colours change on their way."""
     mesh, frame = face.mesh, face.frames[eye]
     own, of_lashes = face.pages.patch_corners[2 * eye : 2 * eye + 2]
+
+    shut, changing = face.shut[eye], []
 
     def add(part: str, sheet: LidSheet, vertices: Vertices, way: FloatArray, uv: FloatArray) -> IntArray:
         _blink(face, vertices, eye, way)
@@ -189,11 +198,15 @@ def _add_lids(face: Pictured, surface: PhotoSurface, eye: int) -> Changing:
     for sheet in sheets_over_skin(frame):
         skin = face.skin.between(*between_vertices(mesh, sheet.places))
         placed = replace(skin, places=skin.places - forward(sheet.places, FORWARD_MM * sheet.come))
-        add(LIDS, sheet, placed, forward(sheet.places, FORWARD_MM), face.pages.uv(sheet.places, own))
+        way = forward(sheet.places, FORWARD_MM)
+        numbers = add(LIDS, sheet, placed, way, face.pages.uv(sheet.places, own))
+        changing.append(Changing(numbers, way, shut.light_at(sheet.places)))
     sheet = sheet_over_eye(frame)
     over = _eye_vertices(face, sheet.places, 0.0)
     over = replace(over, places=over.places - forward(sheet.places, EYE_FORWARD_MM * sheet.come))
-    add(LID_OVER_EYE, sheet, over, forward(sheet.places, EYE_FORWARD_MM), face.pages.uv(sheet.places, own))
+    way = forward(sheet.places, EYE_FORWARD_MM)
+    numbers = add(LID_OVER_EYE, sheet, over, way, face.pages.uv(sheet.places, own))
+    changing.append(Changing(numbers, way, shut.light_at(sheet.places)))
     upper = mesh.upper_lids[eye]
     rows = np.stack([*(np.concatenate([upper[:1], row, upper[-1:]]) for row in mesh.bands[eye][::-1]), upper])
     sheet = LidSheet.of(mesh.places[rows], np.zeros(rows.shape))
@@ -202,7 +215,7 @@ def _add_lids(face: Pictured, surface: PhotoSurface, eye: int) -> Changing:
     way = np.tile(face.camera.ways_to_head(lid_ways(mesh, eye)[0]), (len(rows), 1)) + forward(sheet.places, FORWARD_MM)
     shown = sheet.places + LASHES_INTO * frame.scale * frame.up
     numbers = add(LASHES, sheet, placed, way, face.pages.uv(shown, of_lashes))
-    return Changing(numbers, way, face.shut[eye].change.reshape(-1, 3))
+    return [*changing, Changing(numbers, way, shut.change.reshape(-1, 3))]
 
 
 def _add_margin(face: Pictured, surface: PhotoSurface, eye: int) -> IntArray:
