@@ -1,5 +1,6 @@
 """Lids of a picture that shut: smooth skin without the crease above an open eye, behind what lies before the eye."""
 
+import cv2
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
@@ -103,3 +104,16 @@ def test_landmarks_of_the_lids_follow_the_lashes(found: FoundFace) -> None:
     for side in ("Left", "Right"):
         opened, shut = eye_aperture(landmarks, side)
         assert shut < 0.1 * opened
+
+
+def test_the_white_of_an_eye_darkens_under_a_lid_that_comes_down(found: FoundFace, frames: list[LidFrame]) -> None:
+    pixels = still(NAME, SIDE)
+    for frame in frames:
+        cv2.fillPoly(pixels, [np.rint(np.concatenate([frame.upper, frame.lower[::-1]])).astype(np.int32)], (255,) * 3)
+    opened, nearly = (
+        shown(pixels, found, **dict.fromkeys(SHUT, share)).astype(float).mean(axis=2) for share in (0.0, 0.7)
+    )
+    for frame in frames:
+        columns, rows = np.rint((frame.lower + 0.15 * (frame.upper - frame.lower))[MIDDLE]).astype(int).T
+        assert np.median(opened[rows, columns]) > 240
+        assert np.median(nearly[rows, columns]) < 200

@@ -29,7 +29,7 @@ from tts2face.video.networks import LandmarkNetwork, find_segmenter
 
 FOLDER, N_KEPT = "photos", 8
 LEAST_AGE_S = 3600.0  # of a face that is removed: another process may be about to read a younger one
-MAKING = 5  # raised when faces of photos are made in another way, or of another head
+MAKING = 6  # raised when faces of photos are made in another way, or of another head
 
 
 def face_from_photo(  # noqa: PLR0913 - one parameter an option

@@ -32,8 +32,9 @@ from tts2face.photo.lids import (
     shut_eye,
 )
 from tts2face.photo.light import SMILING, Changing, MouthRows, picture_light, wrinkles
-from tts2face.photo.lines import InnerLips, darken_lip_edges, find_lid_lines, find_lip_line
+from tts2face.photo.lines import darken_lip_edges, find_lid_lines
 from tts2face.photo.mesh import PhotoMesh, build_mesh
+from tts2face.photo.moustache import find_lips
 from tts2face.photo.mouth import MouthInside, MouthPlace, cheek_light, mouth_light, mouth_walls
 from tts2face.photo.photograph import OPAQUE, Photograph
 from tts2face.photo.shapes import (
@@ -106,9 +107,9 @@ def _trace(seen: PhotographedFace, head: Face, fit: PhotoFit) -> Traced:
     pixels, scale = picture.pixels, found.eye_distance_px
     camera = find_camera(found, model.landmarks)
     landmarks = camera.depths_of(found.landmarks)
-    line = find_lip_line(pixels, found)
+    line = find_lips(pixels, found)
     given = PhotoPlaces(fit, (pixels.shape[1], pixels.shape[0]), picture.reduced_by, scale)
-    lips = given.lips(InnerLips(camera.depths_of(line.upper), camera.depths_of(line.lower), line.gap))
+    lips = given.lips(replace(line, upper=camera.depths_of(line.upper), lower=camera.depths_of(line.lower)))
     return Traced(
         model=model,
         seen=seen,
