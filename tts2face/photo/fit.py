@@ -146,7 +146,7 @@ class PhotoPlaces:
         """Edges of the lips with the lines that are given; errors as `lids`."""
         if ("lips", "seam") in self.fit.lines:
             seam = self._line("lips", "seam", (found.upper + found.lower) / 2)
-            return InnerLips(seam, seam.copy(), 0.0, found.under_hair)
+            return InnerLips(seam, seam.copy(), 0.0)
         if not any(part == "lips" for part, _ in self.fit.lines):
             return found
         upper, lower = self._opening("lips", found.upper, found.lower)

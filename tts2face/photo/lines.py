@@ -118,14 +118,11 @@ class InnerLips:
         Pixels and depth as landmarks have them; equal in the corners, and everywhere if the mouth is closed.
     gap
         Largest opening by the landmarks, of the eye distance.
-    under_hair
-        Whether a moustache lies where they meet.
     """
 
     upper: FloatArray
     lower: FloatArray
     gap: float
-    under_hair: bool = False
 
     @property
     def is_closed(self) -> bool:
@@ -164,8 +161,8 @@ def spline_weights(n: int, m: int) -> FloatArray:
 
 
 def darken_lip_edges(pixels: Pixels, lips: InnerLips, scale: float) -> Pixels:
-    """Picture (H, W, 3) whose lips that are parted, or meet under hair, darken at their edges as lips that meet do."""
-    if lips.is_closed and not lips.under_hair:
+    """Picture (H, W, 3) whose parted lips darken towards their inner edges, as lips that meet do."""
+    if lips.is_closed:
         return pixels
     margin = int(np.ceil(EDGE_REACH * EDGE_SHADE * scale)) + 2
     every = np.concatenate([lips.upper, lips.lower])[:, :2]
