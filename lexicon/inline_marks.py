@@ -75,6 +75,7 @@ _CLAUSE_START = re.compile(r"[.!?:…,;—–-]['\"”’)]{0,3}\s*\Z")
 _RIGHT_END = re.compile(rf"[ \t]*(?:\Z|[\n.!?…]|[\"“‘(\[*]?[^\W\d_a-zß-ÿ]|[\"“‘*_~\[<]|{EMOJI})")
 _CLOSE_END = re.compile(r"[ \t]*(?:\Z|[\n.!?…])")
 _SUBJECT = re.compile(r"(?:he|she|it|who|which|that|this|everyone|nobody)\s+\Z", re.IGNORECASE)  # she *looks* well
+_CAPITAL_NOUNS = frozenset(("de", "lb"))  # languages in which capitals begin no sentence
 _NEW_SENTENCE = re.compile(r"\s*[\"“‘]?(?!I\b)[^\W\d_a-zß-ÿ]")
 _LAST_WORD = re.compile(r"([^\W\d_]+)[\"'”’)]?\s*\Z")
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Za-z])(?=[0-9])|_")
@@ -252,7 +253,13 @@ class _Scanner:
 
     def _in_place_of(self, cue: Cue) -> str:
         after = self._after(cue.end)
-        if cue.is_within and _NEW_SENTENCE.match(after) and (word := _LAST_WORD.search(self.tail)) is not None:
+        has_capitals = self._rules.language.partition("-")[0] not in _CAPITAL_NOUNS
+        if (
+            cue.is_within
+            and has_capitals
+            and _NEW_SENTENCE.match(after)
+            and (word := _LAST_WORD.search(self.tail)) is not None
+        ):
             return ". " if not is_function_word(word[1]) else " "
         return " " if self.tail[-1:].isalnum() and after[:1].isalnum() else ""
 

@@ -132,7 +132,7 @@ def _sentence_spans(within: Iterable[PlacedCue], places: _Places) -> Iterator[Sp
         if not placed.style:
             continue
         before = places.word_before(placed.at, in_line=True)
-        start, end = places.sentence(placed.at if before is None else before)
+        start, end = places.sentence(places.next_word(placed.at) if before is None else before)
         if waiting is not None and waiting[1] == end and before is not None:
             start = max(waiting[0], min(before_at, placed.at))
             yield (waiting[0], start, waiting[2])

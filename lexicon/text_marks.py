@@ -160,7 +160,7 @@ class PartReader:
 def _end_sentence(builder: MarkedTextBuilder, separator: str) -> None:
     """End the sentence that is open, with a full stop where it has no mark of its own."""
     last = builder.last_visible
-    if not last or (builder.last_character in "\n\u2028" and separator != PARAGRAPH_END):
+    if not last or (builder.last_character == "\u2028" and separator != PARAGRAPH_END):
         return
     if builder.last_character not in "\n\u2028" and (last.isalnum() or last in "\"'”’»)%*_`"):
         builder.add_text(".")
