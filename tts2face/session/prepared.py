@@ -321,11 +321,9 @@ def unknown_styles(text: MarkedText, names: Sequence[str]) -> tuple[str, ...]:
 def with_styles_of(prepared: PreparedRequest, names: Sequence[str]) -> PreparedRequest:
     """A request whose marks name styles of a palette, and not those of a speech service that are none of it."""
     text = prepared.text
-    known = {
-        name: name if name in names else nearest_style(name) or name
-        for name in {name for run in text.runs for name in run.styles}
-        if name in names or nearest_style(name) or name not in text.foreign_styles
-    }
+    used = {name for run in text.runs for name in run.styles}
+    nearest = {name: name if name in names else nearest_style(name) or name for name in used}
+    known = {name: near for name, near in nearest.items() if near in names or name not in text.foreign_styles}
     runs = [replace(run, styles=tuple(known[name] for name in run.styles if name in known)) for run in text.runs]
     return replace(prepared, text=replace(text, runs=tuple(runs)))
 

@@ -21,6 +21,11 @@ SSML = (
     '<speak>We were <emphasis level="strong">away</emphasis> <break time="300ms"/> a year '
     '<prosody rate="120%">ago</prosody>.</speak>'
 )
+MODEL_TEXT = (
+    "<think>Be kind.</think>[happy] **Sure!** 😊 Here is the *plan*:\n\n## Today\n1. Relax 🧘\n2. Call [Ann](tel:5)\n\n"
+    "| who | when |\n|---|---|\n| Bob | now |\n\n```sh\nls\n```\n*nods* Good luck! :) I ❤️ it (about two hours), &amp; "
+    "<sad>we were ~~here~~ away.</sad> [pause] He (happy) may #GoNow <x>again.</x>"
+)
 WORDS = "bob  B IY1 M\n"
 REQUESTS: dict[str, dict[str, Any]] = {
     "plain": {"text": TEXT},
@@ -28,6 +33,9 @@ REQUESTS: dict[str, dict[str, Any]] = {
     "seed": {"text": TEXT, "seed": 7, "fps": 25.0},
     "marks": {"text": "Well, [pause 0.4] no [nod] more. [style:delighted]Yes.[/style]"},
     "ssml": {"text": SSML},
+    "text of a model": {"text": MODEL_TEXT},
+    "markup llm": {"text": MODEL_TEXT, "markup": "llm"},
+    "no words": {"text": "*nods* 😀", "seed": 2},
     "dictionary": {"text": TEXT, "dictionary": "names"},
     "gestures none": {"text": TEXT, "gestures": "none"},
     "gestures ju2008": {"text": TEXT, "gestures": "ju2008", "synthesis": "theobald2007"},
