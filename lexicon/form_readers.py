@@ -40,85 +40,13 @@ _BEFORE_LETTER = re.compile(r" [a-z]")
 _BEFORE_NUMBER = re.compile(r" ?[0-9]")
 _NO_NAMES = word_set("The On In At And But When Dear I If As To From Near")
 _CENTURY = re.compile(r"(?:st|nd|rd|th)?[ -](?:[Cc]entur(?:y|ies)|[Dd]ynasty|[Oo]lympi)")
-_NOON = re.compile(r" (?:noon|midnight)\b")
-_LASTED = re.compile(r"\b(?:took|takes|lasted|lasts|last|in|of|ran|runs|time|record|duration|for|after|finished) \Z")
 _AT_END = re.compile(r"\s*$")
-_CONTEXT_AFTER = 48  # characters after a full stop that decide whether a sentence begins there
+CONTEXT_AFTER = 48  # characters after a full stop that decide whether a sentence begins there
 
 
-def _before(m: re.Match[str]) -> str:
+def text_before(m: re.Match[str]) -> str:
     """Text before a form that decides how it is read."""
-    return m.string[max(0, m.start() - _CONTEXT_AFTER) : m.start()]
-
-
-def read_numeric_date(m: re.Match[str], _: str) -> str:
-    """3/15/2024 is March fifteenth; 13/13/13 is not a date and is read number by number."""
-    first = m["nd1"]
-    separator = m["ndsep"]
-    second = m["nd2"]
-    last = m["ndy"]
-    words = readings.numeric_date_words(int(first), int(second), last, separator)
-    sign = {"/": "slash", ".": "point", "-": "dash"}[separator]
-    return words or f" {sign} ".join(number_words(part) for part in (first, second, last))
-
-
-def read_iso_date(m: re.Match[str], _: str) -> str:
-    """2024-03-15 is March fifteenth, twenty twenty-four."""
-    month, day = int(m["isom"]), int(m["isod"])
-    if 1 <= month <= 12 and 1 <= day <= 31:
-        return readings.date_words(day, month, m["isoy"])
-    return " dash ".join(number_words(m[part]) for part in ("isoy", "isom", "isod"))
-
-
-def read_month_first(m: re.Match[str], _: str) -> str:
-    """March 3, 2024 is March third, twenty twenty-four."""
-    month = readings.month_number(m["mf"])
-    day = int(m["mfd"])
-    last = m["mfy"] or ""
-    if m["mfto"] and day < int(m["mfto"]) <= 31:
-        year = f", {year_words(int(last))}" if last else ""
-        return f"{readings.date_words(day, month, '')} to {ordinal_words(int(m['mfto']))}{year}"
-    if 1 <= day <= 31 and not m["mfto"]:
-        return readings.date_words(day, month, last)
-    words = f"{readings.MONTHS[month - 1]} {number_words(m['mfd'])}"
-    words += f" to {number_words(m['mfto'])}" if m["mfto"] else ""
-    return words + (f", {year_words(int(last))}" if last else "")
-
-
-def read_month_year(m: re.Match[str], _: str) -> str:
-    """March 2024 is March twenty twenty-four."""
-    return f"{readings.MONTHS[readings.month_number(m['my']) - 1]} {year_words(int(m['myy']))}"
-
-
-def read_day_first(m: re.Match[str], previous: str) -> str:
-    """3 March 2024 is the third of March, twenty twenty-four."""
-    month = readings.month_number(m["df"])
-    day = int(m["dfd"])
-    last = m["dfy"] or ""
-    if not 1 <= day <= 31:
-        return f"{number_words(m['dfd'])} {readings.MONTHS[month - 1]}" + (f" {year_words(int(last))}" if last else "")
-    words = readings.date_words(day, month, last, day_first=True)
-    return words.removeprefix("the ") if previous.lower() == "the" else words
-
-
-def read_clock(m: re.Match[str], _: str) -> str:
-    """3:05 pm is three oh five PM; 26:70 is not a time and is read as twenty-six to seventy."""
-    hour, minute = m["hh"] or m["hh2"] or m["hh3"], m["mm"] or m["mm3"] or "0"
-    half = m["half"] or m["half2"] or m["half3"] or ""
-    if int(hour) > 24 or int(minute) > 59:
-        after = f" {half.replace('.', '').upper()}".rstrip()
-        return " to ".join(cardinal_words(int(part)) for part in (hour, minute, m["ss"]) if part) + after
-    # 1:23:45 hours says itself what it is
-    if m["ss"] and _LASTED.search(_before(m)) and not m.string.startswith(" hour", m.end()):
-        return readings.duration_words(int(hour), int(minute), int(m["ss"]))
-    if int(hour) == 12 and int(minute) == 0 and _NOON.match(m.string, m.end()):
-        return "twelve"
-    return _keep_full_stop(readings.time_words(int(hour), int(minute), int(m["ss"] or 0), half), m)
-
-
-def read_proportion(m: re.Match[str], _: str) -> str:
-    """3:1 is three to one."""
-    return f"{cardinal_words(int(m['ra']))} to {cardinal_words(int(m['rb']))}"
+    return m.string[max(0, m.start() - CONTEXT_AFTER) : m.start()]
 
 
 def read_money(m: re.Match[str], previous: str) -> str:
@@ -155,11 +83,6 @@ def read_measure(m: re.Match[str], previous: str) -> str:
 def read_telephone(m: re.Match[str], _: str) -> str:
     """555-1234 is five five five, one two three four."""
     return readings.telephone_words(m.group())
-
-
-def read_decade(m: re.Match[str], _: str) -> str:
-    """1990s is nineteen nineties."""
-    return readings.decade_words(m["decade"])
 
 
 def read_version(m: re.Match[str], _: str) -> str:
@@ -201,21 +124,9 @@ def read_per(m: re.Match[str], _: str) -> str:
     return f"per {_RATES.get(m['perword'], m['perword'])}"
 
 
-def read_short_name(m: re.Match[str], _: str) -> str:
-    """The days and months of Mon–Fri."""
-    written = m["dayone"] or m["daytwo"]
-    full = next(name for name in (*readings.DAYS, *readings.MONTHS) if name.startswith(written[:3]))
-    return _keep_full_stop(full, m)
-
-
 def read_who(m: re.Match[str], previous: str) -> str:
     """The WHO is spelled, WHO is not."""
     return "W H O" if previous.lower() == "the" else m.group()
-
-
-def read_lap(m: re.Match[str], _: str) -> str:
-    """3:42.7 is three forty-two point seven."""
-    return f"{readings.time_words(int(m['lapm']), int(m['laps']), 0, '')} point {digit_words(m['lapf'])}"
 
 
 def read_initial(m: re.Match[str], previous: str) -> str:
@@ -223,7 +134,7 @@ def read_initial(m: re.Match[str], previous: str) -> str:
     if m.group()[0] in "IVXLCDM" and previous.lower() in RULERS | BEFORE_ROMAN:
         return m.group()
     is_first = not previous or previous in MARKS
-    if not is_first and starts_sentence(m.string[m.end() : m.end() + _CONTEXT_AFTER].lstrip()):
+    if not is_first and starts_sentence(m.string[m.end() : m.end() + CONTEXT_AFTER].lstrip()):
         return m.group()
     starts_name = is_first or previous[:1].isupper() or previous in {"by", "and", "with"}
     return m.group()[0] if starts_name else m.group()
@@ -236,7 +147,7 @@ def read_nothing(_m: re.Match[str], _: str) -> str:
 
 def read_punctuation(m: re.Match[str], _: str) -> str:
     """A punctuation mark; nothing for the full stop of an abbreviation within a sentence (Insp. Morse)."""
-    before, after = m.string[max(m.start() - 24, 0) : m.start()], m.string[m.end() : m.end() + _CONTEXT_AFTER]
+    before, after = m.string[max(m.start() - 24, 0) : m.start()], m.string[m.end() : m.end() + CONTEXT_AFTER]
     return "" if m.group() == "." and is_abbreviated(before, after.lstrip(), "en") else m.group()
 
 
@@ -316,7 +227,7 @@ def _relation(m: re.Match[str], top: int, bottom: int) -> str:
     if m["bottom"] in _OUT_OF and top < bottom and _PEOPLE_AFTER.match(m.string, m.end()):
         return "out of"
     is_mark = m["bottom"] in _OUT_OF and top < bottom and _ALONE_AFTER.match(m.string, m.end())
-    return "out of" if is_mark and _SCORED.search(_before(m)) else ""
+    return "out of" if is_mark and _SCORED.search(text_before(m)) else ""
 
 
 def read_out_of(m: re.Match[str], _: str) -> str:
@@ -344,9 +255,9 @@ def read_roman_numeral(m: re.Match[str], previous: str) -> str:
     return m.group()
 
 
-def _keep_full_stop(words: str, m: re.Match[str]) -> str:
+def keep_full_stop(words: str, m: re.Match[str]) -> str:
     """Keep the full stop of an abbreviation that also ends the sentence."""
-    after = m.string[m.end() : m.end() + _CONTEXT_AFTER]
+    after = m.string[m.end() : m.end() + CONTEXT_AFTER]
     ends = _AT_END.match(m.string, m.end()) or (after[:1].isspace() and starts_sentence(after.lstrip()))
     return f"{words}." if ends and m.group().endswith(".") else words
 
@@ -360,16 +271,16 @@ def read_abbreviation(m: re.Match[str], previous: str) -> str:
     if context == "number" and not _BEFORE_NUMBER.match(m.string, m.end()):
         return m.group()
     if context == "doctor" and after_name and not before_name:
-        return _keep_full_stop("Drive", m)
+        return keep_full_stop("Drive", m)
     if context == "saint" and (after_name or not before_name):
-        return _keep_full_stop("Street", m)
-    return spoken if context in {"title", "number"} else _keep_full_stop(spoken, m)
+        return keep_full_stop("Street", m)
+    return spoken if context in {"title", "number"} else keep_full_stop(spoken, m)
 
 
 def read_dotted_letters(m: re.Match[str], _: str) -> str:
     """F.B.I. is FBI; I.I. is I I, as II would be a number."""
     letters = m.group().replace(".", "").upper()
-    return _keep_full_stop(" ".join(letters) if letters in NEVER_LETTERS else letters, m)
+    return keep_full_stop(" ".join(letters) if letters in NEVER_LETTERS else letters, m)
 
 
 def read_scientific(m: re.Match[str], _: str) -> str:
@@ -432,13 +343,6 @@ def read_either(m: re.Match[str], _: str) -> str:
 def read_rate(m: re.Match[str], _: str) -> str:
     """The mg/dL of "in mg/dL" is milligrams per deciliter."""
     return readings.unit_words(m.group())
-
-
-def read_season(m: re.Match[str], _: str) -> str:
-    """2023/24 is twenty twenty-three twenty-four."""
-    year, following = int(m["year"]), int(m["next"])
-    is_next = following == (year + 1) % 100
-    return f"{year_words(year)}{' ' if is_next else ' over '}{cardinal_words(following)}"
 
 
 def read_unchanged(m: re.Match[str], _: str) -> str:
