@@ -43,20 +43,20 @@ def test_words_and_phones_are_those_that_are_printed(language: str) -> None:
 def test_words_of_numbers_in_german() -> None:
     speech = load_voice("espeak", "de").speak("Der Weg ist 3,5 km lang, das kostet 1.000 €.")
     labels = [word.text for word in speech.words]
-    assert labels == ["Der", "Weg", "ist", "3,5", "km", "lang", "das", "kostet", "1.000", "€"]
+    assert " ".join(labels) == "Der Weg ist drei Komma fünf Kilometer lang das kostet tausend Euro"
     starts = [float(speech.phones.edges[word.first]) for word in speech.words]
     assert min(after - before for before, after in pairwise(starts)) > 0.05
 
 
 def test_a_dictionary_changes_the_words_phones_alone() -> None:
-    own = {"km": SEGMENTS}
+    own = {"kilometer": SEGMENTS}
     speech = load_voice("espeak", "de", own).speak("Nur 3,5 km.")
-    assert [word.text for word in speech.words] == ["Nur", "3,5", "km"]
+    assert [word.text for word in speech.words] == ["Nur", "drei", "Komma", "fünf", "Kilometer"]
     km = speech.words[-1]
-    assert speech.phones.phones[km.first : km.last] == tuple(segment.phone for segment in own["km"])
+    assert speech.phones.phones[km.first : km.last] == tuple(segment.phone for segment in own["kilometer"])
 
 
 def test_words_with_given_phones_stand_beside_numbers() -> None:
     words = [SpokenWord("1.000", ()), SpokenWord("Ada", SEGMENTS, ","), SpokenWord("3,5", ())]
     speech = load_voice("espeak", "de").speak(words)
-    assert [word.text for word in speech.words] == ["1.000", "Ada", "3,5"]
+    assert [word.text for word in speech.words] == ["tausend", "Ada", "drei", "Komma", "fünf"]
