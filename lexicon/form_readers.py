@@ -42,6 +42,28 @@ _NO_NAMES = word_set("The On In At And But When Dear I If As To From Near")
 _CENTURY = re.compile(r"(?:st|nd|rd|th)?[ -](?:[Cc]entur(?:y|ies)|[Dd]ynasty|[Oo]lympi)")
 _AT_END = re.compile(r"\s*$")
 CONTEXT_AFTER = 48  # characters after a full stop that decide whether a sentence begins there
+# 50-50, 80-20: shares of a whole
+_SPLITS = frozenset((str(part), str(100 - part)) for part in range(10, 95, 5) if part >= 50 or part % 10 == 0)
+_NAMED_FRACTIONS = {
+    "24/7": "twenty-four seven",
+    "9/11": "nine eleven",
+    "50/50": "fifty fifty",
+    "20/20": "twenty twenty",
+}
+_SCORED = re.compile(
+    r"\b(?:scor|rat(?:e|ing)|grade|quiz|test|exam|review|mark|points?|got|gave|give|solid|perfect)", re.I
+)
+_OUT_OF = frozenset({"5", "10", "20", "50", "100"})  # of which marks are given
+_ALONE_AFTER = re.compile(r"\s*(?:[.,;:!?)]|\Z)|,? (?:on|in|for|from|by|and|but|at|with|to|so|because|this|last)\b")
+_PEOPLE_AFTER = re.compile(
+    r" (?!miles|cups|inches|feet|pounds|ounces|\w*spoons|acres|lit|met|pints|quarts|yards|hours|seconds|times)"
+    r"(?:people|men|women|children|[a-z]{3,}s)\b"
+)
+_EQUATION = re.compile(r"\s*[=+×÷*<>≤≥-]\s*[0-9a-z]")
+_PRESSURES = (range(60, 261), range(30, 161))  # mmHg, of the heart's beat and between two
+# Times behind a slash, by which something is counted.
+_RATES = {"mo": "month", "wk": "week", "yr": "year", "hr": "hour", "min": "minute", "sec": "second"}
+_RATES |= {name: name for name in ("day", "night", "person")}
 
 
 def text_before(m: re.Match[str]) -> str:
@@ -67,9 +89,9 @@ def read_money_after(m: re.Match[str], previous: str) -> str:
 
 def _as_attribute(words: str, currency: str, m: re.Match[str], previous: str) -> str:
     """Money in the singular before a noun: a $5 bill."""
-    one, many = readings.CURRENCIES[currency][:2]
+    single, many = readings.CURRENCIES[currency][:2]
     is_attribute = previous.lower() in {"a", "an"} and _BEFORE_LETTER.match(m.string, m.end())
-    return words.removesuffix(many) + one if is_attribute and words.endswith(many) else words
+    return words.removesuffix(many) + single if is_attribute and words.endswith(many) else words
 
 
 def read_measure(m: re.Match[str], previous: str) -> str:
@@ -157,10 +179,6 @@ def read_dot(m: re.Match[str], _: str) -> str:
     return "dot" if before.isalnum() and after.isalnum() else "."
 
 
-# 50-50, 80-20: shares of a whole
-_SPLITS = frozenset((str(part), str(100 - part)) for part in range(10, 95, 5) if part >= 50 or part % 10 == 0)
-
-
 def read_range(m: re.Match[str], previous: str) -> str:
     """5-10 km is five to ten kilometers, 1990-1995 two years."""
     # 1815-1820: two numbers of four digits are years, whatever stands before
@@ -184,28 +202,10 @@ def _number(written: str, previous: str) -> str:
     return readings.signed_number_words(written)
 
 
-_NAMED_FRACTIONS = {
-    "24/7": "twenty-four seven",
-    "9/11": "nine eleven",
-    "50/50": "fifty fifty",
-    "20/20": "twenty twenty",
-}
-_SCORED = re.compile(
-    r"\b(?:scor|rat(?:e|ing)|grade|quiz|test|exam|review|mark|points?|got|gave|give|solid|perfect)", re.I
-)
-_OUT_OF = frozenset({"5", "10", "20", "50", "100"})  # of which marks are given
-_ALONE_AFTER = re.compile(r"\s*(?:[.,;:!?)]|\Z)|,? (?:on|in|for|from|by|and|but|at|with|to|so|because|this|last)\b")
-_PEOPLE_AFTER = re.compile(
-    r" (?!miles|cups|inches|feet|pounds|ounces|\w*spoons|acres|lit|met|pints|quarts|yards|hours|seconds|times)"
-    r"(?:people|men|women|children|[a-z]{3,}s)\b"
-)
-_EQUATION = re.compile(r"\s*[=+×÷*<>≤≥-]\s*[0-9a-z]")
-_PRESSURES = (range(60, 261), range(30, 161))  # mmHg, of the heart's beat and between two
-
-
 def read_fraction(m: re.Match[str], _: str) -> str:
     """3/4 is three quarters, 10/10 ten out of ten, 120/80 one hundred twenty over eighty, 245/3 for three wickets."""
-    top, bottom, unit = m["top"], m["bottom"], m["funit"]
+    top, bottom = m["top"], m["bottom"]
+    unit = m["funit"]
     if m["whole"] or unit:
         is_one = not m["whole"] and int(top) <= int(bottom)
         name = "" if not unit else readings.unit_words("inch" if unit == "in" else unit, is_one=is_one)
@@ -217,7 +217,7 @@ def read_fraction(m: re.Match[str], _: str) -> str:
 
 
 def _relation(m: re.Match[str], top: int, bottom: int) -> str:
-    """What a slash between two numbers is said as; empty for a fraction."""
+    """Word for a slash between two numbers; empty in a fraction."""
     if top == bottom:
         return "out of"
     if top in _PRESSURES[0] and bottom in _PRESSURES[1] and top > bottom:
@@ -324,11 +324,6 @@ def read_slashed(m: re.Match[str], _: str) -> str:
     known = {"and/or": "and or", "w/o": "without", "w/": "with", "n/a": "not applicable", "N/A": "not applicable"}
     known |= {"b/c": "because", "c/o": "care of"}
     return known[m.group()]
-
-
-# Times behind a slash, by which something is counted.
-_RATES = {"mo": "month", "wk": "week", "yr": "year", "hr": "hour", "min": "minute", "sec": "second"}
-_RATES |= {name: name for name in ("day", "night", "person")}
 
 
 def read_either(m: re.Match[str], _: str) -> str:

@@ -64,7 +64,7 @@ def _is_known(word: str) -> bool:
 
 @functools.lru_cache(maxsize=20_000)
 def informal_word(word: str) -> str:
-    """What a word of small or mixed letters is said as: IDK, thanks, so; itself in most cases."""
+    """The words for which a word of chat stands: IDK, thanks; of a stretched one its spelling; else itself."""
     known = read_table("informal_words.tsv").get(word)
     if known:
         return known[0]

@@ -65,7 +65,9 @@ def _charge(m: re.Match[str]) -> str:
 
 def _without_closing_quotes(text: str) -> str:
     """A text without the single quotes that end a quotation behind a number, which are no marks of feet."""
-    pieces, at, is_open = [], 0, False
+    pieces: list[str] = []
+    at = 0
+    is_open = False
     for quote in _SINGLE.finditer(text):
         before, after = text[quote.start() - 1 : quote.start()], text[quote.end() : quote.end() + 1]
         if is_open and before.isalnum() and not after.isalnum():
@@ -80,7 +82,9 @@ def _without_closing_quotes(text: str) -> str:
 
 def _with_inches(text: str) -> str:
     """Marks of inches in place of the double quotes that end no quotation and follow a number."""
-    pieces, at, is_open = [], 0, False
+    pieces: list[str] = []
+    at = 0
+    is_open = False
     for quote in _QUOTES.finditer(text):
         start = quote.start()
         sign = quote[0]

