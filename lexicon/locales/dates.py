@@ -21,7 +21,9 @@ def read_numeric_date(place: Place) -> str | None:
 
 def read_short_date(place: Place) -> str | None:
     """5/3 and 5.3. without a year, behind a word that dates have before them."""
-    if place.before.lower() not in place.locale.words("date_before"):
+    is_listed = place.text[max(place.match.start() - 2, 0) : place.match.start()] == ", "  # Fr., 13.12.
+    is_dotted = place.match.group().endswith(".") and (is_listed or not place.is_last)
+    if not is_dotted and place.before.lower() not in place.locale.words("date_before"):
         return None
     day, month = int(place.match["day"]), int(place.match["month"])
     if not (1 <= day <= _DAYS and 1 <= month <= _MONTHS):

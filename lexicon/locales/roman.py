@@ -56,7 +56,7 @@ def _with_suffix(place: Place, value: int) -> str | None:
 
 def _in_context(place: Place, value: int) -> str | None:
     locale = place.locale
-    for word in (f"+{_word_after(place)}", place.before.lower()):
+    for word in (f"+{_word_after(place)}", (place.said or place.before).lower()):
         if word in locale.rows("roman"):
             return _by_word(place, value, word)
     return _ruler(place, value) if place.before in locale.rows("ruler") else None
