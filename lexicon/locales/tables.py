@@ -23,7 +23,7 @@ roman        word before or behind a Roman number, and the kind of number that i
 ruler        names whose Roman numbers are those of rulers
 sign         sign that is spoken, by its words
 fraction     words of a fraction
-word         word of another language, as the language says it
+word         word of another language, as the language says it (those of `loan_words.tsv`, too)
 letter       name of a letter
 form         written form with a pattern and a template of its own (`lexicon.locales.templates`)
 kana         Chinese characters of numbers in kana, for Japanese without its reader
