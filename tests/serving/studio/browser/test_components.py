@@ -194,7 +194,7 @@ def test_keys_paint_and_erase_the_selection(page):
     assert (erase["start"], erase["end"]) == (paint["start"], paint["end"])
 
 
-def test_double_click_adds_key_points_nods_gaze_targets_and_listening(page):
+def test_double_click_adds_key_points_gestures_gaze_targets_and_listening(page):
     page.browser.double_click(*page.at("curve", 1.2, 0.3))
     page.browser.double_click(*page.at("gestures", 2.0))
     page.browser.double_click(*page.at("targets", 2.5))
@@ -207,6 +207,33 @@ def test_double_click_adds_key_points_nods_gaze_targets_and_listening(page):
     assert (listen["kind"], listen["end"] - listen["start"]) == ("listen", pytest.approx(1.0))
     assert (channel["kind"], channel["channel"]) == ("channel", "jawOpen")
     assert [key[1] for key in channel["keys"]][::2] == [0, 0]
+
+
+FILL = """
+    const [name, value] = arguments;
+    const labels = [...document.querySelectorAll('.studio-editor label')];
+    const input = labels.find((one) => one.innerText.startsWith(name)).querySelector('input, select');
+    input.value = value;
+    input.dispatchEvent(new Event('input', { bubbles: true }));
+    input.dispatchEvent(new Event('change', { bubbles: true }));"""
+
+
+def test_a_gesture_gets_another_name_size_and_direction(page):
+    page.show(1.0)
+    page.focus()
+    page.browser.press(*["Down"] * 11, "Enter")
+    (nod,) = page.edits(1)
+    page.browser.press("Right", "Enter")
+    eventually(lambda: page.browser.run("return !!document.querySelector('.studio-editor')"), 10, "the form opens")
+    for field, value in (("Gesture", "wink"), ("Size", "1.5"), ("Duration", "2"), ("Direction", "right")):
+        page.browser.run(FILL, field, value)
+    page.browser.run("document.querySelector('form.studio-editor').requestSubmit()")
+    _, removed, made = page.edits(3)
+    assert removed == {"kind": "remove_gesture", "time": nod["time"], "name": "nod"}
+    assert made == {
+        "kind": "gesture", "time": nod["time"], "name": "wink", "size": 1.5, "seconds": 2, "down_deg": None,
+        "left_deg": -15,
+    }  # fmt: skip
 
 
 def test_lanes_are_muted_and_get_new_seeds(page):

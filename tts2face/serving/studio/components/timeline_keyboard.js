@@ -57,7 +57,7 @@ function current(state) {
 }
 
 export function same(a, b) {
-  return Boolean(a && b) && a.kind === b.kind && Math.abs(a.begin - b.begin) < 1e-6 && (a.index ?? a.number) === (b.index ?? b.number);
+  return Boolean(a && b) && a.kind === b.kind && Math.abs(a.begin - b.begin) < 1e-6 && (a.index ?? a.number ?? a.gesture?.name) === (b.index ?? b.number ?? b.gesture?.name);
 }
 
 function step(state, host, direction) {

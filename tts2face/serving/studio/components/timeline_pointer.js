@@ -53,7 +53,7 @@ export class PointerTools {
     const key = hitKey(row, this.state, x, y, (value) => this.valueY(row, value));
     if (key) return this.key(row, key);
     if (row.feature) return this.state.brush.tool === "select" ? this.resize(row, x) : this.paint(row, x, event);
-    if (row.id === "gestures") return this.gesture(row, x) ?? this.choose(row, x);
+    if (row.id === "gestures") return this.instant(row, x) ?? this.choose(row, x);
     return this.choose(row, x);
   }
 
@@ -213,7 +213,7 @@ export class PointerTools {
     };
   }
 
-  gesture(row, x) {
+  instant(row, x) {
     const { state } = this, gesture = state.model.gestures.find((one) => Math.abs(state.view.x(one.time) - x) <= 8);
     if (!gesture) return null;
     const first = gesture.time;
