@@ -81,6 +81,12 @@ def japanese_phrases(text: str) -> tuple[JapanesePhrase, ...]:
     """Accent phrases of a text in order; Chinese characters need the library that reads them."""
     if not has_kanji(text) and not has_reader():
         return tuple(_plain_phrases(text))
+    return _read_phrases(text)
+
+
+@functools.lru_cache(maxsize=256)
+def _read_phrases(text: str) -> tuple[JapanesePhrase, ...]:
+    """Accent phrases of a text by the library, which takes 1 ms a sentence and is asked for a text several times."""
     read = load_reader().run_frontend
     found, start = list[JapanesePhrase](), 0
     for chunk in split_chunks(text, MAX_CHARACTERS, "ja"):
