@@ -48,7 +48,6 @@ _NAMED_FRACTIONS = {
     "24/7": "twenty-four seven",
     "9/11": "nine eleven",
     "50/50": "fifty fifty",
-    "20/20": "twenty twenty",
 }
 _SCORED = re.compile(
     r"\b(?:scor|rat(?:e|ing)|grade|quiz|test|exam|review|mark|points?|got|gave|give|solid|perfect)", re.I
@@ -59,6 +58,7 @@ _PEOPLE_AFTER = re.compile(
     r" (?!miles|cups|inches|feet|pounds|ounces|\w*spoons|acres|lit|met|pints|quarts|yards|hours|seconds|times)"
     r"(?:people|men|women|children|[a-z]{3,}s)\b"
 )
+_VISION = re.compile(" (?:vision|hindsight|eyesight)")
 _EQUATION = re.compile(r"\s*[=+×÷*<>≤≥-]\s*[0-9a-z]")
 _PRESSURES = (range(60, 261), range(30, 161))  # mmHg, of the heart's beat and between two
 # Times behind a slash, by which something is counted.
@@ -210,6 +210,8 @@ def read_fraction(m: re.Match[str], _: str) -> str:
         is_one = not m["whole"] and int(top) <= int(bottom)
         name = "" if not unit else readings.unit_words("inch" if unit == "in" else unit, is_one=is_one)
         return f"{readings.ratio_words(top, bottom, m['whole'] or '')} {name}".strip()
+    if m["frac"] == "20/20" and _VISION.match(m.string, m.end()):
+        return "twenty twenty"
     if m["frac"] in _NAMED_FRACTIONS:
         return _NAMED_FRACTIONS[m["frac"]]
     relation = _relation(m, int(top), int(bottom))
@@ -331,7 +333,7 @@ def read_either(m: re.Match[str], _: str) -> str:
     unit = _RATES.get(m["other"], m["other"])
     if m["either"].endswith("s") and unit in _RATES.values():
         return f"{m['either']} per {unit}"
-    third = f" {m['third'][1:]}" if m["third"] else ""
+    third = (m["third"] or "").replace("/", " ")
     return f"{informal_word(m['either'])} {informal_word(m['other'])}{third}"
 
 

@@ -95,7 +95,7 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         (
             "either",
             "a",
-            r"(?<![/\w])(?!d[A-Za-z]/d)(?P<either>[^\W\d_]{2,30}|[A-Z])/(?P<other>[^\W\d_]{2,30}|[A-Z])(?P<third>/[^\W\d_]{2,30})?(?![\w/.-]\w|\w)",
+            r"(?<![/\w])(?!d[A-Za-z]/d)(?P<either>[^\W\d_]{2,30}|[A-Z])/(?P<other>[^\W\d_]{2,30}|[A-Z])(?P<third>/[^\W\d_]{2,30}|'s)?(?![\w/.-]\w|\w)",
             forms.read_either,
         ),
         (

@@ -50,7 +50,7 @@ def main() -> None:
     normalize("warm")
     for size in (10_000, 100_000, 1_000_000):
         _report("normalize", SENTENCE * (size // len(SENTENCE)), normalize)
-    for piece in ("....", "a.", "1,", "- ", "Dr "):
+    for piece in ("....", "a.", "1,", "- ", "Dr ", '5" ', "1 - ", "a/b ", "w-w-", "x_y@", "Ca2+", "|a|", "★"):
         for size in (100_000, 1_000_000):
             _report(f"normalize, {piece!r} over and over", piece * (size // len(piece)), normalize)
     for piece in HARD:
