@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from lexicon.errors import BackendError
 from lexicon.locales.arabic import arabic_number
 from lexicon.locales.tables import Locale, Row
 
@@ -177,18 +178,13 @@ def by_rule(locale: Locale, n: int, kind: str, grammar: Grammar = COUNTING) -> s
 
 @functools.lru_cache(maxsize=10_000)
 def _spelt(locale: Locale, n: int, kind: str, grammar: Grammar) -> str:
-    # unicode-rbnf takes 10 to 40 ms a language, and no English text needs it
-    from unicode_rbnf.engine import NoRuleForNumberError
-
     if locale.rows("numeral"):
         return arabic_number(locale, n, kind, grammar.gender == "f", bool(grammar.case))
-    ruleset = _ruleset(locale, kind, grammar)
+    engine = _engine(locale.setting("cldr", locale.language.partition("-")[0]))
+    from unicode_rbnf.engine import NoRuleForNumberError
+
     try:
-        said = (
-            _engine(locale.setting("cldr", locale.language.partition("-")[0]))
-            .format_number(n, ruleset_names=[ruleset])
-            .text
-        )
+        said = engine.format_number(n, ruleset_names=[_ruleset(locale, kind, grammar)]).text
     except NoRuleForNumberError:  # CLDR has no Russian ordinals of millions
         return digits(locale, str(n))
     for pattern, row in locale.rows("fix").items():
@@ -199,6 +195,9 @@ def _spelt(locale: Locale, n: int, kind: str, grammar: Grammar) -> str:
 
 @functools.cache
 def _engine(code: str) -> "RbnfEngine":
-    from unicode_rbnf import RbnfEngine
-
+    # it takes 10 to 40 ms a language, and no English text needs it
+    try:
+        from unicode_rbnf import RbnfEngine
+    except ImportError as missing:
+        raise BackendError("unicode_rbnf is missing; install it with `pip install tts2face`") from missing
     return RbnfEngine.for_language(code)

@@ -2,10 +2,13 @@
 
 import random
 import re
+import sys
 
 import pytest
 
+from lexicon.errors import BackendError
 from lexicon.g2p import languages
+from lexicon.locales import numbers
 from lexicon.locales.reading import read_forms
 from lexicon.normalize import spoken_form
 from lexicon.pronounce import pronounce
@@ -84,3 +87,17 @@ def test_only_words_are_left_of_any_text(language: str) -> None:
         said = spoken_form(text, language)
         assert not NEVER.search(said), (text, said)
         assert spoken_form(said, language) == said
+
+
+def test_the_package_of_numbers_is_named_where_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "unicode_rbnf", None)
+    numbers._engine.cache_clear()
+    numbers._spelt.cache_clear()
+    with pytest.raises(BackendError, match="unicode_rbnf is missing; install it with `pip install tts2face`"):
+        spoken_form("Es sind 5 km.", "de")
+
+
+@pytest.mark.parametrize("language", ["de", "fr-fr", "es", "it", "pt", "nl", "pl", "ru", "tr", "el", "fr-ch", "es-419"])
+def test_long_numbers_have_words(language: str) -> None:
+    for number in ("0", "1000", "21000", "1000000", "2000001", "123456789012345", "1234567890123456"):
+        assert not any(map(str.isdigit, spoken_form(f"{number}, {number}. ", language)))
