@@ -8,6 +8,7 @@ from lexicon.ipa import parse_ipa
 from lexicon.sequence import SILENCE
 from lexicon.spoken_words import pronounce_marked
 from lexicon.text_marks import parse_marks
+from tests.packages import needs
 from tts2face.sound.voice import SpokenWord
 from tts2face.sound.voice_pool import load_voice
 
@@ -27,13 +28,16 @@ TEXTS = {
     "hi": "कीमत ₹3.50 है और 20% छूट।",
     "ko": "가격은 3.5달러이고 20% 빨라졌다.",
     "vi": "Giảm 20% cho 1.500 người, -5 °C.",
-    "cmn": "价格是3.5元，他跑了100米。",
+    "cmn": "价格是3.5元，他跑了100米，还钱给熊。",
+    "ja": "3.5ドルの料理は、20%安い。",
     "ar": "السعر ٣٫٥ دولار و100 كم.",
 }
 
 
 @pytest.mark.parametrize("language", TEXTS)
 def test_words_and_phones_are_those_that_are_printed(language: str) -> None:
+    if language == "ja":
+        needs("pyopenjtalk")
     printed = pronounce_marked(parse_marks(TEXTS[language], language), language)
     speech = load_voice("espeak", language).speak(TEXTS[language])
     assert [word.text for word in speech.words] == [word.text for word in printed.words]
