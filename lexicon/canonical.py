@@ -119,7 +119,7 @@ def canonical_text(text: str, *, keep_marks: bool = False) -> str:
     Loose combining marks are removed unless `keep_marks` is set, for scripts that are written with them, in the order
     of `signs_before_vowels`.
     """
-    text = _ABOUT.sub("about ", _AREA_CODE.sub(r"\1-", text))
+    text = _ANGLED.sub(r" \1 ", _ABOUT.sub("about ", _AREA_CODE.sub(r"\1-", text)))
     text = text.translate(_translation_table()) if text.isascii() else _canonical_letters(text, keep_marks=keep_marks)
     for pattern, replacement in _STEPS:
         text = pattern.sub(replacement, text)
@@ -129,7 +129,6 @@ def canonical_text(text: str, *, keep_marks: bool = False) -> str:
 def _canonical_letters(text: str, *, keep_marks: bool) -> str:
     """A text whose characters are canonical one by one: NFKC, and the table; of ASCII only the table is needed."""
     text = _SUPERSCRIPT.sub(lambda run: "^" + unicodedata.normalize("NFKC", run.group()).replace("−", "-"), text)
-    text = _ANGLED.sub(r" \1 ", text)
     text = _VULGAR.sub(r" \1", text).translate(_translation_table())
     # translated before and after: NFKC itself makes characters of the table, and would lose superscripts
     text = unicodedata.normalize("NFKC", text).translate(_translation_table())

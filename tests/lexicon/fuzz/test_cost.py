@@ -46,7 +46,7 @@ def subtitle(text: str) -> None:
 FUNCTIONS: tuple[tuple[Callable[[str], object], int, tuple[str, ...]], ...] = (
     (lambda text: [*split_chunks(text, 300)], 12_000, UNITS),
     (lambda text: split_phrase(text, 90), 12_000, UNITS),
-    (in_parts, 12_000, UNITS),
+    (in_parts, 4_000, UNITS),
     (subtitle, 12_000, UNITS),
     (parse_marks, 12_000, UNITS),
     (parse_ipa, 12_000, UNITS),
