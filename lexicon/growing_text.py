@@ -35,6 +35,7 @@ _SPACES = re.compile(r"\s{2,}")
 _STYLE_END = re.compile(r"\[(?P<closing>/?)style\b[^\[\]]*\]")
 _ELEMENT_END = re.compile(r"<(?P<closing>/?)[A-Za-z][^<>]*(?<!/)>|<[^<>]*\Z")
 _HALF = re.compile("[\ud800-\udfff]")  # of a character in two parts, as JavaScript cuts them
+_LONE = re.compile("[\ud800-\udbff](?!\\Z)|[\udc00-\udfff]")  # whose other half cannot follow
 MAX_INDENT = 4
 SEARCHED_CHARACTERS = 600  # of text without a cut that are read again with each part; more only as it grows
 LEAST_GROWTH = 1.25  # as a factor
@@ -166,7 +167,9 @@ class GrowingText:
 def _joined(last: str, part: str) -> str:
     """A part with the pair of the half of a character that arrived before it; other halves are left out at the end."""
     joined = (last if _HALF.match(last) else "") + part
-    return joined.encode("utf-16", "surrogatepass").decode("utf-16", "surrogatepass") if _HALF.search(joined) else part
+    if not _HALF.search(joined):
+        return part
+    return _LONE.sub("", joined.encode("utf-16", "surrogatepass").decode("utf-16", "surrogatepass"))
 
 
 def _open_end(text: str, patterns: Sequence["re.Pattern[str]"]) -> int:

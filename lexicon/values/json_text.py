@@ -24,8 +24,8 @@ def read_json(path: Path) -> Any:
     return parse_json(read_text(path, LARGEST_JSON_BYTES), str(path))
 
 
-def parse_json(content: str, name: str) -> Any:
-    """Content of a JSON text.
+def parse_json(content: str, name: str, *, has_halves: bool = False) -> Any:
+    """Content of a JSON text; with `has_halves` one that may contain unpaired surrogates.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def parse_json(content: str, name: str) -> Any:
         raise DataError(f"{name}, line {broken.lineno}: not JSON ({broken.msg}); correct it there") from broken
     except InputError as wrong:
         raise DataError(f"{name}: {wrong}") from wrong
-    if _SURROGATE.search(content):
+    if not has_halves and _SURROGATE.search(content):
         _check_characters(parsed, name)
     return parsed
 

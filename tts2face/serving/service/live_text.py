@@ -45,7 +45,10 @@ def parse_message(text: str) -> Any:
             413, "too_large", f"a message has {len(text)} characters; send at most {MAX_MESSAGE_CHARACTERS}, in parts"
         )
     try:
-        return parse_json(text, "the message")
+        content = parse_json(text, "the message", has_halves=True)
+        # a text may end within a character, whose other half is in the next one
+        is_text = isinstance(content, dict) and content.keys() == {"type", "text"} and content["type"] == "text"
+        return content if is_text and isinstance(content["text"], str) else parse_json(text, "the message")
     except DataError:
         return None
 
