@@ -15,8 +15,7 @@ def read_measure(place: Place) -> str:
     said = _magnified(place, row, grammar.case) if place.match["magnitude"] else ""
     said = said or count(locale, place.amount("amount"), row, grammar.case)
     if place.match["per"]:
-        per = locale.rows("unit")[place.match["per"]]
-        said = f"{said} {locale.setting('per')} {per.forms[0]}"
+        said = f"{said} {_per_unit(locale, place.match['per'])}"
     return said
 
 
@@ -45,7 +44,14 @@ def read_money(place: Place) -> str:
     case = place.grammar("cardinal").case
     said = _magnified(place, row, case) if place.match["magnitude"] else money(locale, amount, row, case)
     per = place.match.groupdict().get("per")
-    return f"{said} {locale.setting('per')} {locale.rows('unit')[per].forms[0]}" if per else said
+    return f"{said} {_per_unit(locale, per)}" if per else said
+
+
+def _per_unit(locale: Locale, written: str) -> str:
+    """One unit behind the word for per; forms that hold their number (=) have the noun of hundreds."""
+    row = locale.rows("unit")[written]
+    noun = noun_form(locale, row, Amount("", "100")) if row.forms[0].startswith("=") else row.forms[0]
+    return f"{locale.setting('per')} {noun}"
 
 
 def money(locale: Locale, amount: Amount, row: Row, case: str = "") -> str:

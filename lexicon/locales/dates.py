@@ -11,12 +11,20 @@ _DAYS, _MONTHS = 31, 12
 
 
 def read_numeric_date(place: Place) -> str | None:
-    """3/5/2024, 3.5.2024 and 2024-05-03 as a day of a month; None for other numbers."""
+    """3/5/2024, 3.5.2024 and 2024-05-03 as a day of a month, 12/25/2024 by its day; None for other numbers."""
     match, locale = place.match, place.locale
     day, month, written = int(match["day"]), int(match["month"]), match["year"]
+    if _MONTHS < month <= _DAYS and match["s"] == "/":
+        day, month = month, day
     if not (1 <= day <= _DAYS and 1 <= month <= _MONTHS):
         return None
-    return _date(place, day, locale.rows("month")[str(month)].spoken, written)
+    return _date(place, day, _month(locale, month), written)
+
+
+def _month(locale: Locale, number: int) -> str:
+    """Name of a month, or its number where months have numbers."""
+    row = locale.rows("month").get(str(number))
+    return cardinal(locale, number) if row is None else row.spoken
 
 
 def read_short_date(place: Place) -> str | None:
@@ -28,7 +36,7 @@ def read_short_date(place: Place) -> str | None:
     day, month = int(place.match["day"]), int(place.match["month"])
     if not (1 <= day <= _DAYS and 1 <= month <= _MONTHS):
         return None
-    return _date(place, day, place.locale.rows("month")[str(month)].spoken, "")
+    return _date(place, day, _month(place.locale, month), "")
 
 
 def read_named_date(place: Place) -> str | None:

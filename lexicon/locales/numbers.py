@@ -77,6 +77,8 @@ def year(locale: Locale, n: int, grammar: Grammar = COUNTING) -> str:
     if hundreds and 1100 <= n < 2000:  # उन्नीस सौ अट्ठानवे
         rest = [cardinal(locale, n % 100)] if n % 100 else []
         return " ".join([cardinal(locale, n // 100), hundreds, *rest])
+    if locale.setting("year") == "digits":  # 二零二四
+        return digits(locale, str(n))
     if not locale.setting("year"):
         return cardinal(locale, n)
     return ordinal(locale, n, grammar) if locale.setting("year") == "ordinal" else _spelt(locale, n, "year", grammar)

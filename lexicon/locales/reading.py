@@ -2,6 +2,7 @@
 
 import re
 import unicodedata
+from collections.abc import Sequence
 
 from lexicon.locales.harmony import with_tail
 from lexicon.locales.place import Place
@@ -17,16 +18,34 @@ _LAST_WORD = re.compile(r"[^\W\d_]+\Z")
 
 
 class _PlainCharacters(dict[int, str]):
-    """Digits of all writing systems as ASCII ones, and one kind of space, minus and apostrophe."""
+    """Digits of all writing systems, circles and indices as ASCII ones, and one kind of space, minus and apostrophe."""
 
     def __missing__(self, code: int) -> str:
         letter = chr(code)
         is_digit = code > 127 and unicodedata.category(letter) == "Nd"
-        self[code] = plain = str(unicodedata.digit(letter)) if is_digit else letter
+        is_digit = is_digit or unicodedata.decomposition(letter).startswith(("<circle>", "<sub>"))  # ①, H₂O
+        digit = unicodedata.digit(letter, None) if is_digit else None
+        self[code] = plain = letter if digit is None else str(digit)
         return plain
 
 
 _CHARACTERS = _PlainCharacters(_PLAIN)
+_JOINED_LETTERS = re.compile(r"[\u2103\u2109\u2160-\u217f\u3371-\u337a\u3380-\u33df]")  # ℃ Ⅳ ㎏
+_POWERS = str.maketrans("23", "²³")
+
+
+def _plain_text(text: str) -> tuple[str, Sequence[int]]:
+    """A text in plain characters, and for each of them the index of the written one, with that of the end."""
+    plain = text.translate(_CHARACTERS)
+    if not _JOINED_LETTERS.search(plain):
+        return plain, range(len(text) + 1)
+    letters: list[str] = []
+    places: list[int] = []
+    for at, letter in enumerate(plain):
+        said = unicodedata.normalize("NFKC", letter).translate(_POWERS) if _JOINED_LETTERS.match(letter) else letter
+        letters.append(said)
+        places += [at] * len(said)
+    return "".join(letters), (*places, len(text))
 
 
 def has_table(language: str) -> bool:
@@ -42,7 +61,7 @@ def read_forms(text: str, language: str) -> list[WrittenForm]:
     locale = find_locale(language)
     if locale is None:
         return _with_minus(text, language)
-    plain = text.translate(_CHARACTERS)
+    plain, places = _plain_text(text)
     found: list[WrittenForm] = []
     at = done = 0
     said = ""
@@ -53,18 +72,26 @@ def read_forms(text: str, language: str) -> list[WrittenForm]:
             at, said = place.end(), ""
             continue
         if done < match.start():
-            found.append(WrittenForm(text[done : match.start()], plain[done : match.start()]))
+            found.append(WrittenForm(text[places[done] : places[match.start()]], plain[done : match.start()]))
         at = done = match.end()
-        is_joined = found and found[-1].spoken[-1:].isalnum() and spoken[:1].isalnum()
+        is_joined = found and _ends_in_letter(found[-1].spoken) and spoken[:1].isalnum()
         is_joined = is_joined and _last_word(found[-1].spoken) not in locale.words("prefixes")
         is_followed = (
-            plain[at : at + 1].isalnum() and spoken[-1:].isalnum() and not _is_attached(locale, plain, at, spoken)
+            plain[at : at + 1].isalnum() and _ends_in_letter(spoken) and not _is_attached(locale, plain, at, spoken)
         )
-        found.append(WrittenForm(text[match.start() : at], join * bool(is_joined) + spoken + join * is_followed))
+        found.append(
+            WrittenForm(text[places[match.start()] : places[at]], join * bool(is_joined) + spoken + join * is_followed)
+        )
         said = _last_word(spoken.rstrip())
-    if done < len(text):
-        found.append(WrittenForm(text[done:], plain[done:]))
+    if done < len(plain):
+        found.append(WrittenForm(text[places[done] :], plain[done:]))
     return found
+
+
+def _ends_in_letter(spoken: str) -> bool:
+    """Whether words end in a letter, perhaps with the sign of a vowel."""
+    last = spoken[-1:]
+    return bool(last) and (last.isalnum() or unicodedata.category(last)[0] == "M")
 
 
 def _is_attached(locale: Locale, text: str, at: int, spoken: str) -> bool:

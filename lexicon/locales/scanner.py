@@ -30,6 +30,7 @@ _ADDRESS = (
     rf"|{_LABEL}(?:\.{_LABEL}){{0,3}}\.{_TLD}(?![A-Za-z0-9_])(?!\.\w)(?:/[^\s,;!]{{0,400}}[^\s,;!.:?)])?"
 )
 _ROMAN = rf"(?P<roman>[IVXLCDM]{{1,15}})(?P<suffix>{{suffix}}\.?)?(?!{LETTER}|['’-]{LETTER}|[0-9])"
+_POWER = r"(?<=[\w)])(?:\^(?P<digits>-?[0-9]{1,4})(?!\w)|(?P<raised>⁻?[⁰¹²³⁴⁵⁶⁷⁸⁹]{1,4})(?![⁰¹²³⁴⁵⁶⁷⁸⁹⁻]))"
 _PART = re.compile("‹([a-z ]+)›")
 
 
@@ -85,7 +86,7 @@ _FRACTION = rf"(?: ?(?P<vulgar>{_VULGAR})| (?P<top>[0-9]{{1,3}})/(?P<bottom>[0-9
 _ALONE = rf"(?P<sign>{_VULGAR})|(?P<first>[0-9]{{1,3}})/(?P<second>[0-9]{{1,3}})(?![\w/])"
 # Names in angle quotes are parts of `_parts`; a form with a part that the language lacks is left out.
 _NUMBER_FORMS: tuple[tuple[str, Reader], ...] = (
-    (r"(?P<year>[0-9]{4})-(?P<month>[0-9]{2})-(?P<day>[0-9]{2})(?![\w-])", dates.read_numeric_date),
+    (r"(?P<year>[0-9]{4})(?P<s>-)(?P<month>[0-9]{2})-(?P<day>[0-9]{2})(?![\w-])", dates.read_numeric_date),
     (
         r"(?P<day>[0-9]{1,2})(?P<s>[/.-]) ?(?P<month>[0-9]{1,2})(?P=s) ?(?P<year>[0-9]{4}|[0-9]{2})(?![\w/]|[.,][0-9])"
         r"‹year word›‹tail›",
@@ -137,7 +138,7 @@ _NUMBER_FORMS: tuple[tuple[str, Reader], ...] = (
     (r"(?P<digits>[0-9]{1,4})\.(?= ‹letter›)", ordinals.read_dotted_ordinal),
     (r"(?![0-9]{1,3}(?:\.[0-9]{3})+(?![0-9.]))[0-9]{1,4}(?:\.[0-9]{1,4}){2,6}(?!\w)", digit_groups.read_version),
     (r"[0-9]{1,4}‹other decimal›(?:[0-9]{1,2}|[0-9]{4})(?![0-9]|\.[0-9])", digit_groups.read_version),
-    (r"(?P<first>[0-9]{1,3}):(?P<second>[0-9]{1,3})(?![0-9:])", digit_groups.read_score),
+    (r"(?P<first>[0-9]{1,3}):(?P<second>[0-9]{1,7})(?![0-9:])", digit_groups.read_score),
     (r"‹signed›‹tail›", counted.read_number),
 )
 
@@ -276,8 +277,14 @@ def _forms_by_sign(locale: Locale) -> dict[str, tuple[Form, ...]]:
     for first, forms in _grouped(locale.rows("abbreviation")).items():
         if not first.isalpha():
             found.setdefault(first, []).append(Form(re.compile(_any_of(forms)), words.read_abbreviation))
-    for dash in "-–":
-        found.setdefault(dash, []).append(Form(re.compile(rf"{dash}(?=[0-9])"), words.read_dash))
-    for first, forms in _grouped(locale.rows("sign")).items():
-        found.setdefault(first, []).append(Form(re.compile(_any_of(forms)), words.read_sign))
+    for first, form in _forms_of_signs(locale):
+        found.setdefault(first, []).append(form)
     return {first: tuple(forms) for first, forms in found.items()}
+
+
+def _forms_of_signs(locale: Locale) -> Iterator[tuple[str, Form]]:
+    """Powers, dashes and signs with words of their own, with the character at which each is tried."""
+    yield from ((first, Form(re.compile(_POWER), words.read_power)) for first in "^⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+    yield from ((dash, Form(re.compile(rf"{dash}(?=[0-9])"), words.read_dash)) for dash in "-–")
+    for first, written in _grouped(locale.rows("sign")).items():
+        yield first, Form(re.compile(_any_of(written)), words.read_sign)

@@ -1,10 +1,11 @@
 """Readers of abbreviations, words of other languages, addresses and signs."""
 
 import re
+import unicodedata
 from collections.abc import Collection
 
 from lexicon.locales.nouns import noun_form
-from lexicon.locales.numbers import Amount, digits, whole
+from lexicon.locales.numbers import Amount, digits, number, whole
 from lexicon.locales.place import Place
 from lexicon.locales.tables import Row
 from lexicon.sentence_ends import ends_sentence
@@ -90,6 +91,18 @@ def read_sign(place: Place) -> str | None:
     if "unit" in row.details and not _stands_between_units(place):
         return " "
     return row.spoken
+
+
+def read_power(place: Place) -> str | None:
+    """Words of a power (10^6, 10⁻³); None for a square or cube, which have words of their own."""
+    locale, raised = place.locale, place.match["raised"] or ""
+    written = place.match["digits"] or unicodedata.normalize("NFKC", raised).replace("\u2212", "-")
+    own = locale.rows("sign").get("²³"[int(written) - 2] if written in {"2", "3"} else "")
+    if own is not None:
+        return own.spoken
+    sign = "-" if written.startswith("-") else ""
+    exponent = number(locale, Amount(sign, written.removeprefix("-")))
+    return locale.setting("power").format(exponent)
 
 
 def _is_term(sign: str) -> bool:

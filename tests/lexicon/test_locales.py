@@ -9,13 +9,16 @@ import pytest
 from lexicon.errors import BackendError
 from lexicon.g2p import languages
 from lexicon.locales import numbers
-from lexicon.locales.reading import read_forms
+from lexicon.locales.reading import read, read_forms
+from lexicon.locales.tables import find_locale
 from lexicon.normalize import spoken_form
 from lexicon.pronounce import pronounce
 from lexicon.spoken_words import pronounce_marked
 from lexicon.text_marks import parse_marks
 from lexicon.vowels import without_vowels
 from lexicon.written_forms import read_table
+
+TABLES = ["ar", "cmn", "de", "el", "es", "fr-fr", "hi", "it", "ja", "ko", "nl", "pl", "pt-br", "ru", "tr", "vi"]
 
 
 @pytest.mark.parametrize(
@@ -101,3 +104,48 @@ def test_the_package_of_numbers_is_named_where_it_is_missing(monkeypatch: pytest
 def test_long_numbers_have_words(language: str) -> None:
     for number in ("0", "1000", "21000", "1000000", "2000001", "123456789012345", "1234567890123456"):
         assert not any(map(str.isdigit, spoken_form(f"{number}, {number}. ", language)))
+
+
+@pytest.mark.parametrize("language", TABLES)
+def test_every_table_has_the_signs_and_powers_of_texts(language: str) -> None:
+    locale = find_locale(language)
+    assert locale is not None
+    missing = [sign for sign in "&+=*×÷<>≤≥≈≠√²³%§°@#∞π№" if sign not in locale.rows("sign")]
+    assert not missing
+    assert "{}" in locale.setting("power")
+    for text in ("7-7-1886", "12/25/2024", "2024-05-03", "3/5/24", "5㎏", "№5", "①", "CO₂", "x⁻³", "10^6", "≥5", "∞"):
+        assert not re.search(r"[\d㎏№①₂³⁻≥∞^]", read(text, language))
+        assert pronounce(text, language).words
+
+
+@pytest.mark.parametrize(
+    ("language", "text", "spoken"),
+    [
+        ("cmn", "31.2.2024", "二零二四年二月三十一日"),
+        ("ja", "29/2/1998", "千九百九十八年二月二十九日"),
+        ("ko", "7-6-1886", "천팔백팔십육년 유월 칠일"),
+        ("de", "12/25/2024", "fünfundzwanzigster Dezember zweitausendvierundzwanzig"),
+        ("vi", "2024-05-03", "ba tháng năm năm hai nghìn không trăm hai mươi tư"),
+        ("de", "10㎡", "zehn Quadratmeter"),
+        ("fr-fr", "20℃", "vingt degrés Celsius"),
+        ("es", "5㎏/㎡", "cinco kilogramos por metro cuadrado"),
+        ("de", "Heinrich Ⅷ regierte", "Heinrich der achte regierte"),
+        ("fr-fr", "CO₂", "CO deux"),
+        ("cmn", "10⁻³", "十的负三次方"),
+        ("it", "10^6", "dieci elevato a sei"),
+        ("ru", "2^3", "два в кубе"),
+        ("de", "5*3", "fünf mal drei"),
+        ("de", "im Maßstab 1:25000", "im Maßstab eins zu fünfundzwanzigtausend"),
+        ("hi", "3≠4", "तीन बराबर नहीं चार"),
+        ("ar", "5 kg/m²", "خمسة كيلوغرامات في متر مربع"),
+    ],
+)
+def test_signs_dates_and_joined_letters(language: str, text: str, spoken: str) -> None:
+    assert without_vowels(read(text, language), language) == spoken
+
+
+def test_written_forms_of_joined_letters_are_known() -> None:
+    text = "Es sind 5㎏ auf 10㎡, Ⅳ. Teil."
+    forms = read_forms(text, "de")
+    assert "".join(form.source for form in forms) == text
+    assert [word.source for word in pronounce(text, "de").words][2:6] == ["5㎏", "5㎏", "auf", "10㎡"]
