@@ -11,7 +11,8 @@ from lexicon.locales.tables import Locale, Row
 
 def read_divided(place: Place) -> str | None:
     """Whole number and a fraction with the noun between them: deux heures et demie; None where it is behind."""
-    locale, integer, noun = place.locale, place.match["integer"], place.match["noun"]
+    locale = place.locale
+    integer, noun = place.match["integer"], place.match["noun"]
     row = _row(locale, integer, *_parts(place))
     gender = gender_of(locale, noun)
     if row is None or "behind" not in row.details or not noun[0].islower() or noun in locale.rows("unit"):

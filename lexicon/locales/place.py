@@ -10,7 +10,7 @@ from lexicon.locales.tables import Locale
 
 _LAST_WORD = re.compile(r"([^\W\d_]+)[.'’]?\s?[(\"«„“]?\Z")
 _NEXT_WORD = re.compile(r"\s?([^\W\d_]+)")
-_CONTEXT = 40  # characters around a form that are looked at
+_CONTEXT = 40  # characters around a form that its readers search
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,6 @@
 Columns are kind, written form, spoken form and details. Several written forms of one row are separated by ``|``, as
 are the forms of a noun by the plural categories of the language (setting ``plural``). Details are ``name=value``
 pairs with semicolons between them, or words.
-
 ============ ====================================================================================================
 setting      signs and templates of the language, by the names that `lexicon.locales` reads
 rule         rule set of CLDR by kind, gender and case (``cardinal f genitive``)
