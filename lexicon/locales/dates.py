@@ -13,12 +13,12 @@ _DAYS, _MONTHS = 31, 12
 def read_numeric_date(place: Place) -> str | None:
     """3/5/2024, 3.5.2024 and 2024-05-03 as a day of a month, 12/25/2024 by its day; None for other numbers."""
     match, locale = place.match, place.locale
-    day, month, written = int(match["day"]), int(match["month"]), match["year"]
+    day, month = int(match["day"]), int(match["month"])
     if _MONTHS < month <= _DAYS and match["s"] == "/":
         day, month = month, day
     if not (1 <= day <= _DAYS and 1 <= month <= _MONTHS):
         return None
-    return _date(place, day, _month(locale, month), written)
+    return _date(place, day, _month(locale, month), match["year"])
 
 
 def _month(locale: Locale, number: int) -> str:
