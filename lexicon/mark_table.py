@@ -16,8 +16,10 @@ word       what is said where an emoji stands for a word in a sentence (I ❤️
 """
 
 import functools
+import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
@@ -25,12 +27,21 @@ from types import MappingProxyType
 from lexicon.errors import DataError, InputError
 from lexicon.gesture_marks import parse_gesture
 from lexicon.marked_text import MAX_PAUSE_S, GestureMark
-from lexicon.values import tables
-from lexicon.values.files import LARGEST_TEXT_BYTES
+from lexicon.values.files import LARGEST_TEXT_BYTES, read_text
 
 COLUMNS = ("mark", "kind", "style", "gesture", "strength", "seconds", "word")
 KINDS = ("emoji", "emoticon", "tag", "action", "stage")
 MAX_MARK_CHARACTERS = 40
+_SAID = frozenset(("emoji", "emoticon"))  # kinds of marks that may stand for a word
+_WORD = r"[^\W\d_]+(?:['’-][^\W\d_]+)*"
+# How a mark of each kind is spelled; others are never found in a text.
+_SPELLINGS = MappingProxyType({
+    "emoji": (re.compile(r"(?=.*[^\x00-\x7f])[^A-Za-z]+"), "an emoji"),
+    "emoticon": (re.compile(r"\S.*\S|[^\x00-\x7f]"), "two or more characters"),
+    "tag": (re.compile(_WORD), "a single word of letters"),
+    "action": (re.compile(rf"{_WORD}(?: {_WORD})*"), "a verb, perhaps with words behind it"),
+    "stage": (re.compile(rf"{_WORD}(?: {_WORD})*"), "a verb, perhaps with words behind it"),
+})  # fmt: skip
 _GLYPH_CHOICES = {ord("\ufe0e"): None, ord("\ufe0f"): None}
 SKIN_TONES = MappingProxyType(dict.fromkeys(range(0x1F3FB, 0x1F400), ""))
 
@@ -49,10 +60,11 @@ class TextMark:
 
 @dataclass(frozen=True, slots=True)
 class MarkTable:
-    """Marks by kind and spelling; actions and stage directions by the verb's forms."""
+    """Marks by kind and spelling; actions and stage directions by the verb's forms; styles of a user's own rows."""
 
     marks: Mapping[str, Mapping[str, TextMark]]
     verbs: Mapping[str, tuple[TextMark, ...]] = field(default_factory=dict)
+    own_styles: frozenset[str] = frozenset()
 
     def emoji(self, written: str) -> TextMark | None:
         """The mark of an emoji, with or without its skin tones; of joined ones that of the first that is known."""
@@ -91,8 +103,13 @@ def shipped_marks() -> MarkTable:
 
 @functools.lru_cache(maxsize=16)
 def _marks_of(path: Path, _: tuple[int, int]) -> MarkTable:
-    rows = tables.read_table(path, LARGEST_TEXT_BYTES, delimiters="\t")
-    return _table([*_shipped_rows(), *_checked_rows(rows, str(path))])
+    try:
+        lines = read_text(path, LARGEST_TEXT_BYTES).splitlines()
+    except OSError as refused:
+        raise DataError(f"{path} cannot be read ({refused.strerror}); check the file") from refused
+    rows = [line.split("\t") for line in lines]
+    own = _checked_rows(rows, str(path))
+    return replace(_table([*_shipped_rows(), *own]), own_styles=frozenset(row.style for row in own if row.style))
 
 
 def read_marks_table(path: Path | None) -> MarkTable:
@@ -125,12 +142,23 @@ def _checked_rows(rows: Sequence[Sequence[str]], source: str) -> list[TextMark]:
             f"{source}: the first line must name columns of {', '.join(COLUMNS)}, with mark and kind among them, not "
             f"{', '.join(heading)[:80] or 'nothing'}; correct it, with tabs between the columns"
         )
-    found = []
+    if len({*heading}) < len(heading):
+        raise DataError(f"{source}: the first line names a column twice; remove one of them")
+    found: dict[tuple[str, str], TextMark] = {}
+    lines: dict[tuple[str, str], int] = {}
     for line, row in enumerate(rows[1:], 2):
+        place = f"{source}, line {line}"
+        if any(map(str.strip, row[len(heading) :])):
+            raise DataError(f"{place}: {len(row)} cells stand below {len(heading)} columns; correct the tabs")
         cells = {name: cell.strip() for name, cell in zip(heading, row, strict=False)}
-        if any(cells.values()):
-            found.append(_mark(cells, f"{source}, line {line}"))
-    return found
+        if not any(cells.values()):
+            continue
+        mark = _mark(cells, place)
+        key = mark.kind, mark.mark
+        if key in found:
+            raise DataError(f"{place}: {cells['mark']!r} stands in line {lines[key]}, too; remove one of them")
+        found[key], lines[key] = mark, line
+    return [*found.values()]
 
 
 def _mark(cells: Mapping[str, str], place: str) -> TextMark:
@@ -139,8 +167,12 @@ def _mark(cells: Mapping[str, str], place: str) -> TextMark:
         raise DataError(f"{place}: a mark has 1 to {MAX_MARK_CHARACTERS} characters, not {mark[:20]!r}; correct it")
     if kind not in KINDS:
         raise DataError(f"{place}: there is no kind {kind[:40]!r} of marks; choose {', '.join(KINDS)}")
+    pattern, what = _SPELLINGS[kind]
+    if not pattern.fullmatch(mark):
+        raise DataError(f"{place}: a mark of kind {kind} is {what}, not {mark[:20]!r}; correct it, or the kind")
     gesture, seconds = cells.get("gesture", ""), cells.get("seconds", "")
-    pause_s = 0.0
+    _check_columns(cells, kind, place)
+    pause_s = _parse_number(seconds, "seconds", place)
     if gesture:
         written = f"{gesture} {cells.get('strength', '')} {seconds + 's' if seconds else ''}"
         try:
@@ -151,11 +183,30 @@ def _mark(cells: Mapping[str, str], place: str) -> TextMark:
             raise DataError(f"{place}: cannot read the gesture {written.strip()[:40]!r}; write one as wink left")
     else:
         found = None
-        pause_s = tables.parse_cell(seconds, Path(place), 0, "seconds") if seconds else 0.0
         if not 0.0 <= pause_s <= MAX_PAUSE_S:
             raise DataError(f"{place}: a pause must lie between 0 and {MAX_PAUSE_S:g} s, not {seconds} s; correct it")
     key = mark.translate(_GLYPH_CHOICES) if kind == "emoji" else mark if kind == "emoticon" else mark.casefold()
-    return TextMark(key, kind, cells.get("style", ""), found, pause_s, cells.get("word", ""))
+    return TextMark(key, kind, cells.get("style", ""), found, 0.0 if gesture else pause_s, cells.get("word", ""))
+
+
+def _check_columns(cells: Mapping[str, str], kind: str, place: str) -> None:
+    """Reject values that have no effect in a row, and a strength that is no number."""
+    _parse_number(cells.get("strength", ""), "strength", place)
+    if cells.get("strength") and not cells.get("gesture"):
+        raise DataError(f"{place}: a strength has no effect without a gesture; name one, or remove the strength")
+    if cells.get("word") and kind not in _SAID:
+        raise DataError(f"{place}: a word is said for emoji and emoticons only; remove it, or correct the kind")
+
+
+def _parse_number(written: str, name: str, place: str) -> float:
+    """A number of 0 or more, or 0 for an empty cell."""
+    try:
+        number = float(written or 0)
+    except ValueError:
+        number = math.nan
+    if not 0 <= number < math.inf:
+        raise DataError(f"{place}: {name} must be a number of 0 or more, not {written[:20]!r}; correct it")
+    return number
 
 
 def _table(rows: Iterable[TextMark]) -> MarkTable:

@@ -66,7 +66,9 @@ def test_the_service_passes_a_text_on_as_it_is(tmp_path: Path) -> None:
             }
 
 
-def test_a_table_of_the_user_is_read_at_each_door(tones: World, tmp_path: Path) -> None:
+def test_a_table_of_the_user_is_read_at_each_door(
+    tones: World, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "marks.tsv"
     path.write_text("mark\tkind\tgesture\nboing\ttag\tshake\n")
     marks = prepare(Request(text="[boing] Bob may move.", text_marks=path)).text.marks
@@ -76,6 +78,10 @@ def test_a_table_of_the_user_is_read_at_each_door(tones: World, tmp_path: Path) 
     flags = ["--export", str(tmp_path / "a.track.json"), "--fps", "5", *tones.flags]
     assert run(["[boing] Bob may move.", "--text-marks", str(path), *flags]) == 0
     assert run(["Bob may move.", "--text-marks", str(tmp_path / "none.tsv"), *flags]) == 3
+    path.write_text("mark\tkind\tstyle\nboing\ttag\tpurple\n")
+    capsys.readouterr()
+    assert run(["[boing] Bob may move.", "--text-marks", str(path), *flags]) == 2
+    assert f"{path}: there is no style 'purple' in the palette; it has" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("text", ["😀", "*nods*", "...", ":D", "```\nx\n```"])

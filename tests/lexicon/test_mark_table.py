@@ -39,6 +39,17 @@ def test_a_user_s_rows_precede_those_of_the_package(tmp_path: Path) -> None:
         (f"{HEADING}\n🎉\temoji\t\tjump\n", "line 2: cannot read the gesture 'jump'; write one as wink left"),
         (f"{HEADING}\n🎉\temoji\t\tnod\t9\n", "line 2: the size of the gesture nod must lie between 0.1 and 2, not 9"),
         (f"{HEADING}\nhm\ttag\t\t\t\t60\n", "line 2: a pause must lie between 0 and 10 s, not 60"),
+        ("mark\tkind\tkind\n🎉\temoji\ttag\n", "the first line names a column twice; remove one of them"),
+        ("mark\tkind\nhooray\ttag\tsad\n", "line 2: 3 cells stand below 2 columns; correct the tabs"),
+        (f"{HEADING}\nhooray\ttag\n\nHooray\ttag\n", "line 4: 'Hooray' stands in line 2, too; remove one of them"),
+        (f"{HEADING}\nfox\temoji\n", "line 2: a mark of kind emoji is an emoji, not 'fox'; correct it, or the kind"),
+        (f"{HEADING}\n(\temoticon\n", "kind emoticon is two or more characters, not '\\('"),
+        (f"{HEADING}\nwell done\ttag\n", "kind tag is a single word of letters, not 'well done'"),
+        (f"{HEADING}\n2x\taction\n", "kind action is a verb, perhaps with words behind it, not '2x'"),
+        (f"{HEADING}\n🎉\temoji\t\tnod\tbig\n", "line 2: strength must be a number of 0 or more, not 'big'"),
+        (f"{HEADING}\n🎉\temoji\t\tnod\t\tlong\n", "line 2: seconds must be a number of 0 or more, not 'long'"),
+        (f"{HEADING}\n🎉\temoji\thappy\t\t0.5\n", "line 2: a strength has no effect without a gesture; name one"),
+        (f"{HEADING}\nhooray\ttag\t\t\t\t\tyes\n", "line 2: a word is said for emoji and emoticons only"),
     ],
 )
 def test_a_wrong_table_is_refused(content: str, reason: str, tmp_path: Path) -> None:

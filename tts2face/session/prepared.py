@@ -313,14 +313,26 @@ def marked_styles(text: MarkedText) -> tuple[str, ...]:
 def unknown_styles(text: MarkedText, names: Sequence[str]) -> tuple[str, ...]:
     """Styles in the marks of a text that a palette with these names lacks, and that stand for none of it."""
     used = dict.fromkeys(name for run in text.runs for name in run.styles)
-    return tuple(
-        name for name in used if not all(style in names or nearest_style(style) for style in parse_style(name).values())
-    )
+    return tuple(name for name in used if not _has_style(names, name))
+
+
+def _has_style(names: Sequence[str], written: str) -> bool:
+    """Whether each style that is written is of a palette with these names, or near one of it."""
+    return all(style in names or nearest_style(style) for style in parse_style(written).values())
 
 
 def with_styles_of(prepared: PreparedRequest, names: Sequence[str]) -> PreparedRequest:
-    """A request whose marks name styles of a palette, and not those of a speech service that are none of it."""
-    text = prepared.text
+    """A request whose marks name styles of a palette, and not those of a speech service that are none of it.
+
+    Raises
+    ------
+    InputError
+        The user's table of marks names a style that the palette lacks.
+    """
+    text, path = prepared.text, prepared.request.text_marks
+    wrong = [style for style in sorted(read_marks_table(path).own_styles) if not _has_style(names, style)]
+    if wrong:
+        raise InputError(f"{path}: there is no style {wrong[0][:40]!r} in the palette; it has {', '.join(names)}")
     used = {name for run in text.runs for name in run.styles}
     nearest = {name: name if name in names else nearest_style(name) or name for name in used}
     known = {name: near for name, near in nearest.items() if near in names or name not in text.foreign_styles}

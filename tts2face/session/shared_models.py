@@ -158,7 +158,8 @@ class SessionModels:
 
     def with_own_styles(self, prepared: PreparedRequest) -> PreparedRequest:
         """A request whose marks name styles of the palette, where there is one nearest to that of a speech service."""
-        palette = self.palette if prepared.request.has_gestures and marked_styles(prepared.text) else None
+        has_styles = marked_styles(prepared.text) or prepared.request.text_marks is not None
+        palette = self.palette if prepared.request.has_gestures and has_styles else None
         return prepared if palette is None else with_styles_of(prepared, palette.names)
 
     def gesture_layer(self, prepared: PreparedRequest) -> GestureLayer | None:
