@@ -333,7 +333,8 @@ class _Scanner:
         is_attribute = not found.is_verb and (word := _LAST_WORD.search(self.tail)) and is_function_word(word[1])
         stands_alone = _CLAUSE_START.search(self.tail) or self._is_first() or _CLOSE_END.match(self._after(match.end()))
         is_model = self._rules.is_model and not is_attribute
-        if not (stands_alone or is_model or (found.is_verb and " " not in words)):
+        shows = any(mark.gesture or mark.style or mark.pause_s for mark in found.marks)
+        if not (stands_alone or is_model or (found.is_verb and shows and " " not in words)):
             return None
         return Cue(*match.span(), found.marks)
 
@@ -377,10 +378,15 @@ class _Scanner:
         if name in _PASSED:
             is_noted = name in _UNFOLLOWED and not closing
             return Silent(*span, f"{shown} is followed within <speak> alone; its text is spoken" if is_noted else "")
-        wraps = self._is_first() or self._after(match.end())[:1].isalnum()  # not <name> in a letter
-        if closing or "=" in attributes or match[0].endswith("/>") or (self._rules.is_model and wraps):
+        before, after, words = self.tail[-1:], self._after(match.end())[:1], attributes.strip(" /")
+        wraps = self._is_first() or after.isalnum()  # not <name> in a letter
+        if closing or "=" in attributes or match[0].endswith("/>") or (self._rules.is_model and wraps and not words):
             return Silent(*span, "" if closing else f"{shown} is no tag that is known; the text behind it is spoken")
-        return None if attributes.strip() else Text(*span, match[0][1:-1])
+        if words and (before.isalnum() or after.isalnum()):  # x<y then y>x
+            return None
+        return Text(
+            *span, f"{' ' * before.isalnum()}{match[0][1:-1]}{' ' * after.isalnum()}"
+        )  # <order number>, List<T>
 
 
 def _pause(attributes: str, usual: float) -> TextMark:

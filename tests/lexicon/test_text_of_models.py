@@ -139,3 +139,19 @@ def test_long_texts_of_marks_are_read_at_once(unit: str) -> None:
 def test_an_unknown_markup_is_refused() -> None:
     with pytest.raises(InputError, match="there is no markup 'md'; choose auto, plain, ssml, llm"):
         parse_marks("a", markup="md")
+
+
+@pytest.mark.parametrize(
+    ("text", "spoken"),
+    [
+        ("If x<y then y>x.", "If x less than y then y greater than x"),
+        ("Dear <customer name>, your <order number> is ready.", "Dear customer name your order number is ready"),
+        ("set<int> s and List<String> names", "set int s and List String names"),
+        ("He seems (waits) sad.", "He seems waits sad"),
+        ("He seems (pauses) sad.", "He seems sad"),
+    ],
+)  # fmt: skip
+def test_comparisons_and_names_in_brackets_are_spoken(text: str, spoken: str) -> None:
+    assert " ".join(word.text for word in pronounce_marked(parse_marks(text)).words) == spoken
+    model = " ".join(word.text for word in pronounce_marked(parse_marks("So, x<y then y>x.", markup="llm")).words)
+    assert model == "So x less than y then y greater than x"

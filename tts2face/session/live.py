@@ -350,8 +350,8 @@ class LiveSpeech:
         """Whether a gesture waits or is being made."""
         return self.gestures.move_at(self.seconds)
 
-    def change_style(self, style: str) -> None:
-        """From the next word or the next silence on, the face and its voice have another style.
+    def change_style(self, style: str) -> str:
+        """From the next word or the next silence on, the face and its voice have another style, whose name is returned.
 
         Names of styles of speech services stand for the nearest ones, as in marks; ``auto`` follows the words.
 
@@ -365,6 +365,7 @@ class LiveSpeech:
         if self._layer is not None:
             self._layer.change_style(None if is_auto(style) else style)
         self._request, self._silent = (replace(request, style=style) for request in (self._request, self._silent))
+        return style
 
     def rest(self) -> None:
         """The next text begins with the ``lead`` of the request, without a pause after the sentence before it."""

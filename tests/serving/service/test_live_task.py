@@ -221,6 +221,15 @@ def test_an_unknown_style_is_an_error_and_the_stream_goes_on() -> None:
     assert "speech" in {one["type"] for one in events}
 
 
+@pytest.mark.parametrize("style", ["cheerful", "delighted", "auto"])
+def test_a_style_of_a_speech_service_holds_in_idle_motion_too(style: str) -> None:
+    say, change = {"type": "say", "text": "Yes."}, {"type": "style", "style": style}
+    events = stream_events(tts2face.Session(), say, change, say, with_idle=True)
+    assert "error" not in {one["type"] for one in events}
+    assert [one["style"] for one in events if one["type"] == "style"] == [style]
+    assert sum(one["type"] == "speech" for one in events) == 2
+
+
 def test_the_idle_motion_has_the_style() -> None:
     events = stream_events(
         tts2face.Session(), {"type": "listen", "rate": None}, {"type": "style", "style": "delighted"}

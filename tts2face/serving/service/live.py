@@ -117,10 +117,9 @@ class LiveTask:
 
     def _change_style(self, style: str) -> Event:
         try:
-            self._speech.change_style(style)
+            self._options["style"] = self._speech.change_style(style)
         except Tts2faceError as error:
             return Event({"type": "error", "message": " ".join(str(error).split())})
-        self._options["style"] = style
         if self._has_idle:
             self._idle, self._idle_at = idle_motion(self._session, self._options), 0
         return Event({"type": "style", "style": style, "at": round(self._seconds, 4)})
