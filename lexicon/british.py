@@ -97,8 +97,10 @@ def _word(word: str, american: Segments, *, is_last: bool) -> Segments:
 
 def _with_weak_ham(segments: Segments, word: str) -> Segments:
     """Phones of a place in -ham, which the dictionary has in full for some of them: Balham, Birmingham."""
-    *_, vowel, end = segments or (IpaPhone("m"),) * 2
-    if not _HAM.search(word) or (vowel.phone, end.phone) != ("a", "m") or vowel.stress == 1:
+    if len(segments) < len("ham") or not _HAM.search(word):
+        return segments
+    *_, vowel, end = segments
+    if (vowel.phone, end.phone) != ("a", "m") or vowel.stress == 1:
         return segments
     rest = segments[:-3] if segments[-3].phone == "h" else segments[:-2]
     return (*rest, IpaPhone("ə", is_syllabic=True), end)

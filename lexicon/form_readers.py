@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from lexicon import written_forms as readings
 from lexicon.dictionary import word_set
-from lexicon.informal_words import informal_word
+from lexicon.informal_words import informal_word, plain_word
 from lexicon.number_contexts import words_in_context
 from lexicon.number_words import cardinal_words, digit_words, number_words, ordinal_words, roman_value, year_words
 from lexicon.pauses import MARKS
@@ -280,9 +280,10 @@ def read_abbreviation(m: re.Match[str], previous: str) -> str:
 
 
 def read_dotted_letters(m: re.Match[str], _: str) -> str:
-    """F.B.I. is FBI; I.I. is I I, as II would be a number."""
+    """F.B.I. is FBI; I.I. is I I, as II would be a number, and A.A.A.A. is A A A A, as AAAA would be a stretched word."""
     letters = m.group().replace(".", "").upper()
-    return keep_full_stop(" ".join(letters) if letters in NEVER_LETTERS else letters, m)
+    is_apart = letters in NEVER_LETTERS or plain_word(letters) != letters
+    return keep_full_stop(" ".join(letters) if is_apart else letters, m)
 
 
 def read_scientific(m: re.Match[str], _: str) -> str:

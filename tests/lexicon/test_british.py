@@ -87,6 +87,10 @@ def test_a_dictionary_takes_precedence_and_is_not_linked() -> None:
     assert pronounce("car and car", "en-gb", own).words[0].phones == ("k", "ɑ")
 
 
+def test_a_letter_with_an_accent_is_one_sound() -> None:
+    assert _phones("À la carte")[1:] == ["lɑ", "kɑt"]
+
+
 def test_without_the_dictionary_espeak_reads(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(misaki, "_text", lambda accent, grade: b"{}")
     assert not has_dictionary("en-gb")

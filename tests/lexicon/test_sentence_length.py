@@ -46,7 +46,7 @@ def voiced(sentence: Sentence) -> int:
 def test_a_text_without_ends_becomes_bounded_sentences() -> None:
     wrong = []
     for text, language in TEXTS:
-        sentences = list(split_sentences(parse_marks(text, language), language))
+        sentences = list(split_sentences(parse_marks(text, language, "plain"), language))
         written = "".join("".join(phrase.source.split()) for one in sentences for phrase in one.utterances)
         is_complete = written.strip(".") == text.replace(" ", "").strip(".")
         is_joined = [after.first for after in sentences[1:]] == [one.last for one in sentences[:-1]]
@@ -102,7 +102,7 @@ def test_an_address_stays_whole_and_a_longer_word_is_cut() -> None:
 @pytest.mark.parametrize("unit", ["$1,234,567.89 ", "1234567890", "12345 ", "+1 (555) 123-4567 ", "👍🏽"])
 def test_the_first_piece_is_short_also_where_everything_is_a_number(unit: str) -> None:
     text = (unit * 7000)[:100_000]
-    first, second = islice(split_sentences(parse_marks(text), "en-us"), 2)
+    first, second = islice(split_sentences(parse_marks(text, markup="plain"), "en-us"), 2)
     assert len(first.utterances[0].text) <= FIRST_SPOKEN_LETTERS + 10
     assert len(second.utterances[0].text) <= MOST_VOICED
 
