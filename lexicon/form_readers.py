@@ -280,7 +280,7 @@ def read_abbreviation(m: re.Match[str], previous: str) -> str:
 
 
 def read_dotted_letters(m: re.Match[str], _: str) -> str:
-    """F.B.I. is FBI; I.I. is I I, as II would be a number, and A.A.A.A. is A A A A, as AAAA would be a stretched word."""
+    """F.B.I. is FBI; I.I. is I I, as II would be a number; A.A.A.A. is A A A A, as AAAA would be a stretched word."""
     letters = m.group().replace(".", "").upper()
     is_apart = letters in NEVER_LETTERS or plain_word(letters) != letters
     return keep_full_stop(" ".join(letters) if is_apart else letters, m)
