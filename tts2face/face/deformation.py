@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from tts2face.types import HEAD_CHANNELS
 REST_HEAD = np.zeros(len(HEAD_CHANNELS), np.float32)  # head pose at rest
 CHIN_MARGIN_MM = 8.0  # height below the chin that still moves rigidly with the head
 MIN_NECK_MM = 20.0  # meshes with a shorter neck move rigidly as a whole
+IDENTITY = np.eye(3)
+N_KEPT = 64  # poses whose transforms are kept: a frame takes the same ones several times
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,34 +124,46 @@ def _share_by_height(face: Face) -> NDArray[np.float32]:
 
 def rotation_matrix(turn: NDArray[np.floating]) -> NDArray[np.float64]:
     """Rotation matrix (3, 3) of a rotation vector (3,) in radians (Rodrigues)."""
-    angle = float(np.linalg.norm(turn))
+    angle = float(np.sqrt(turn.dot(turn)))
     # the axis of no rotation would be 0 / 0
     if angle == 0.0:
-        return np.eye(3)
-    x, y, z = np.asarray(turn, np.float64) / angle
+        return IDENTITY.copy()
+    x, y, z = (np.asarray(turn, np.float64) / angle).tolist()
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    rotation: NDArray[np.float64] = np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross)
+    rotation: NDArray[np.float64] = IDENTITY + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross)
     return rotation
 
 
 def head_rotation(pitch: float, yaw: float, roll: float) -> NDArray[np.float64]:
     """Rotation matrix (3, 3) of the head: roll about z first, then pitch about x, then yaw about y; radians."""
-    about_x, about_y, about_z = np.eye(3) * [[pitch], [yaw], [roll]]
+    about_x, about_y, about_z = IDENTITY * [[pitch], [yaw], [roll]]
     return rotation_matrix(about_y) @ rotation_matrix(about_x) @ rotation_matrix(about_z)
 
 
 def head_transform(head: NDArray[np.floating], pivot: NDArray[np.floating]) -> NDArray[np.float32]:
     """Rigid transform (3, 4) of a head pose (6,) about the pivot (3,): rotation and translation."""
-    pitch, yaw, roll, *shift = (float(value) for value in head)
-    rotation = head_rotation(pitch, yaw, roll)
-    transform = np.column_stack([rotation, pivot - rotation @ pivot + shift])
-    return transform.astype(np.float32)
+    return _transform(tuple(np.asarray(head).tolist()), pivot.dtype.char, tuple(pivot.tolist())).copy()
+
+
+@lru_cache(N_KEPT)
+def _transform(head: tuple[float, ...], kind: str, about: tuple[float, ...]) -> NDArray[np.float32]:
+    pitch, yaw, roll, *shift = head
+    pivot, rotation = np.array(about, kind), head_rotation(pitch, yaw, roll)
+    transform = np.zeros((3, 4), np.float32)
+    transform[:, :3], transform[:, 3] = rotation, pivot - rotation @ pivot + shift
+    return transform
 
 
 def eye_rotations(turns: NDArray[np.float32], weights: NDArray[np.floating]) -> NDArray[np.float32]:
     """Rotation matrices (E, 3, 3) of the eyeballs for rotation vectors per weight (E, K, 3) and weights (K,)."""
     vectors = np.einsum("ekc,k->ec", turns, weights)
-    return np.array([rotation_matrix(vector) for vector in vectors], np.float32).reshape(-1, 3, 3)
+    kind = vectors.dtype.char
+    return np.array([_rotation(kind, *vector) for vector in vectors.tolist()], np.float32).reshape(-1, 3, 3)
+
+
+@lru_cache(N_KEPT)
+def _rotation(kind: str, *turn: float) -> NDArray[np.float64]:
+    return rotation_matrix(np.array(turn, kind))
 
 
 @kernel

@@ -106,12 +106,19 @@ class EyeOpenings:
 
     def sink(self, centres: NDArray[np.floating], points: Float32Array) -> None:
         """Move vertices (V, 3) of eyeballs with centres (E, 3) back behind lids, in place, before the head moves."""
-        for number, edges in zip(np.flatnonzero(self.found), self.edges(points), strict=True):
-            off = (edges - centres[number]).astype(np.float32)
-            off = np.take_along_axis(off, off[:, :, :1].argsort(axis=1), axis=1)
-            most = np.float32(SINK_SHARE * self.radius[number])
-            first, end = self.spans[number]
-            _sink(first, end, centres[number].astype(np.float32), off, most, points)
+        found = self.found
+        if not found.any():
+            return
+        middles = centres[found].astype(np.float32)
+        off = (self.edges(points) - middles[:, None, None]).astype(np.float32)
+        eye, lid = np.indices(off.shape[:2])[..., None]
+        _sink(
+            self.spans[found],
+            middles,
+            off[eye, lid, off[..., 0].argsort(axis=2)],
+            SINK_SHARE * self.radius[found],
+            points,
+        )
 
 
 def eye_openings(face: Face) -> EyeOpenings:
@@ -263,13 +270,14 @@ def _height(lid, across):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _sink(first, end, centre, lids, most, vertices):  # type: ignore[no-untyped-def]
-    """Move an eyeball's vertices in [first, end) back by up to `most` mm beyond the edges of lids (2, L, 3)."""
-    upper, lower = lids[0], lids[1]
-    last = len(upper) - 1
-    for v in range(first, end):
-        x, y = vertices[v, 0] - centre[0], vertices[v, 1] - centre[1]
-        if vertices[v, 2] > centre[2]:
-            beyond = max(y - _height(upper, x), _height(lower, x) - y)
-            beyond = max(beyond, min(upper[0, 0], lower[0, 0]) - x, x - max(upper[last, 0], lower[last, 0]))
-            vertices[v, 2] -= min(max(np.float32(SINK_SLOPE) * beyond, np.float32(0)), most)
+def _sink(spans, centres, lids, most, vertices):  # type: ignore[no-untyped-def]
+    """Move the vertices of eyeballs in spans (E, 2) back by up to `most` (E,) mm beyond edges of lids (E, 2, L, 3)."""
+    for e in range(len(spans)):
+        upper, lower = lids[e, 0], lids[e, 1]
+        last = len(upper) - 1
+        for v in range(spans[e, 0], spans[e, 1]):
+            x, y = vertices[v, 0] - centres[e, 0], vertices[v, 1] - centres[e, 1]
+            if vertices[v, 2] > centres[e, 2]:
+                beyond = max(y - _height(upper, x), _height(lower, x) - y)
+                beyond = max(beyond, min(upper[0, 0], lower[0, 0]) - x, x - max(upper[last, 0], lower[last, 0]))
+                vertices[v, 2] -= min(max(np.float32(SINK_SLOPE) * beyond, np.float32(0)), most[e])

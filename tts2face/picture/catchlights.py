@@ -3,6 +3,9 @@
 Animators place them so; the mirror image of a lamp leaves the iris with the gaze and with turns of the head.
 """
 
+import math
+from bisect import bisect_right
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -23,6 +26,7 @@ SMALL, WHOLE = 0.1, 1.2  # heights seen, over the iris's radius, between which i
 HIDDEN, CLEAR = 0.06, 0.3  # those between which it appears
 AWAY, TOWARDS = 0.05, 0.35  # cosines of the gaze from the line of sight between which it appears
 SOFT = 0.45  # of its radius, over which it fades
+FIRST_AXIS = np.array([1.0, 0.0, 0.0])
 
 
 def catchlight_sizes(centres: NDArray[np.floating], radius: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -53,33 +57,44 @@ def place_catchlight(
     side
         Of the key light, from -1, the left of the picture, to 1.
     """
-    sight = np.asarray(centre, np.float64) / np.linalg.norm(centre)
-    right = np.array([1.0, 0.0, 0.0]) - sight[0] * sight
-    right /= np.linalg.norm(right)
-    axes = np.stack([right, np.cross(right, sight)])
-    row = np.concatenate([axes.ravel(), np.zeros(4)])
+    row = np.zeros(N_CATCHLIGHT_COLUMNS)
+    axes = row[:PLACE_RIGHT].reshape(2, 3)
+    sight = centre / np.sqrt(centre.dot(centre))
+    right = FIRST_AXIS - sight[0] * sight
+    right /= np.sqrt(right.dot(right))
+    a, b, c, d, e, f = *right.tolist(), *sight.tolist()
+    axes[0], axes[1] = right, (b * f - c * e, c * d - a * f, a * e - b * d)
     towards = -float(gaze @ sight)
-    x, y = (float(value) for value in axes @ gaze * iris[0])
-    radius = float(np.sqrt(1 - iris[0] ** 2))
+    x, y = (axes @ gaze * iris[0]).tolist()
+    radius = math.sqrt(1 - iris[0] ** 2)
     # the iris is seen as an ellipse, narrow along the way from the eye's middle
     away, narrow = max(x * x + y * y, 1e-12), 1 - max(towards, 0.0) ** 2
-    wide, high = (radius * float(np.sqrt(1 - narrow * of**2 / away)) for of in (x, y))
+    wide, high = (radius * math.sqrt(1 - narrow * of**2 / away) for of in (x, y))
     left, end = x - wide, x + wide
-    edges = None if lids is None else lids @ axes.T
-    if edges is not None:
-        left, end = max(left, float(edges[..., 0].min())), min(end, float(edges[..., 0].max()))
+    edges = [] if lids is None else [sorted(lid) for lid in (lids @ axes.T).tolist()]
+    if edges:
+        left, end = max(left, min(lid[0][0] for lid in edges)), min(end, max(lid[-1][0] for lid in edges))
     across = (left + end) / 2 + side * ASIDE_SHARE * max(end - left, 0.0) / 2
-    half = high * float(np.sqrt(max(1 - ((across - x) / max(wide, 1e-6)) ** 2, 0.0)))
+    half = high * math.sqrt(max(1 - ((across - x) / max(wide, 1e-6)) ** 2, 0.0))
     low, top = y - half, y + half
-    if edges is not None:
-        upper, lower = (np.interp(across, *lid[np.argsort(lid[:, 0])].T) for lid in edges)
-        low, top = max(low, float(lower)), min(top, float(upper))
+    if edges:
+        upper, lower = (_height(lid, across) for lid in edges)
+        low, top = max(low, lower), min(top, upper)
     seen = max(top - low, 0.0)
     size = min(iris[1] * radius * _rise(seen / radius, SMALL, WHOLE), MOST_OF_SEEN * seen)
     row[PLACE_RIGHT], row[PLACE_UP] = across, low + HEIGHT_SHARE * seen
     row[SCALE] = 1 / max(size, 1e-3)
     row[STRENGTH] = _rise(seen / radius, HIDDEN, CLEAR) * _rise(towards, AWAY, TOWARDS)
     return row
+
+
+def _height(edge: list[list[float]], across: float) -> float:
+    """Height at a place across of an edge whose points [across, height] are sorted, as `numpy.interp` gives it."""
+    after = bisect_right(edge, across, key=itemgetter(0))
+    if after in (0, len(edge)):
+        return edge[0 if after == 0 else -1][1]
+    (x0, y0), (x1, y1) = edge[after - 1 : after + 1]
+    return (y1 - y0) / (x1 - x0) * (across - x0) + y0
 
 
 def _rise(value: float, low: float, high: float) -> float:

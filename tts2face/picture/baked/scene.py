@@ -45,7 +45,17 @@ from tts2face.picture.baked.shading import (
 )
 from tts2face.picture.baked.softening import blur_within
 from tts2face.picture.baked.surface import TEXELS_A_PIXEL, LitSurface, build_surface, stack_pages
-from tts2face.picture.baked.visibility import N_SPAN_VALUES, NEAR, RED, X, fill_bands, find_bands, find_nearest, project
+from tts2face.picture.baked.visibility import (
+    N_SPAN_VALUES,
+    NEAR,
+    RED,
+    X,
+    fill_bands,
+    find_bands,
+    find_nearest,
+    project,
+    span_of_bands,
+)
 from tts2face.picture.camera import CameraMatrices
 from tts2face.picture.catchlights import PLACE_RIGHT, UP
 from tts2face.picture.options import Picture
@@ -214,9 +224,7 @@ class LitScene:
 
     def _eye_bands(self, buffers: LitBuffers) -> tuple[int, int]:
         """The first of the bands that show eyeballs, and one past the last."""
-        bands = buffers.bands[self.surface.of_eyes]
-        bands = bands[bands[:, 1] > bands[:, 0]]
-        return (int(bands[:, 0].min()), int(bands[:, 1].max())) if len(bands) else (0, 0)
+        return span_of_bands(buffers.bands, self.surface.of_eyes)
 
     def _colour(self, found: Any, count: int, buffers: LitBuffers) -> None:
         """Write the colours of fragments; on eyeballs, the light."""
@@ -269,7 +277,8 @@ class LitScene:
             add_responses(base, answer, terms, first, out)
             if out is buffers.mouth and self.surface.mouth is not None:
                 self.surface.mouth.hold(points, found.ring, found.table[-out.shape[1] :], out)
-            buffers.table[at : at + out.shape[1], RED:] = out.T
+            for channel, values in enumerate(out):  # a transposed block is copied by threes
+                buffers.table[at : at + out.shape[1], RED + channel] = values
             at += out.shape[1]
         if not light.changes_in_texels:
             return

@@ -84,6 +84,17 @@ def fill_bands(bands: Array, ends: Array, order: Array) -> None:
 
 
 @kernel
+def span_of_bands(bands: Array, numbers: Array) -> tuple[int, int]:
+    """The first of the bands (F, 2) that triangles of some numbers (n,) touch, and one past the last."""
+    first, end = np.int64(len(bands)), np.int64(0)
+    for i in range(len(numbers)):
+        low, high = np.int64(bands[numbers[i], 0]), np.int64(bands[numbers[i], 1])
+        if high > low:
+            first, end = min(first, low), max(end, high)
+    return min(first, end), end
+
+
+@kernel
 def find_nearest(
     table: Array, triangles: Array, order: Array, first_row: int, nearest: Array, spans: Array
 ) -> tuple[int, int]:
