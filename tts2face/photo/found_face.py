@@ -237,14 +237,20 @@ def _read(pixels: Pixels, tracker: FaceTracker, crop: Crop, n_faces: int) -> Fou
         eye_distance,
         n_faces,
         bool(lips > max(HIDDEN_SPREAD * eye_distance, HIDDEN_RATIO * spread[ABOVE_MOUTH].mean())),
-        min(score for _, score in readings) >= SURE_SCORE and _least_turned(pixels, tracker, crop) >= SURE_TURNED_SCORE,
+        min(score for _, score in readings) >= SURE_SCORE and _is_sure_turned(pixels, tracker, crop),
     )
 
 
-def _least_turned(pixels: Pixels, tracker: FaceTracker, crop: Crop) -> float:
-    """Least probability of a face in crops of other sizes and angles, rad, but for one of them."""
+def _is_sure_turned(pixels: Pixels, tracker: FaceTracker, crop: Crop) -> bool:
+    """Whether crops of other sizes and angles, rad, show a face, but for one of them; no more are read than decide."""
     turned = (replace(crop, side=size * crop.side, angle=crop.angle + turn) for size, turn in TURNED_CROPS)
-    return sorted(tracker.read_crop(pixels, other)[1] for other in turned)[1]
+    unsure = sure = 0
+    while sure < len(TURNED_CROPS) - 1 and unsure < 2:
+        if tracker.read_crop(pixels, next(turned))[1] >= SURE_TURNED_SCORE:
+            sure += 1
+        else:
+            unsure += 1
+    return unsure < 2
 
 
 def _check(found: FoundFace, shape: tuple[int, ...], name: str, reduced_by: float) -> None:

@@ -319,12 +319,11 @@ def _nearest(line: FloatArray, places: FloatArray) -> tuple[FloatArray, FloatArr
     )
     steps = np.gradient(fine, axis=0)
     steps /= np.linalg.norm(steps, axis=1, keepdims=True)
-    off = places[:, None] - fine
-    best = np.linalg.norm(off, axis=2).argmin(axis=1)
-    rows = np.arange(len(places))
+    away_x, away_y = (places[:, k, None] - fine[:, k] for k in (0, 1))
+    best = np.sqrt(away_x * away_x + away_y * away_y).argmin(axis=1)
     direction = steps[best]
     right = np.column_stack([np.abs(direction[:, 1]), -direction[:, 0] * np.sign(direction[:, 1])])
-    way: FloatArray = (off[rows, best] * right).sum(axis=1)
+    way: FloatArray = ((places - fine[best]) * right).sum(axis=1)
     return way, best / (len(fine) - 1), direction
 
 

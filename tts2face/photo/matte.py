@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tts2face.models.landmarks import FACE_OVAL
-from tts2face.numeric.arrays import Float32Array, FloatArray, IntArray, Mask, Pixels, smoothstep
+from tts2face.numeric.arrays import Float32Array, FloatArray, IntArray, Mask, Pixels, dot_products, smoothstep
 from tts2face.photo.photograph import Photograph
 
 Network = Callable[[Float32Array], Sequence[Float32Array]]
@@ -161,10 +161,11 @@ def _cover(pixels: Pixels, share: Float32Array, face: Mask, scale: float) -> tup
     of_person, person_variance = _spread(colours, person, scale)
     behind, variance = _spread(colours, background, scale)
     apart = of_person - behind
-    squared = (apart**2).sum(axis=2) + 1
-    mixed = (((colours - behind) * apart).sum(axis=2) / squared).clip(0, 1)
+    squared = dot_products(apart, apart) + 1
+    mixed = (dot_products(colours - behind, apart) / squared).clip(0, 1)
     noise = mixed**2 * person_variance + (1 - mixed) ** 2 * variance + COLOUR_NOISE**2
-    noise += ((colours - behind - mixed[..., None] * apart) ** 2).sum(axis=2)
+    left = colours - behind - mixed[..., None] * apart
+    noise += dot_products(left, left)
     trust = READING_NOISE**2 / (READING_NOISE**2 + noise / squared)
     cover = np.where(person, 1, np.where(background, 0, trust * mixed + (1 - trust) * share))
     return ((cover - LEAST) / (MOST - LEAST)).clip(0, 1).astype(np.float32), of_person
@@ -219,7 +220,7 @@ def _spread(colours: Float32Array, known: Mask, scale: float) -> tuple[Float32Ar
     import cv2
 
     weight = known.astype(np.float32)
-    values = np.concatenate([colours, (colours**2).sum(axis=2, keepdims=True)], axis=2)
+    values = np.concatenate([colours, dot_products(colours, colours)[..., None]], axis=2)
     found = np.broadcast_to(values[known].mean(axis=0) if known.any() else values.mean(axis=(0, 1)), values.shape)
     for spread in SPREADS:
         side = 2 * max(1, round(spread * scale)) + 1
@@ -227,7 +228,7 @@ def _spread(colours: Float32Array, known: Mask, scale: float) -> tuple[Float32Ar
         for _ in range(2):
             sums, share = (cv2.blur(part, (side, side), borderType=cv2.BORDER_REPLICATE) for part in (sums, share))
         found = (sums + LEAST_KNOWN * found) / (share + LEAST_KNOWN)[..., None]
-    variance = np.maximum(found[..., 3] - (found[..., :3] ** 2).sum(axis=2), 0) / 3
+    variance = np.maximum(found[..., 3] - dot_products(found[..., :3], found[..., :3]), 0) / 3
     return found[..., :3].astype(np.float32), variance.astype(np.float32)
 
 
@@ -243,7 +244,8 @@ def _paint_hole(pixels: Pixels, hole: Mask, scale: float) -> Pixels:
     side = 2 * round(STANDS_OUT_REACH * scale) + 1
     share = np.maximum(cv2.blur(known, (side, side)), 1e-3)
     mean = cv2.blur(pixels * known[..., None], (side, side)) / share[..., None]
-    stands_out = (1 + ((pixels - mean) ** 2).sum(axis=2) / AGREED**2).astype(np.float32)
+    off = pixels - mean
+    stands_out = (1 + dot_products(off, off) / AGREED**2).astype(np.float32)
     found = _nearest(pixels, known, scale)
     down, across = np.nonzero(hole)
     sums, weights = LEAST_AGREED * found[down, across].astype(np.float32), np.full((len(down), 1), LEAST_AGREED)

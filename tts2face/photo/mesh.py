@@ -241,9 +241,11 @@ def way_outside(places: FloatArray, oval: FloatArray) -> FloatArray:
     """(N,) way from places (N, 2) to a closed line (M, 2), less than 0 inside."""
     ends = np.roll(oval, -1, axis=0)
     sides = ends - oval
-    at = np.einsum("nmc,mc->nm", places[:, None] - oval, sides) / np.maximum((sides**2).sum(axis=1), 1e-12)
-    nearest = oval + np.clip(at, 0, 1)[..., None] * sides
-    way = np.linalg.norm(places[:, None] - nearest, axis=2).min(axis=1)
+    x, y = places[:, 0, None], places[:, 1, None]
+    at = (x - oval[:, 0]) * sides[:, 0] + (y - oval[:, 1]) * sides[:, 1]
+    at = np.clip(at / np.maximum((sides**2).sum(axis=1), 1e-12), 0, 1)
+    right, up = x - (oval[:, 0] + at * sides[:, 0]), y - (oval[:, 1] + at * sides[:, 1])
+    way = np.sqrt((right * right + up * up).min(axis=1))
     signed: FloatArray = np.where(points_in_polygon(places, oval), -way, way)
     return signed
 

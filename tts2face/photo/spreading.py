@@ -72,4 +72,4 @@ def _solved(system: sparse.csc_matrix, values: FloatArray) -> FloatArray:
     One column after the other: all at once go through a threaded BLAS, which takes eight times as long.
     """
     factors = splu(system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    return np.stack([factors.solve(np.ascontiguousarray(column)) for column in values.T], axis=1)
+    return np.array([factors.solve(column) for column in np.ascontiguousarray(values.T)]).T

@@ -81,7 +81,9 @@ class PhotoSurface:
 
 def moves(vertices: Vertices) -> Mask:
     """(V,) whether vertices move with a shape or with the head."""
-    return np.asarray((np.abs(vertices.shapes).max(axis=(0, 2)) > MOVED) | (vertices.follow > MOVED))
+    shapes = vertices.shapes
+    most = np.maximum(shapes.max(axis=0), -shapes.min(axis=0)).max(axis=1)
+    return np.asarray((most > MOVED) | (vertices.follow > MOVED))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -182,12 +184,13 @@ def _vertices(mesh: PhotoMesh, lashes: Sequence[IntArray]) -> Mapping[int, int]:
 def _triangles_around(places: FloatArray, points: FloatArray, triangles: IntArray) -> tuple[IntArray, FloatArray]:
     """Corners (N, 3) of the triangles around places (N, 2), or nearest to them, and the weights of the places."""
     a, b, c = (points[triangles[:, k]] for k in range(3))
-    first, second, off = b - a, c - a, places[:, None] - a
+    first, second = b - a, c - a
+    right, up = (places[:, k, None] - a[:, k] for k in range(2))
     area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
     area = np.where(np.abs(area) < 1e-12, 1e-12, area)
-    along = (off[..., 0] * second[:, 1] - off[..., 1] * second[:, 0]) / area
-    across = (first[:, 0] * off[..., 1] - first[:, 1] * off[..., 0]) / area
-    weights = np.stack([1 - along - across, along, across], axis=-1)
-    best = weights.min(axis=-1).argmax(axis=-1)
-    inside = np.clip(weights[np.arange(len(places)), best], 0, None)
+    along = (right * second[:, 1] - up * second[:, 0]) / area
+    across = (first[:, 0] * up - first[:, 1] * right) / area
+    weights = (1 - along - across, along, across)
+    best = np.minimum(np.minimum(weights[0], weights[1]), weights[2]).argmax(axis=-1)
+    inside = np.clip(np.stack([part[np.arange(len(places)), best] for part in weights], axis=-1), 0, None)
     return triangles[best], inside / inside.sum(axis=1, keepdims=True)

@@ -62,7 +62,7 @@ def place_catchlight(
     sight = centre / np.sqrt(centre.dot(centre))
     right = FIRST_AXIS - sight[0] * sight
     right /= np.sqrt(right.dot(right))
-    a, b, c, d, e, f = *right.tolist(), *sight.tolist()
+    (a, b, c), (d, e, f) = right, sight
     axes[0], axes[1] = right, (b * f - c * e, c * d - a * f, a * e - b * d)
     towards = -float(gaze @ sight)
     x, y = (axes @ gaze * iris[0]).tolist()

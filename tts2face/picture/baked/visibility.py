@@ -91,7 +91,7 @@ def span_of_bands(bands: Array, numbers: Array) -> tuple[int, int]:
         low, high = np.int64(bands[numbers[i], 0]), np.int64(bands[numbers[i], 1])
         if high > low:
             first, end = min(first, low), max(end, high)
-    return min(first, end), end
+    return int(min(first, end)), int(end)
 
 
 @kernel
