@@ -62,8 +62,10 @@ class FaceRig:
         """Vertices (V, 3), mm, for shape weights (K,), of a head that has not moved."""
         vertices = np.zeros_like(self.rest)
         weights = np.array(weights, np.float32)  # a copy that can be written: kernels are compiled for one kind
-        eyes = eye_rotations(self.eye_turns, weights)
         _apply_shapes(self.rest, self.starts, self.indices, self.deltas, weights, vertices)
+        if not len(self.eye_spans):
+            return vertices
+        eyes = eye_rotations(self.eye_turns, weights)
         _turn_eyes(self.eye_spans, self.eye_centres, eyes, vertices)
         centres = self.clearance.centres(self.eye_centres, weights)
         self.clearance.enforce(centres, eyes, vertices)
@@ -71,7 +73,8 @@ class FaceRig:
 
     def sink_eyes(self, weights: NDArray[np.floating], vertices: NDArray[np.float32]) -> None:
         """Move the eyeballs of vertices (V, 3) of `deform` back behind their lids in place, for who draws them."""
-        self.clearance.openings.sink(self.clearance.centres(self.eye_centres, weights), vertices)
+        if len(self.eye_spans):
+            self.clearance.openings.sink(self.clearance.centres(self.eye_centres, weights), vertices)
 
     def move_head(self, head: NDArray[np.floating], vertices: NDArray[np.float32]) -> None:
         """Move vertices (V, 3) of `deform` in place by a head pose (6,)."""

@@ -111,7 +111,7 @@ class EyeOpenings:
             return
         middles = centres[found].astype(np.float32)
         off = (self.edges(points) - middles[:, None, None]).astype(np.float32)
-        eye, lid = np.indices(off.shape[:2])[..., None]
+        eye, lid = np.arange(len(off))[:, None, None], np.arange(off.shape[1])[:, None]
         _sink(
             self.spans[found],
             middles,

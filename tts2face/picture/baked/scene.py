@@ -290,8 +290,10 @@ class LitScene:
     def _eye_rows(self, pose: tuple[Float32Array, Float32Array, Float32Array]) -> Float32Array:
         """Rows of the eyes for (vertices, shape weights, head pose)."""
         _, weights, head = pose
-        moved = head_transform(head, self.face.pivot)
         rows = np.zeros((len(self.face.eyes), N_EYE_COLUMNS), np.float32)
+        if not len(rows):
+            return rows
+        moved = head_transform(head, self.face.pivot)
         for row, eye, turn in zip(
             rows, self.face.eyes, eye_rotations(self.surface.rig.eye_turns, weights), strict=True
         ):
@@ -301,13 +303,12 @@ class LitScene:
         pupil = min(painted * (1 + DILATION * _weight(self.face, weights, PUPIL_SHAPE)), 0.95 * iris)
         rows[:, PUPIL:KEY] = pupil, iris, painted / pupil, (iris - painted) / (iris - pupil)
         # a picture keeps the light that it has
-        if len(lamps := self.surface.light.lamps) and len(rows):
+        if len(lamps := self.surface.light.lamps):
             view = self.optics.view
             seen = self.surface.eyes.seen(pose, view)
             lamp = view[:, :3] @ lamps[0, :3] + view[:, 3] - seen[0].mean(axis=0)
-            spots = self.surface.eyes.catchlights(
-                seen, float(np.clip(lamp[0] / np.linalg.norm(lamp) / KEY_ASIDE, -1, 1))
-            )
+            side = float(lamp[0] / np.sqrt(lamp.dot(lamp)) / KEY_ASIDE)
+            spots = self.surface.eyes.catchlights(seen, min(max(side, -1.0), 1.0))
             spots[:, :UP], spots[:, UP:PLACE_RIGHT] = (
                 spots[:, :UP] @ view[:, :3],
                 spots[:, UP:PLACE_RIGHT] @ view[:, :3],
