@@ -34,24 +34,26 @@ _LONG_NUMBER = re.compile(rf"[0-9]{{{MAX_CARDINAL_DIGITS + 1},}}")
 
 
 @functools.cache
-def _scanners() -> tuple[dict[str, re.Pattern[str]], dict[str, forms.Reader]]:
-    """Patterns of the forms that begin with a letter, a digit, or another sign, and readers by the group of a form."""
-    rows = form_table()
-    patterns = {
-        start: re.compile("|".join(f"(?P<f_{name}>{pattern})" for name, starts, pattern, _ in rows if start in starts))
-        for start in "a0."
-    }
-    return patterns, {f"f_{name}": reader for name, _, _, reader in rows}
+def _scanner(start: str) -> re.Pattern[str]:
+    """Pattern of the forms that begin with a letter (a), a digit (0) or another sign (.); few texts have all three."""
+    rows = (f"(?P<f_{name}>{pattern})" for name, starts, pattern, _ in form_table() if start in starts)
+    return re.compile("|".join(rows))
+
+
+@functools.cache
+def _readers() -> dict[str, forms.Reader]:
+    """Readers by the group of a form."""
+    return {f"f_{name}": reader for name, _, _, reader in form_table()}
 
 
 def _find_forms(text: str) -> Iterator[tuple[re.Match[str], forms.Reader]]:
     """Written forms one after another, with their readers; every character belongs to one."""
-    patterns, readers = _scanners()
-    of_letters, of_digits, of_signs = (patterns[start].match for start in "a0.")
+    readers = _readers()
     at = 0
     while at < len(text):
         sign = text[at]
-        match = (of_digits if sign in "0123456789" else of_letters if sign.isalnum() else of_signs)(text, at)
+        start = "0" if sign in "0123456789" else "a" if sign.isalnum() else "."
+        match = _scanner(start).match(text, at)
         if match is None:  # the last form of each pattern is any character
             raise AssertionError(f"no form begins with {sign!r}")
         yield match, readers[match.lastgroup or ""]

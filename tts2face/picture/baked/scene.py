@@ -224,7 +224,8 @@ class LitScene:
 
     def _eye_bands(self, buffers: LitBuffers) -> tuple[int, int]:
         """The first of the bands that show eyeballs, and one past the last."""
-        return span_of_bands(buffers.bands, self.surface.of_eyes)
+        of_eyes = self.surface.of_eyes
+        return span_of_bands(buffers.bands, of_eyes) if len(of_eyes) else (0, 0)
 
     def _colour(self, found: Any, count: int, buffers: LitBuffers) -> None:
         """Write the colours of fragments; on eyeballs, the light."""
@@ -274,6 +275,8 @@ class LitScene:
         for base, answer, (terms, first), out in zip(
             self.bases, self.answers, places, (buffers.light, buffers.mouth, buffers.balls), strict=True
         ):
+            if not out.size:
+                continue
             add_responses(base, answer, terms, first, out)
             if out is buffers.mouth and self.surface.mouth is not None:
                 self.surface.mouth.hold(points, found.ring, found.table[-out.shape[1] :], out)
