@@ -124,7 +124,7 @@ def _run_live_window(source: str, models: "Models", picture: "Picture", model: P
     from tts2face.models.face_loading import load_face
     from tts2face.picture.display import require_display
     from tts2face.picture.window import LiveWindow
-    from tts2face.session.live import CALIBRATION_S, LiveCapture
+    from tts2face.session.live_capture import CALIBRATION_S, LiveCapture
     from tts2face.video.camera import CaptureDevice
 
     require_display("--camera")

@@ -39,7 +39,7 @@ _BEFORE_NAME = re.compile(r"[\w,]\s*\Z")
 
 
 def emoji_word(written: str, mark: TextMark | None, before: str, after: str, language: str) -> str:
-    """What an emoji says; empty where it is silent, as in all languages but English.
+    """Word that an emoji says; empty where it is silent, as in all languages but English.
 
     Parameters
     ----------

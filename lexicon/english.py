@@ -146,9 +146,9 @@ def look_up_word(word: str, *, is_letter: bool, own: Lookup) -> tuple[IpaPhone, 
     if entry is None and "-" in word:
         parts = [part for part in word.split("-") if part]
         # re-elected, co-own: not the note re, nor the company
-        begins = beginning(parts[0]) if len(parts) > 1 and own(parts[0]) is None and parts[0].islower() else None
+        prefix = beginning(parts[0]) if len(parts) > 1 and own(parts[0]) is None and parts[0].islower() else None
         spoken = [look_up_word(part, is_letter=part.isupper(), own=own) for part in parts]
-        spoken[:1] = [begins or spoken[0]] if spoken else []
+        spoken[:1] = [prefix or spoken[0]] if spoken else []
         known = [segments for segments in spoken if segments]
         entry = _join_compound(parts, known) if known and len(known) == len(parts) else None
     if entry is None and stem:

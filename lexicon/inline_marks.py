@@ -158,7 +158,7 @@ def _pattern(emoticons: tuple[str, ...], left_out: frozenset[str] = frozenset())
     """All kinds of marks but some, each a group of its name; longer emoticons first."""
     longest = sorted(emoticons, key=len, reverse=True)
     written = "|".join(
-        f"{re.escape(one)}(?![\\w\\\\/])" if one[-1].isalnum() else f"{re.escape(one)}(?!\\w)" for one in longest
+        f"{re.escape(face)}(?![\\w\\\\/])" if face[-1].isalnum() else f"{re.escape(face)}(?!\\w)" for face in longest
     )
     kinds = {"own": OWN_MARK, "emoticon": rf"(?<![\w\\/])(?:{written})|{_GLUED.pattern}(?!\w)", **_KINDS}
     return re.compile("|".join(f"(?P<{kind}>{pattern})" for kind, pattern in kinds.items() if kind not in left_out))
@@ -373,12 +373,14 @@ class _Scanner:
 
     def _other_tag(self, match: "re.Match[str]", name: str) -> Part | None:
         """A tag without an effect here, or words between < and >."""
-        span, closing, attributes = match.span(), bool(match["closing"]), match["attributes"]
+        span, closing = match.span(), bool(match["closing"])
+        attributes = match["attributes"]
         shown = " ".join(match[0][:MAX_QUOTED_CHARACTERS].split())
         if name in _PASSED:
             is_noted = name in _UNFOLLOWED and not closing
             return Silent(*span, f"{shown} is followed within <speak> alone; its text is spoken" if is_noted else "")
-        before, after, words = self.tail[-1:], self._after(match.end())[:1], attributes.strip(" /")
+        before, after = self.tail[-1:], self._after(match.end())[:1]
+        words = attributes.strip(" /")
         wraps = self._is_first() or after.isalnum()  # not <name> in a letter
         if closing or "=" in attributes or match[0].endswith("/>") or (self._rules.is_model and wraps and not words):
             return Silent(*span, "" if closing else f"{shown} is no tag that is known; the text behind it is spoken")

@@ -1,4 +1,4 @@
-"""Where the styles and gestures of marks begin and end in the spoken text.
+"""Places in the spoken text from which and up to which the styles and gestures of marks apply.
 
 The style of a tag or an action applies to what follows it, up to the next one or the end of the paragraph; that of an
 emoji to the sentence in which it stands, or that it ends. What nothing follows in its paragraph belongs to the sentence

@@ -48,7 +48,7 @@ SKIN_TONES = MappingProxyType(dict.fromkeys(range(0x1F3FB, 0x1F400), ""))
 
 @dataclass(frozen=True, slots=True)
 class TextMark:
-    """What one mark shows: a style, a gesture at 0, seconds of a pause, and the word for which it may stand."""
+    """A mark and its meaning: a style, a gesture at 0, seconds of a pause, and the word for which it may stand."""
 
     mark: str
     kind: str

@@ -94,7 +94,9 @@ class _BlockReader:
         closing = re.compile(rf"^[ \t]{{0,12}}{re.escape(mark)}{re.escape(mark[0])}*[ \t]*(?:\n|\Z)", re.MULTILINE)
         found = closing.search(self._text, fence.end())
         end = found.end() if found else len(self._text)
-        start, self.at, self._goes_on = self.at, end, False
+        start = self.at
+        self.at = end
+        self._goes_on = False
         return Block(start, end, (Run(start, end, "end", PARAGRAPH_END),), is_whole=True, is_open=found is None)
 
     def _before(self, hidden: "re.Match[str]") -> Block:
@@ -215,7 +217,7 @@ def _row(text: str, start: int, end: int) -> Iterator[Run]:
 
 
 def _end_of_line(text: str, at: int) -> str:
-    """What ends an item or a row before a position: a sentence, or a paragraph before a blank line."""
+    """End of an item or a row before a position: of a sentence, or of a paragraph before a blank line."""
     return PARAGRAPH_END if text[at : _line_end(text, at)].isspace() else SENTENCE_END
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from lexicon.inline_marks import Cue, End, Own, Part, Rules, Silent, Text, read_blocks
 from lexicon.mark_cues import PlacedCue
 from lexicon.markdown import BLOCK_START, PARAGRAPH_END, Block
-from lexicon.marked_text import MarkedTextBuilder
+from lexicon.marked_text_builder import MarkedTextBuilder
 from lexicon.sentence_length import n_letters
 from lexicon.text_marks import PartReader
 
@@ -62,7 +62,11 @@ class SentenceCuts:
                 self._letters.append(total)
         self.spoken = builder.text_from(0)
         self._walked = (-1, 0, 0, 0)  # an entry, and its letters, characters and source up to the last cut
-        self._at, self._style, self._has_words, self._newlines = 0, style, False, 0  # of `style_at`
+        # of `style_at`
+        self._at = 0
+        self._style = style
+        self._has_words = False
+        self._newlines = 0
 
     @property
     def ends_block(self) -> bool:
@@ -89,7 +93,8 @@ class SentenceCuts:
 
     def _behind(self, number: int, place: int) -> int:
         """The cut behind a letter, over the marks that belong to it."""
-        cut, newlines, is_adjacent = place, 0, True
+        cut, newlines = place, 0
+        is_adjacent = True
         has_break = self._has_break_ahead(number, place)
         for at in range(number, len(self._entries)):
             entry = self._entries[at]
@@ -137,7 +142,8 @@ class SentenceCuts:
     def style_at(self, cut: int) -> str:
         """The style of the tag that applies at a cut, unless another one, or a paragraph, begins there."""
         self._follow_to(cut)
-        style, has_words, newlines = self._style, self._has_words, self._newlines
+        style = self._style
+        has_words, newlines = self._has_words, self._newlines
         for at in range(self._at, len(self._entries)):
             entry = self._entries[at]
             if _begins_style(entry.part):
@@ -188,7 +194,8 @@ class SentenceCuts:
             return part.end
         known, done, at, place = self._walked
         if known != number or done > letters:
-            done, at, place = 0, 0, part.start
+            done = at = 0
+            place = part.start
         while done < letters and at < len(said):
             character = said[at].casefold()
             at += 1

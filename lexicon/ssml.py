@@ -24,7 +24,8 @@ from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.inline_marks import Cue, Rules, Text, read_words
 from lexicon.mark_cues import PlacedCue, with_cues
 from lexicon.mark_table import MarkTable, shipped_marks
-from lexicon.marked_text import MAX_NESTING, GestureMark, MarkedText, MarkedTextBuilder, NameMark, PhoneMark
+from lexicon.marked_text import MAX_NESTING, GestureMark, MarkedText, NameMark, PhoneMark
+from lexicon.marked_text_builder import MarkedTextBuilder
 from lexicon.say_as import reads_kind, say_as
 from lexicon.ssml_leniency import (
     LANGUAGE,

@@ -4,7 +4,7 @@ Marks: ``[pause 0.4]``, ``[nod]`` and other gestures (`lexicon.gesture_marks`), 
 ``[phoneme:təˈmɑtoʊ]tomato[/phoneme]``; what people and language models write (`lexicon.inline_marks`), Markdown
 (`lexicon.markdown`), and words that are typed with emphasis (`lexicon.emphasis`). A mark that is not understood costs
 the mark, with a note, and no words. A further markup of texts: a function as those of `MARKUPS`, its row, and its name
-in `tts2face.request.MARKUPS`.
+in `tts2face.source_options.MARKUPS`.
 """
 
 import re
@@ -20,7 +20,8 @@ from lexicon.inline_marks import MAX_QUOTED_CHARACTERS, Cue, End, Own, Part, Rul
 from lexicon.mark_cues import PlacedCue, with_cues
 from lexicon.mark_table import MarkTable, shipped_marks
 from lexicon.markdown import PARAGRAPH_END
-from lexicon.marked_text import GestureMark, MarkedText, MarkedTextBuilder
+from lexicon.marked_text import GestureMark, MarkedText
+from lexicon.marked_text_builder import MarkedTextBuilder
 from lexicon.ssml import VoiceHz, _add_phonemes, parse_ssml, typical_hz
 
 USUAL_PAUSE_S = 0.7  # of [pause] without a number, as of a strong break in SSML
@@ -132,7 +133,8 @@ class PartReader:
     """
 
     def __init__(self, text: str, rules: Rules, builder: MarkedTextBuilder, *, has_emphasis: bool = True) -> None:
-        self._text, self._builder, self._has_pauses = text, builder, has_emphasis
+        self._text, self._builder = text, builder
+        self._has_pauses = has_emphasis
         self._emphases = [*find_emphases(text, rules.language)][::-1] if has_emphasis else []
         self.cues: list[PlacedCue] = []
 

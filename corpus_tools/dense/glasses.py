@@ -185,7 +185,7 @@ def _frame(face: Face, glasses: Glasses) -> tuple[FloatArray, NDArray[np.int64]]
     skin = face.vertices[part_vertices(face, ("skin",))].astype(np.float64)
     half = np.ptp(glasses.rims, axis=1).mean(axis=0) / 2
     tubes, inner, rims = [], [], _rims(face, half)
-    rims = {sign: rim + AHEAD * max(_sunk(skin, one) for one in rims.values()) for sign, rim in rims.items()}
+    rims = {sign: rim + AHEAD * max(_sunk(skin, either) for either in rims.values()) for sign, rim in rims.items()}
     for eye in sorted(face.eyes, key=lambda either: float(either.centre[0])):
         sign = float(np.sign(eye.centre[0]))
         rim = rims[sign]

@@ -36,7 +36,7 @@ def off_natural(hue: FloatArray) -> FloatArray:
 
 
 def below_hat(portrait: Portrait, hair: SeenHair, cast: FloatArray) -> SeenHair | None:
-    """What is seen of hair where the crown is a hat's, in light of a cast (2,); None if there is none.
+    """Visible hair where the crown is a hat's, in light of a cast (2,); None if there is none.
 
     The region stays, since a hat hides skin as hair does. Where it hides all hair the colour is the brows'.
     """

@@ -42,7 +42,7 @@ from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.lips.options import ExcludedToken, SynthesisOptions
 from tts2face.models.palette_editing import StyleMix
 from tts2face.picture.options import Picture
-from tts2face.request import FromPhones, FromSound, Idle, Listening, Recorded, Request, SourceOptions, Spoken
+from tts2face.request import FromPhones, FromSound, Idle, Listening, Recorded, Request, Spoken
 from tts2face.serving.batch.cast import Cast, Role
 from tts2face.serving.batch.lines import LineSettings
 from tts2face.serving.batch.options import BatchOptions
@@ -53,6 +53,7 @@ from tts2face.session.encoded_stream import StreamFormat
 from tts2face.session.named_models import Models
 from tts2face.session.performance import Performance
 from tts2face.session.project import Project
+from tts2face.source_options import SourceOptions
 from tts2face.types import Clip, Speech, Trajectory, Waveform, resting_head
 
 SPEECH = Speech(Waveform(np.zeros(800), 8000), PhoneSequence(["a"], [0.0, 0.1]), (WordSpan("a", 0, 1),))

@@ -21,10 +21,10 @@ from tts2face.lips.exemplar import build_exemplar_model, speech_trajectory
 from tts2face.models.landmarks import lip_opening, lip_width
 from tts2face.models.talker import Talker
 from tts2face.models.talker_file import load_talker
-from tts2face.request import AUDIO_MAP_NAMES, RECOGNISED
 from tts2face.session.recording import map_audio_to_motion
 from tts2face.sound.transcript import recognise_phones
 from tts2face.sound.voice_pool import load_voice
+from tts2face.source_options import AUDIO_MAP_NAMES, RECOGNISED
 from tts2face.storage.wave_files import wave_bytes
 from tts2face.types import Speech, frame_count
 

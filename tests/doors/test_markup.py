@@ -13,13 +13,14 @@ from lexicon.errors import InputError
 from tests.serving.service.in_process import TableProcess, service_client
 from tests.world import World
 from tts2face.processes.message import MORE, Message
-from tts2face.request import MARKUPS, Request
+from tts2face.request import Request
 from tts2face.serving.service.live import LiveTask
 from tts2face.serving.service.messages import Event, Work
 from tts2face.serving.service.routes.openai import Markup
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.session.project import Project
 from tts2face.session.project_file import load_project, save_project
+from tts2face.source_options import MARKUPS
 
 FRAGMENT = 'Bob <bell xml:id="x">may</bell> move &amp; <break time="1s"/> be away.'
 NOTE = "SSML, line 1: <bell> is not supported; its text is spoken"

@@ -12,21 +12,10 @@ import pytest
 from lexicon.errors import DataError, InputError
 from tests.world import ROOT, World
 from tts2face.numeric.kernels import CACHE_VARIABLE, FOLDER
-from tts2face.request import (
-    GESTURES,
-    LEAD_S,
-    OPTIONS,
-    SOURCE_OPTIONS,
-    TURN_S,
-    FromSound,
-    Idle,
-    Listening,
-    Recorded,
-    Request,
-    Spoken,
-)
+from tts2face.request import GESTURES, OPTIONS, TURN_S, FromSound, Idle, Listening, Recorded, Request, Spoken
 from tts2face.session.session import Session
 from tts2face.sound.voice_pool import VoicePool
+from tts2face.source_options import LEAD_S, SOURCE_OPTIONS
 from tts2face.types import Clip, concatenate_clips
 
 TEXT = "Bob may move. We were away."

@@ -8,7 +8,7 @@ from lexicon.errors import DataError, InputError
 from tts2face.gestures.elements import ExpressionSpan, Gesture
 from tts2face.models.palette import FEATURES
 from tts2face.request import Request
-from tts2face.session.prepared import build_request_timeline
+from tts2face.session.request_timeline import build_request_timeline
 
 PLAN = """{"style": {"all": "calm", "head": "cross"}, "nods": [{"time": 1}], "gains": {"head": 2, "jaw": 0.5},
 "expressions": [{"expression": "happy", "weight": 1, "start": 0, "end": 9}]}"""

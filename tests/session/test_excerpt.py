@@ -9,9 +9,10 @@ from lexicon.sentence_length import n_letters
 from lexicon.sequence import SILENCE
 from tests.tones import PHONE_S
 from tests.world import World
-from tts2face.request import LEAD_S, Request
+from tts2face.request import Request
 from tts2face.session.joining import CUT_SILENCE_S, Excerpt
 from tts2face.session.prepared import PreparedRequest, prepare
+from tts2face.source_options import LEAD_S
 
 PARTS = ("When Bob may move,", "the big maps", "are away. We were away.")
 

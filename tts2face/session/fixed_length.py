@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from lexicon.marked_text import MAX_PAUSE_S, PauseMark
 from lexicon.sequence import PhoneSequence
 from tts2face.numeric.arrays import smoothstep
-from tts2face.request import IDLE_LIMITS_S, LEAD_S, Idle, Listening, Recorded, Spoken
+from tts2face.request import Idle, Listening, Recorded, Spoken
 from tts2face.session.joining import silent_frames, with_length
 from tts2face.session.prepared import PreparedRequest, prepare
 from tts2face.session.speech_stream import Piece
+from tts2face.source_options import IDLE_LIMITS_S, LEAD_S
 from tts2face.types import Clip, Speech, first_sample
 
 EASE_S = 0.25  # from and to rest; a head turns back within a quarter of a second

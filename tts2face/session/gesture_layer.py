@@ -26,12 +26,13 @@ from tts2face.gestures.speech_plan import NO_PLAN, SpeechPlan, plan_speech
 from tts2face.gestures.stream import GestureFields, GestureStream, GestureValues
 from tts2face.gestures.timeline import Timeline, parse_style
 from tts2face.models.palette import Palette
-from tts2face.request import FIELDS, OPTIONS, SOURCE_OPTIONS
+from tts2face.request import FIELDS, OPTIONS
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.edits import ChannelEdits
 from tts2face.session.gesture_mouth import breath_of_gestures, mouth_gestures
 from tts2face.session.prepared import PreparedRequest, marked_styles
 from tts2face.session.speech_stream import Piece
+from tts2face.source_options import SOURCE_OPTIONS
 from tts2face.storage.memory import NO_MEMORY, ResultMemory
 from tts2face.types import Clip, Waveform, YieldTurn, keep_on
 

@@ -25,19 +25,19 @@ from lexicon.ssml_prosody import semitones_factor
 from lexicon.text_marks import parse_marks
 from lexicon.values.checks import check_limits
 from lexicon.values.files import is_file
-from tts2face.gestures.elements import ExpressionSpan, Gains, Gesture, ListeningSpan
-from tts2face.gestures.listening import CUE_RATE, cue_times, responses
-from tts2face.gestures.timeline import Timeline, parse_expressions, parse_gains, parse_style
-from tts2face.gestures.timeline_file import read_timeline
+from tts2face.gestures.elements import Gesture
+from tts2face.gestures.timeline import Timeline, parse_style
 from tts2face.lips.options import METHOD_OPTIONS, ExcludedToken, SynthesisOptions
 from tts2face.models.person import Person
 from tts2face.picture.options import Picture
-from tts2face.request import CAMERA, IDLE_LIMITS_S, Idle, Listening, Recorded, Request, Source, Spoken, option_fields
+from tts2face.request import Idle, Listening, Recorded, Request, Source, Spoken, option_fields
 from tts2face.session.corrections import SentenceEdges, StaleEdgesError
 from tts2face.session.joining import Excerpt
+from tts2face.session.request_timeline import build_request_timeline, listening_timeline
 from tts2face.sound.fitting import Fitting, fitting_voice
 from tts2face.sound.voice_pool import usual_pitch_hz
 from tts2face.sound.voice_urls import is_voice_url
+from tts2face.source_options import IDLE_LIMITS_S
 from tts2face.storage.output_paths import AnyPath
 from tts2face.types import exact_rate
 
@@ -47,8 +47,6 @@ if TYPE_CHECKING:
 HEARING_STEPS, RECORDING_STEPS = 300, 700  # steps of progress of a recording: until its phones are known, and then
 IDLE_STEPS = 1000  # steps of progress of idle animation
 SILENT_S = 0.5  # of a text without words, as of the pause behind a sentence
-OF_VIDEO = "video"  # expression of the person in the video of a recording
-SMILE_S = 10.0  # of its beginning are read
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -324,10 +322,7 @@ def _has_style(names: Sequence[str], written: str) -> bool:
 def with_styles_of(prepared: PreparedRequest, names: Sequence[str]) -> PreparedRequest:
     """A request whose marks name styles of a palette, and not those of a speech service that are none of it.
 
-    Raises
-    ------
-    InputError
-        The user's table of marks names a style that the palette lacks.
+    A style of the user's table of marks that the palette lacks is an `InputError`.
     """
     text, path = prepared.text, prepared.request.text_marks
     wrong = [style for style in sorted(read_marks_table(path).own_styles) if not _has_style(names, style)]
@@ -372,54 +367,3 @@ def check_marks(text: MarkedText, request: Request) -> None:
 def _primary(language: str) -> str:
     """Primary language of a code: ``en`` of ``en-gb``."""
     return language.partition("-")[0]
-
-
-def build_request_timeline(request: Request) -> Timeline:
-    """Timeline of a request's ``timeline`` file, overridden by its ``style``, ``gain`` and ``expression``."""
-    flags = Timeline(
-        style=parse_style(request.style) if request.style is not None else {},
-        expressions=_expressions(request),
-        gains=_gains(request),
-    )
-    return read_timeline(request.timeline).merge(flags) if request.timeline is not None else flags
-
-
-def _expressions(request: Request) -> tuple[ExpressionSpan, ...]:
-    if request.expression is None:
-        return ()
-    if request.expression.strip() != OF_VIDEO:
-        return parse_expressions(request.expression)
-    source = request.source
-    if not isinstance(source, Recorded):
-        raise InputError("--expression video needs a recording with pictures of the person; add --audio clip.mp4")
-    from tts2face.lips.performer import held_smile, smile_weight
-    from tts2face.video.blendshapes import BlendshapeReader
-    from tts2face.video.streaming import StreamingTracker
-    from tts2face.video.take import read_take
-
-    take = read_take(source.audio, StreamingTracker(), BlendshapeReader(), seconds=SMILE_S)
-    smile = held_smile(take.scores)
-    return (ExpressionSpan("happy", smile_weight(smile)),) if smile else ()
-
-
-def _gains(request: Request) -> Gains:
-    gains = parse_gains(request.gain) if request.gain is not None else Gains()
-    if request.gaze != CAMERA:
-        return gains
-    if "gaze" in gains.factors:
-        raise InputError("--gain of the gaze has no effect with --gaze camera; remove one of them")
-    return Gains({**gains.factors, "gaze": 0.0})
-
-
-def listening_timeline(request: Request) -> Timeline:
-    """Motion of the face while it listens; what is heard of a partner gives the responses."""
-    source = request.source
-    if not isinstance(source, Listening):
-        return Timeline()
-    span = ListeningSpan(0.0, source.seconds, reacts=source.partner is None)
-    cues: list[float] = []
-    if source.partner is not None:
-        from tts2face.video.media import read_sound
-
-        cues = [time for time in cue_times(read_sound(source.partner, CUE_RATE)) if time < source.seconds]
-    return responses(cues, request.known_seed).merge(Timeline(listens=(span,)))

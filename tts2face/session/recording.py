@@ -20,12 +20,12 @@ from tts2face.lips.explanation import PhoneExplanation
 from tts2face.models.audio_map import AudioMap
 from tts2face.models.talker import Talker, speech_channels
 from tts2face.numeric.arrays import interpolate_cubic
-from tts2face.request import RECOGNISED
 from tts2face.sound.alignment import TextMismatch
 from tts2face.sound.features import FEATURE_RATE
 from tts2face.sound.listener import StreamingFeatures
 from tts2face.sound.pauses import speech_level
 from tts2face.sound.transcript import align_recording, pronounce_transcript, recognise_phones
+from tts2face.source_options import RECOGNISED
 from tts2face.types import (
     SOUND_RATE,
     Clip,

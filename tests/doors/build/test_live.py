@@ -9,7 +9,7 @@ from cli.main import run
 from tests.corpus_tools.films import join_clips
 from tts2face.lips.performer import build_performer_retargeter
 from tts2face.models.face_loading import load_face
-from tts2face.session.live import CALIBRATION_S, LiveCapture, LivePose, track_poses
+from tts2face.session.live_capture import CALIBRATION_S, LiveCapture, LivePose, track_poses
 from tts2face.video.blendshapes import BlendshapeReader
 from tts2face.video.media import TimedFrame, read_frames
 from tts2face.video.streaming import StreamingTracker

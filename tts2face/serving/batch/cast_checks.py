@@ -10,11 +10,12 @@ from tts2face.articulation import NATURAL, parse_articulation
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_names import BALD
 from tts2face.models.palette_file import load_palette
-from tts2face.request import AUTO, OWN_FACE
+from tts2face.request import OWN_FACE
 from tts2face.session.catalogue import identities
 from tts2face.session.named_models import Models
 from tts2face.sound.voice_pool import find_voice
 from tts2face.sound.voice_urls import is_voice_url
+from tts2face.source_options import AUTO
 
 
 def check_names(models: Models, request: Mapping[str, Any]) -> None:

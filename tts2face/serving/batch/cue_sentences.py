@@ -10,6 +10,7 @@ from lexicon.text_marks import is_ssml
 from tts2face.serving.batch.windows import Window
 
 MAX_GAP_S = 1.0  # between the cues of a sentence
+PUNCTUATED_SHARE = 0.4  # of the cues of a file that end a sentence: then a missing end mark means something
 _CLOSING = "\"'”’»)]"
 _ENDS = re.compile(r"[.!?…。！？｡।:;]$")
 _DOTS = re.compile(r"(?:\.{2,}|…)$")
@@ -52,6 +53,11 @@ def continues(text: str, following: str, language: str = "en-us", *, is_in_capit
 def has_end_mark(text: str) -> bool:
     """Whether a cue ends with a mark of sentences' ends, if only with the full stop of an abbreviation."""
     return _ENDS.search(_end(text)) is not None
+
+
+def is_punctuated(texts: Sequence[str]) -> bool:
+    """Whether so many cues of a file have end marks that one without goes on in the next."""
+    return sum(map(has_end_mark, texts)) >= PUNCTUATED_SHARE * len(texts)
 
 
 def _end(text: str) -> str:

@@ -11,12 +11,12 @@ from lexicon.errors import DataError, InputError
 from lexicon.sentence_length import n_letters
 from tts2face.interchange.exports.table import batch_format
 from tts2face.interchange.subtitles.cues import Cue
-from tts2face.request import IDLE_LIMITS_S, ONLY_SPOKEN, SOURCE_OPTIONS, Request
+from tts2face.request import ONLY_SPOKEN, Request
 from tts2face.serving.batch.cast import Cast
 from tts2face.serving.batch.cast_checks import check_names
 from tts2face.serving.batch.content_address import file_hash
 from tts2face.serving.batch.cue_file import left_out_cues, read_cue_file
-from tts2face.serving.batch.cue_sentences import MAX_GAP_S, has_end_mark, sentence_groups, spoken_part
+from tts2face.serving.batch.cue_sentences import MAX_GAP_S, is_punctuated, sentence_groups, spoken_part
 from tts2face.serving.batch.export import check_faces
 from tts2face.serving.batch.lines import Lines
 from tts2face.serving.batch.options import REPORT, BatchOptions, non_defaults
@@ -27,12 +27,12 @@ from tts2face.serving.batch.speakers import Speakers
 from tts2face.serving.batch.windows import Window, cue_lines, cue_windows, scenes
 from tts2face.session.named_models import Models
 from tts2face.session.prepared import prepare
+from tts2face.source_options import IDLE_LIMITS_S, SOURCE_OPTIONS
 from tts2face.types import SOUND_RATE, exact_rate, first_sample
 
 MAX_IDLE_S = 20.0  # of one segment of silence
 MARGIN_S = 0.5  # around a cue, for speech of a dubbing track that begins early or ends late; half of shorter gaps
 NOT_WHEN_SILENT = {*SOURCE_OPTIONS, "dictionary", "text_marks", "language"}
-PUNCTUATED_SHARE = 0.4  # of the cues of a file in capitals that end a sentence: then a missing end mark means something
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,8 +198,7 @@ class FilePlan:
     def _find_sentences(self, windows: Sequence[Window]) -> None:
         """Note the sentences that run over several cues."""
         gap = round(MAX_GAP_S * float(exact_rate(self.base.request.fps)))
-        ends = sum(has_end_mark(window.cue.text) for window in windows)
-        is_open = self._is_in_capitals and ends >= PUNCTUATED_SHARE * len(windows)
+        is_open = self._is_in_capitals and is_punctuated([window.cue.text for window in windows])
         keys = [None if window.part else self._who(window) for window in windows]
         languages = [self._language(window) for window in windows]
         for group in sentence_groups(windows, keys, gap, languages, is_in_capitals=is_open):

@@ -11,7 +11,8 @@ from tts2face.interchange.exports.table import batch_format
 from tts2face.interchange.subtitles.film_track import Film
 from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.option import option
-from tts2face.request import AUTO_MARKUP, option_fields
+from tts2face.request import option_fields
+from tts2face.source_options import AUTO_MARKUP
 
 MOVIE_FORMATS = ("mp4", "webm", "mov", "none")
 CLIP_UNITS = ("cue", "scene", "file", "film")

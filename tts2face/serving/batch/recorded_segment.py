@@ -10,11 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from lexicon.errors import DataError
-from tts2face.request import IDLE_LIMITS_S, FromPhones, Idle, Recorded, Request, Spoken
+from tts2face.request import FromPhones, Idle, Recorded, Request, Spoken
 from tts2face.serving.batch.audio_track import open_track
 from tts2face.serving.batch.segment import Segment
 from tts2face.session.session import Session
 from tts2face.sound.pauses import speech_onset
+from tts2face.source_options import IDLE_LIMITS_S
 from tts2face.types import SOUND_RATE, Waveform, exact_rate, first_sample
 
 ONSET_S = 60  # of a recording of a cue, within which its first sound lies

@@ -9,13 +9,14 @@ from lexicon.errors import InputError
 from lexicon.languages import language_code
 from tts2face.interchange.subtitles.cues import Cue
 from tts2face.models.person import seed_of
-from tts2face.request import AUTO, DRAWN_FACE, Request
+from tts2face.request import DRAWN_FACE, Request
 from tts2face.serving.batch.cast import MODEL_NAMES, REQUEST_NAMES, SILENT, Cast, Role
 from tts2face.serving.batch.lines import NO_SETTINGS, Lines, LineSettings
 from tts2face.session.named_models import Models
 from tts2face.sound.fitting import Fitting, fitting_voice
 from tts2face.sound.shipped_voices import SHIPPED_VOICES
 from tts2face.sound.voice_pool import find_voice, has_voice, is_installed, speaks
+from tts2face.source_options import AUTO
 
 UNNAMED = "(no name)"
 # Shipped faces of other speakers, by the sex of their voices.

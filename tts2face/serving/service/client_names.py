@@ -18,7 +18,6 @@ from lexicon.languages import language_code
 from lexicon.marked_text import RATE_LIMITS
 from lexicon.spoken_words import reading_notes
 from lexicon.text_language import guess_language
-from tts2face.request import AUTO, AUTO_MARKUP
 from tts2face.serving.service.clip_options import check_voice, resolve_models
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
@@ -29,6 +28,7 @@ from tts2face.session import catalogue
 from tts2face.session.named_models import Models
 from tts2face.sound.fitting import FORMANT_SYNTHESIS, fitting_voice
 from tts2face.sound.voice_pool import find_voice
+from tts2face.source_options import AUTO, AUTO_MARKUP
 
 ADJUSTED = "X-Tts2face-Adjusted"
 FEMALE, MALE = "female", "male"

@@ -18,7 +18,7 @@ from lexicon.errors import InputError
 from tts2face.models.face_names import default_face
 from tts2face.models.named_colours import parse_hair_colour
 from tts2face.picture.options import AUTO_SIZE, BLUR, COLOURS, STUDIO, TRANSPARENT, Picture, parse_size
-from tts2face.request import AUTO, OWN_FACE, Request, option_fields
+from tts2face.request import OWN_FACE, Request, option_fields
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.library import Library, shipped_names
@@ -26,6 +26,7 @@ from tts2face.serving.work.resource_check import DICTIONARY, FACE
 from tts2face.session import catalogue
 from tts2face.session.encoded_stream import media_types
 from tts2face.session.named_models import Models
+from tts2face.source_options import AUTO
 
 if TYPE_CHECKING:
     from tts2face.serving.service.state import ServiceState

@@ -71,7 +71,7 @@ def follow(call: Call) -> dict[str, Any]:
         The landmark models or a package are missing.
     """
     from tts2face.models.face_loading import load_face
-    from tts2face.session.live import CALIBRATION_S, track_poses
+    from tts2face.session.live_capture import CALIBRATION_S, track_poses
     from tts2face.video.blendshapes import BlendshapeReader
     from tts2face.video.tracking import FaceTracker
 

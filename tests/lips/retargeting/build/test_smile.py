@@ -7,7 +7,7 @@ import pytest
 import tts2face
 from lexicon.errors import DataError, InputError
 from tts2face.request import Request
-from tts2face.session.prepared import build_request_timeline
+from tts2face.session.request_timeline import build_request_timeline
 
 TEXT = "We were away."
 

@@ -13,7 +13,6 @@ from starlette.datastructures import FormData
 
 from lexicon.g2p import DEFAULT_LANGUAGE
 from tts2face.picture.streamed_movie import MOVIE_KINDS
-from tts2face.request import AUTO
 from tts2face.serving.service.client_names import Adjustments
 from tts2face.serving.service.clip_options import ClipRequest, divide_options
 from tts2face.serving.service.errors import RefusedError
@@ -22,6 +21,7 @@ from tts2face.serving.service.state import service_state
 from tts2face.serving.service.uploads import MAX_TEXT_BYTES, UploadFolder, upload_folder
 from tts2face.session.encoded_stream import media_types
 from tts2face.session.named_models import Models
+from tts2face.source_options import AUTO
 
 router = APIRouter(prefix="/v1", tags=["clips"])
 FILES = ("audio", "background", "partner", "timeline")

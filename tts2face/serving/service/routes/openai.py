@@ -41,7 +41,7 @@ SoundFormat = Literal["mp3", "opus", "aac", "flac", "wav", "pcm", "weba"]
 Format = Literal[
     "mp3", "opus", "aac", "flac", "wav", "pcm", "weba", "mp4", "webm", "glb", "jsonl", "curves", "oculus", "azure"
 ]
-Markup = Literal["auto", "plain", "ssml", "llm"]  # as `tts2face.request.MARKUPS`
+Markup = Literal["auto", "plain", "ssml", "llm"]  # as `tts2face.source_options.MARKUPS`
 TimeName = Literal["word", "phone"]
 LISTS: Mapping[str, str] = MappingProxyType({"word": "words", "phone": "phones"})  # in answers, by what has times
 

@@ -5,13 +5,14 @@ from typing import Any
 
 from nicegui import ui
 
-from tts2face.request import GESTURES, MARKUPS, OWN_FACE, Recorded
+from tts2face.request import GESTURES, OWN_FACE, Recorded
 from tts2face.serving.studio.pages import character_dialog
 from tts2face.serving.studio.pages.choices import appearance, languages, models, voices
 from tts2face.serving.studio.pages.frame import heading
 from tts2face.serving.studio.pages.open_page import OpenPage
 from tts2face.serving.studio.pages.photo_dialog import TITLE, PhotoDialog, may_make_faces
 from tts2face.serving.work.resource_check import FACE, PALETTE, TALKER
+from tts2face.source_options import MARKUPS
 
 APPEARANCE = {"identity": "Identity", "hair": "Hair", "hair_color": "Hair colour"}  # of a face, with their labels
 TYPING_MS = 350  # of rest after which a text is spoken
