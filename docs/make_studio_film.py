@@ -305,7 +305,7 @@ def add_curves(studio: httpx.Client, number: str, tab: str = "") -> None:
         {"kind": "paint", "feature": "brows", "style": "exaggerated", "start": 0.8, "end": 2.9},
         {"kind": "paint", "feature": "head", "style": "delighted", "start": 1.9, "end": 3.6},
         {"kind": "curve", "expression": "happy", "keys": [[0.2, 0], [1.2, 0.6], [2.4, 0.2], [3.4, 0.7], [3.9, 0]]},
-        {"kind": "nod", "time": 1.45, "size": 1.0},
+        {"kind": "gesture", "name": "nod", "time": 1.45, "size": 1.0},
         {"kind": "gaze", "start": 2.2, "end": 2.9, "down_deg": 4, "left_deg": 12},
         {"kind": "channel", "channel": "jawOpen", "keys": [[0.9, 0], [1.1, 0.12], [1.3, 0]]},
     )

@@ -69,7 +69,7 @@ def test_marks_are_found_where_a_voice_divides_words_otherwise() -> None:
     ("language", "text", "word", "mark"),
     [
         ("en-us", "He came home; she had left.", 2, ";"),
-        ("de", "Er kam um 7.30 Uhr – sie war weg.", 4, "—"),
+        ("de", "Er kam um 7.30 Uhr – sie war weg.", 5, "—"),
         ("fr-fr", "Il est venu, elle est partie.", 2, ","),
         ("ru", "Он пришёл… и ушёл.", 1, "…"),
     ],

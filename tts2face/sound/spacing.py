@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lexicon.normalize import spoken_form
 from lexicon.pauses import MARKS, PAUSES_S
 from lexicon.sequence import SILENCE, PhoneSequence, enforce_increasing
 from lexicon.written_words import written_words
@@ -85,7 +86,7 @@ def _marks(speech: Speech, content: SpeechInput, language: str) -> list[str]:
     if language.partition("-")[0] == "en":
         known = [(word.text, word.mark) for word in pronounce_content(content, language, {})]
     else:
-        known = [(word.text, word.mark) for word in written_words(written, language)]
+        known = [(word.text, word.mark) for word in written_words(spoken_form(written, language), language)]
     spoken = [word.text.lower() for word in speech.words]
     if len(known) == len(spoken):
         return [mark for _, mark in known[:-1]]
