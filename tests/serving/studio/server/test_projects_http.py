@@ -102,9 +102,9 @@ def test_a_shorter_text_cuts_the_timeline(studio: httpx.Client, number: str) -> 
 
 def test_what_is_wrong_is_said_and_the_last_clip_stays(studio: httpx.Client, number: str) -> None:
     before, *_ = preview(studio, number)
-    edit(studio, number, {"kind": "request", "options": {"text": "..."}})
+    edit(studio, number, {"kind": "request", "options": {"text": "<speak>Hello"}})
     header, *_ = preview(studio, number)
-    assert "there is nothing to say" in header["error"]
+    assert "the SSML is not well-formed" in header["error"]
     assert header["n_frames"] == before["n_frames"]
 
 
