@@ -93,11 +93,6 @@ def read_path(m: re.Match[str], _: str) -> str:
     return dots + address_words(written.removeprefix("." if dots else ""))
 
 
-def read_file(m: re.Match[str], _: str) -> str:
-    """main.py is main dot P Y."""
-    return address_words(m.group())
-
-
 def read_hashtag(m: re.Match[str], _: str) -> str:
     """#MachineLearning2024 is hashtag machine learning twenty twenty-four, #nofilter hashtag no filter."""
     words = " ".join(

@@ -17,7 +17,6 @@ ELEMENTS = word_set(
 _ANIONS = word_set("Cl Br F I O S OH CN H N As Se Te P Cl-")
 _PART = re.compile(r"([A-Z][a-z]?)([0-9]{0,3})")
 STAND_INS = {FACTORIAL: "factorial", MINUS: "minus", RANGE: "to", BACKSLASH: "backslash", HOME: "tilde", OVER: "over"}
-CHEMICAL = r"(?:[A-Z][a-z]?[0-9]{0,3}){1,12}(?:[0-9]?[+∸](?![\w+]))?(?![\w'-])"
 _SYMBOLS_AFTER = re.compile(r" ?(?:long|wide|tall|high|deep|thick|across|by|x|×|of|in|from|and|or|to)\b|[.,;:!?]|\s*\Z")
 
 

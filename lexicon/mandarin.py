@@ -11,7 +11,6 @@ import functools
 from importlib import resources
 from typing import Any, NamedTuple
 
-_NEVER = "-"
 _NEUTRAL = "5"
 
 

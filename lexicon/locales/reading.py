@@ -48,11 +48,6 @@ def _plain_text(text: str) -> tuple[str, Sequence[int]]:
     return "".join(letters), (*places, len(text))
 
 
-def has_table(language: str) -> bool:
-    """Whether the numbers, abbreviations and signs of a language are read by its table."""
-    return find_locale(language) is not None
-
-
 def read_forms(text: str, language: str) -> list[WrittenForm]:
     """Parts of a text with their spoken forms; written forms without blanks, and what is between them as it is.
 

@@ -17,7 +17,6 @@ from lexicon.marked_text import GestureMark
 from lexicon.moods import is_auto
 from lexicon.pauses import pause_behind
 from lexicon.spoken_words import reading_notes
-from lexicon.ssml_leniency import nearest_style
 from lexicon.text_marks import parse_marks
 from tts2face.gestures.elements import ListeningSpan
 from tts2face.gestures.listening import LASTS_S, responses
@@ -26,7 +25,7 @@ from tts2face.models.talker import speech_channels
 from tts2face.request import Idle, Listening, Request, Spoken
 from tts2face.session.joining import END_S, JOIN_LEAD_S
 from tts2face.session.live_gestures import WaitingGestures
-from tts2face.session.prepared import PreparedRequest, prepare, unknown_styles
+from tts2face.session.prepared import PreparedRequest, palette_style, prepare, unknown_styles
 from tts2face.session.recording import select_audio_map
 from tts2face.session.shared_models import SessionModels
 from tts2face.session.speech_stream import Piece, after_listening
@@ -219,7 +218,7 @@ class LiveSpeech:
             There is no such style.
         """
         names = self._models.palette.names if self._models.palette is not None else ()
-        style = style if style in names else nearest_style(style) or style
+        style = palette_style(names, style)
         if self._layer is not None:
             self._layer.change_style(None if is_auto(style) else style)
         self._request, self._silent = (replace(request, style=style) for request in (self._request, self._silent))

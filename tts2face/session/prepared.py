@@ -308,6 +308,11 @@ def marked_styles(text: MarkedText) -> tuple[str, ...]:
     return tuple(dict.fromkeys(style for styles in runs for style in innermost_styles(styles).values()))
 
 
+def palette_style(names: Sequence[str], written: str) -> str:
+    """Style of a palette with these names for which a written one stands; the written one if it stands for none."""
+    return written if written in names else nearest_style(written) or written
+
+
 def unknown_styles(text: MarkedText, names: Sequence[str]) -> tuple[str, ...]:
     """Styles in the marks of a text that a palette with these names lacks, and that stand for none of it."""
     used = dict.fromkeys(name for run in text.runs for name in run.styles)
@@ -329,7 +334,7 @@ def with_styles_of(prepared: PreparedRequest, names: Sequence[str]) -> PreparedR
     if wrong:
         raise InputError(f"{path}: there is no style {wrong[0][:40]!r} in the palette; it has {', '.join(names)}")
     used = {name for run in text.runs for name in run.styles}
-    nearest = {name: name if name in names else nearest_style(name) or name for name in used}
+    nearest = {name: palette_style(names, name) for name in used}
     known = {name: near for name, near in nearest.items() if near in names or name not in text.foreign_styles}
     runs = [replace(run, styles=tuple(known[name] for name in run.styles if name in known)) for run in text.runs]
     return replace(prepared, text=replace(text, runs=tuple(runs)))
