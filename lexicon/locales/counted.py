@@ -8,10 +8,15 @@ from lexicon.locales.tables import Locale, Row
 _MAGNITUDE_DIGITS = "1000000"  # the noun behind a million is that behind its digits
 
 
-def read_measure(place: Place) -> str:
-    """Number with a unit, perhaps per another one (5 km/h), and with an ending of the language (kg'lık)."""
+def read_measure(place: Place) -> str | None:
+    """Number with a unit, perhaps per another one (5 km/h), and with an ending of the language (kg'lık).
+
+    None where the unit is rather a word (3 in Berlin) or the end of a quotation.
+    """
     locale, grammar = place.locale, place.grammar("cardinal")
     row = locale.rows("unit")[place.match["unit"]]
+    if ("last" in row.details and place.after) or ("quote" in row.details and place.is_quoted):
+        return None
     said = _magnified(place, row, grammar.case) if place.match["magnitude"] else ""
     said = said or count(locale, place.amount("amount"), row, grammar.case)
     if place.match["per"]:

@@ -11,6 +11,7 @@ from lexicon.locales.tables import Locale
 _LAST_WORD = re.compile(r"([^\W\d_]+)[.'’]?\s?[(\"«„“]?\Z")
 _NEXT_WORD = re.compile(r"\s?([^\W\d_]+)")
 _CONTEXT = 40  # characters around a form that its readers search
+_QUOTATION = 300  # characters of a quotation, at most
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +40,13 @@ class Place:
     def is_last(self) -> bool:
         """Whether nothing but marks follows."""
         return not self.text[self.match.end() : self.match.end() + _CONTEXT].strip(" \n\"'»”“)")
+
+    @property
+    def is_quoted(self) -> bool:
+        """Whether the last straight quotation mark before the form opens a quotation."""
+        start = self.match.start()
+        mark = self.text.rfind('"', max(start - _QUOTATION, 0), start)
+        return mark >= 0 and (mark == 0 or not (self.text[mark - 1].isalnum() or self.text[mark - 1] in ".,!?…"))
 
     def grammar(self, kind: str) -> Grammar:
         """Gender and case that the word before requires of a kind of number."""

@@ -153,8 +153,9 @@ def _parts(locale: Locale) -> dict[str, str]:
     amount, letter = amount_pattern(locale), _letter(locale)
     of, year_words = locale.setting("date_of"), locale.setting("year_words")
     named = {name.replace("_", " "): locale.setting(name) for name in ("hour_sign", "time_words", "day_ending")}
-    named |= {kind: alternatives(locale, kind) for kind in ("unit", "magnitude", "currency", "suffix")}
+    named |= {kind: alternatives(locale, kind) for kind in ("unit", "currency", "suffix")}
     return named | {
+        "magnitude": alternatives(locale, "magnitude") + rf"(?!(?<=[{_LATIN}])[{_LATIN}])",  # 3 MW are no millions
         "amount": amount,
         "signed": rf"(?P<amount>(?:[-+]|± ?)?{amount})",
         "letter": letter,

@@ -10,7 +10,10 @@ fix          pattern and replacement in words of numbers that CLDR misspells
 ordinal      ordinals that CLDR lacks, in the masculine nominative; ``inflection`` has endings by gender and case
 case         gender or case that a word requires of the number behind it; details: of which kind of number
 gender       endings of nouns, longest first, and whole nouns (with a caret) of a gender
-unit         unit or noun behind a number; ``{}`` is the number where it does not come first
+unit         unit or noun behind a number; ``{}`` is the number where it does not come first; details: ``alone`` (also
+             without a number), ``last`` (only where no word follows, because it is itself a word), ``quote`` (not
+             where it closes a quotation), ``si=`` signs of its prefixes
+prefix       SI prefix of units
 magnitude    thousand, million and so on behind a number
 currency     currency; details ``cents=`` have its hundredth part
 month        number of a month: its name in dates, and written forms in details
@@ -32,12 +35,15 @@ numeral      words of numbers of which CLDR has no grammatical forms
 
 import functools
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from types import MappingProxyType
 
 COLUMNS = 4
+_LIKE_NO_WORD = re.compile("[a-z][A-ZΩ]|[µμ]")  # kHz, mA, but not mm, MB or Pa
+_NO_FORMS = frozenset({"alone", "last", "quote", "gender", "si"})  # details that are no forms of the noun in a case
+_BEFORE_NOUN = re.compile(r"=|.*\{\} ?")  # a form that holds its number, or has it before the noun
 _NO_ROWS: Mapping[str, "Row"] = MappingProxyType({})
 
 
@@ -86,6 +92,7 @@ def find_locale(language: str) -> Locale | None:
     for name in dict.fromkeys((code.partition("-x-")[0], code)):
         for kind, rows in (_read(name) or {}).items() if name != primary else ():
             kinds[kind] = {**kinds.get(kind, {}), **rows}
+    kinds["unit"] = {**dict(_prefixed_units(kinds)), **kinds.get("unit", {})}
     kinds["word"] = {**_loan_words(primary), **kinds.get("word", {})}
     return Locale(language, MappingProxyType({kind: MappingProxyType(rows) for kind, rows in kinds.items()}))
 
@@ -101,6 +108,32 @@ def _read(name: str) -> dict[str, dict[str, Row]] | None:
         for form in [written] if kind in {"fix", "form"} or len(written) == 1 else written.split("|"):
             kinds.setdefault(kind, {})[form] = row
     return kinds
+
+
+def _prefixed_units(kinds: Mapping[str, Mapping[str, Row]]) -> Iterator[tuple[str, Row]]:
+    """Units with their SI prefixes (kΩ, mA); one that no word looks like is read without a number, too."""
+    prefixes = kinds.get("prefix", _NO_ROWS)
+    for written, row in kinds.get("unit", _NO_ROWS).items():
+        for sign, prefix in prefixes.items():
+            if prefix.details.get("sign", sign) in row.details.get("si", ""):
+                details = {
+                    name: value if name in _NO_FORMS else _with_prefix(prefix.spoken, value)
+                    for name, value in row.details.items()
+                }
+                alone = {"alone": "alone"} if _LIKE_NO_WORD.match(sign + written) else {}
+                spoken = _with_prefix(prefix.spoken, row.spoken)
+                yield sign + written, Row(spoken, MappingProxyType(details | alone))
+
+
+def _with_prefix(prefix: str, forms: str) -> str:
+    """Forms of a unit behind a prefix; where nouns have capitals, the prefix has it (Kiloohm)."""
+    found = []
+    for form in forms.split("|"):
+        lead = _BEFORE_NOUN.match(form)
+        at = lead.end() if lead else 0
+        noun = form[at].lower() + form[at + 1 :] if prefix[0].isupper() else form[at:]
+        found.append(form[:at] + prefix + noun)
+    return "|".join(found)
 
 
 def _loan_words(language: str) -> dict[str, Row]:
