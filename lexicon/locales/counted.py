@@ -1,6 +1,6 @@
 """Readers of numbers with what they count: measures, money, ranges, fractions, ordinals, telephone numbers."""
 
-from lexicon.locales.nouns import behind, count, gender_of, noun_form
+from lexicon.locales.nouns import behind, count, gender_of, is_plural, noun_form
 from lexicon.locales.numbers import Amount, Grammar, is_round_million, number, ordinal, whole, year
 from lexicon.locales.place import Place, read_amount
 from lexicon.locales.tables import Locale, Row
@@ -95,7 +95,8 @@ def read_number(place: Place) -> str:
     amount = place.amount("amount")
     noun = noun_behind(place)
     agrees = noun and (amount.is_one or not locale.setting("only_one_agrees"))
-    gender = grammar.gender or ((gender_of(locale, noun) or locale.setting("default_gender")) if agrees else "")
+    own = gender_of(locale, noun, plural=is_plural(locale, amount)) if agrees else ""
+    gender = grammar.gender or own or (locale.setting("default_gender") if agrees else "")
     if amount.sign or amount.decimals or not written.isdigit():
         said = number(locale, amount, Grammar(gender, grammar.case))
     else:

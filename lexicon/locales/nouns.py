@@ -73,8 +73,13 @@ def noun_form(locale: Locale, row: Row, amount: Amount, case: str = "") -> str:
     return forms[min(category, len(forms) - 1)]
 
 
-def gender_of(locale: Locale, word: str) -> str:
-    """Gender of a noun by its ending; empty where the language does not tell."""
+def is_plural(locale: Locale, amount: Amount) -> bool:
+    """Whether the noun behind a number has another form than behind one."""
+    return PLURALS[locale.setting("plural", "one")](amount) > 0
+
+
+def gender_of(locale: Locale, word: str, *, plural: bool = False) -> str:
+    """Gender of a noun by its ending, of one or of several; empty where the language does not tell."""
     small = word.lower().split(" ")[0]
     rows = locale.rows("gender")
     whole = rows.get("^" + small)
@@ -83,7 +88,7 @@ def gender_of(locale: Locale, word: str) -> str:
     for length in range(min(len(small), 7), 0, -1):
         row = rows.get(small[-length:])
         if row is not None:
-            return row.spoken
+            return row.details.get("plural", row.spoken) if plural else row.spoken
     return ""
 
 

@@ -9,7 +9,8 @@ rule         rule set of CLDR by kind, gender and case (``cardinal f genitive``)
 fix          pattern and replacement in words of numbers that CLDR misspells
 ordinal      ordinals that CLDR lacks, in the masculine nominative; ``inflection`` has endings by gender and case
 case         gender or case that a word requires of the number behind it; details: of which kind of number
-gender       endings of nouns, longest first, and whole nouns (with a caret) of a gender
+gender       endings of nouns, longest first, and whole nouns (with a caret) of a gender; details: ``plural``, the
+             gender of plurals with this ending
 unit         unit or noun behind a number; ``{}`` is the number where it does not come first; details: ``alone`` (also
              without a number), ``last`` (only where no word follows, because it is itself a word), ``quote`` (not
              where it closes a quotation), ``si=`` signs of its prefixes
