@@ -31,13 +31,20 @@ def read_named_telephone(place: Place) -> str | None:
 
 
 def read_version(place: Place) -> str | None:
-    """Numbers with points between them: 1.2.3, 192.168.0.1, 3.11; None for a number in groups."""
+    """Numbers with points between them: 1.2.3, 192.168.0.1, 3.11; None for a number in groups.
+
+    Of two, the second one is read as decimals are, unless a word for a version is before them.
+    """
     locale = place.locale
     if re.fullmatch(amount_pattern(locale), place.match.group()):
         return None
     join = locale.setting("join", " ")
     dot = join + locale.setting("dot", locale.setting("point")) + join
-    return dot.join(whole(locale, part) for part in place.match.group().split("."))
+    parts = place.match.group().split(".")
+    if len(parts) == 2 and place.before.lower() not in locale.words("version_words"):
+        most = int(locale.setting("decimals", "0"))
+        return dot.join([whole(locale, parts[0]), (whole if len(parts[1]) <= most else digits)(locale, parts[1])])
+    return dot.join(whole(locale, part) for part in parts)
 
 
 def read_score(place: Place) -> str:

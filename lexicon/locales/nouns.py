@@ -94,7 +94,8 @@ def gender_of(locale: Locale, word: str, *, plural: bool = False) -> str:
 
 def count(locale: Locale, amount: Amount, row: Row, case: str = "") -> str:
     """A number with its noun: trois kilomètres, un million de kilomètres, yüzde yirmi."""
-    said = number(locale, amount, Grammar(row.details.get("gender") or gender_of(locale, row.forms[0]), case))
+    gender = row.details.get("gender") or gender_of(locale, row.forms[0]) or locale.setting("default_gender")
+    said = number(locale, amount, Grammar(gender, case))
     if amount.whole == "2" and not amount.decimals and not amount.sign:
         said = locale.setting("two") or said  # 两公里, but 二
     noun = noun_form(locale, row, amount, case)

@@ -13,7 +13,8 @@ def read_suffixed(place: Place) -> str | None:
     n, grammar = int(place.match["digits"]), place.grammar("ordinal")
     if place.match["suffix"] == "°" and not noun_behind(place):  # 25° are degrees
         return None
-    grammar = Grammar(row.details.get("gender", grammar.gender), row.details.get("case", grammar.case))
+    case = row.details.get("noun", "") if noun_behind(place) else ""  # tercer piso
+    grammar = Grammar(row.details.get("gender", grammar.gender), case or row.details.get("case", grammar.case))
     if "tens" in row.details and n % 10 == 0 and n > 10:  # 90-е годы
         grammar = Grammar(case=row.details["tens"])
     if row.spoken == "ordinal":
@@ -23,9 +24,12 @@ def read_suffixed(place: Place) -> str | None:
 
 
 def read_dotted_ordinal(place: Place) -> str | None:
-    """Ordinal with a full stop within a sentence (der 5. Platz, 2. gün); None for the end of a sentence."""
+    """Ordinal with a full stop (der 5. Platz, 2. gün), also at the end of a sentence (am 3.); else None."""
     locale, following = place.locale, place.after
     grammar = place.grammar("ordinal")
+    starts_sentence = following in locale.words("function_words") and following[:1].isupper()
+    if (not following or starts_sentence) and not place.ends_in_ordinal:
+        return None
     is_known = following.lower() in locale.words("ordinal_nouns")
     is_within = following[:1].islower() and locale.setting("dotted_ordinals") == "small"
     if not (is_known or is_within or grammar.case):
@@ -33,7 +37,8 @@ def read_dotted_ordinal(place: Place) -> str | None:
     gender = gender_of(locale, following)
     case = grammar.case
     own = locale.rows("case").get(f"ordinal {place.before.lower()} {gender}")
-    return ordinal(locale, int(place.match["digits"]), Grammar(gender, own.spoken if own else case))
+    said = ordinal(locale, int(place.match["digits"]), Grammar(gender, own.spoken if own else case))
+    return f"{said}." if starts_sentence else said
 
 
 def read_first_day(place: Place) -> str | None:

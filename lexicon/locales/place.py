@@ -48,9 +48,17 @@ class Place:
         mark = self.text.rfind('"', max(start - _QUOTATION, 0), start)
         return mark >= 0 and (mark == 0 or not (self.text[mark - 1].isalnum() or self.text[mark - 1] in ".,!?…"))
 
+    @property
+    def _before_series(self) -> str:
+        """Word before the first one of a series of ordinals (am 3., 4. und 5. Mai); empty if there is none."""
+        series = self.locale.setting("ordinal_series")
+        start = self.match.start()
+        found = re.search(rf"([^\W\d_]+) {series}\Z", self.text[max(start - _CONTEXT, 0) : start]) if series else None
+        return found[1] if found else ""
+
     def grammar(self, kind: str) -> Grammar:
         """Gender and case that the word before requires of a kind of number."""
-        word = (self.said or self.before).lower()
+        word = (self._before_series or self.said or self.before).lower()
         rows = self.locale.rows("case")
         row = rows.get(f"{kind} {word}") or rows.get(word)
         return Grammar(row.details.get("gender", ""), row.spoken) if row else Grammar()
@@ -60,6 +68,12 @@ class Place:
         """Whether the word before has an ordinal behind it: godzina 14."""
         row = self.locale.rows("case").get((self.said or self.before).lower())
         return row is not None and "ordinal" in row.details
+
+    @property
+    def ends_in_ordinal(self) -> bool:
+        """Whether the word before may have an ordinal without a noun behind it: am 3."""
+        row = self.locale.rows("case").get(f"ordinal {(self._before_series or self.before).lower()}")
+        return row is not None and "end" in row.details
 
     def amount(self, group: str) -> Amount:
         """The amount of a group of the match."""

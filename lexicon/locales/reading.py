@@ -30,7 +30,8 @@ class _PlainCharacters(dict[int, str]):
 
 
 _CHARACTERS = _PlainCharacters(_PLAIN)
-_JOINED_LETTERS = re.compile(r"[\u2103\u2109\u2160-\u217f\u3371-\u337a\u3380-\u33df]")  # ℃ Ⅳ ㎏
+_JOINED_LETTERS = re.compile(r"[\u2103\u2109\u2160-\u217f\u3371-\u337a\u3380-\u33df®™℠]")  # ℃ Ⅳ ㎏
+_UNSPOKEN = frozenset("®™℠")
 _POWERS = str.maketrans("23", "²³")
 
 
@@ -42,7 +43,9 @@ def _plain_text(text: str) -> tuple[str, Sequence[int]]:
     letters: list[str] = []
     places: list[int] = []
     for at, letter in enumerate(plain):
-        said = unicodedata.normalize("NFKC", letter).translate(_POWERS) if _JOINED_LETTERS.match(letter) else letter
+        said = "" if letter in _UNSPOKEN else letter
+        if said and _JOINED_LETTERS.match(letter):
+            said = unicodedata.normalize("NFKC", letter).translate(_POWERS)
         letters.append(said)
         places += [at] * len(said)
     return "".join(letters), (*places, len(text))

@@ -7,6 +7,7 @@ from lexicon.locales.tables import Locale
 from lexicon.number_words import roman_value
 
 _SAFE_ROMAN = frozenset("IVX")  # numbers of other letters are words and sizes (MIX, XL, DVD)
+ROMAN_LETTERS = frozenset("IVXLCDM")
 _CONTEXT = 40
 
 
@@ -21,9 +22,14 @@ def read_roman(place: Place) -> str | None:
         return known
     if value and _is_number(written, value):
         return cardinal(locale, value)
-    if len(written) > 2 and "I" in written:  # espeak-ng reads MIX as 1009
+    if "I" in written and (len(written) > 2 or not value or _is_in_capitals(place)):  # espeak-ng reads MIX as 1009
         return written.lower()
     return spelled(locale, written) if len(written) > 1 else None
+
+
+def _is_in_capitals(place: Place) -> bool:
+    """Whether the words around are in capitals: IL EST LI."""
+    return any(len(word) > 2 and word.isupper() for word in (place.before, place.after))
 
 
 def _is_number(written: str, value: int) -> bool:

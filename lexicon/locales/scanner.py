@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from lexicon.locales import counted, dates, digit_groups, fractions, ordinals, roman, words
+from lexicon.locales import counted, dates, digit_groups, fractions, initialisms, ordinals, roman, words
 from lexicon.locales.place import Reader, amount_pattern
 from lexicon.locales.tables import Locale, alternatives
 from lexicon.locales.templates import template_forms
@@ -21,13 +21,20 @@ _VOWEL_SIGNS = "\u064b-\u065f\u0670\u0900-\u0903\u093a-\u094f\u0955-\u0957\u0962
 WORD = rf"(?:[{_LATIN}]+|(?:(?![{_LATIN}]){LETTER}|[{_VOWEL_SIGNS}])+)"
 PLACE = re.compile(rf"(?P<number>[0-9\u00bc-\u00be\u2150-\u215e])|(?P<word>{WORD})|[^\w\s]|\S")
 _LEADING_LETTERS = re.compile(rf"{WORD}?")
+_INITIALISM = rf"(?P<letters>[A-ZÄÖÜÀ-ÞĄ-Ž]{{2,8}})(?P<ending>s)?(?!{LETTER})"
 _LABEL = r"[A-Za-z0-9][A-Za-z0-9-]{0,62}"
 _TLD = (
     r"(?:com|org|net|edu|gov|io|ai|app|dev|info|eu|de|fr|es|it|pt|br|nl|be|pl|ru|tr|gr|at|ch|uk|us|mx|cn|jp|kr|in|vn)"
 )
+_EXTENSION = (
+    r"(?:txt|md|pdf|docx?|xlsx?|pptx?|[ct]sv|json|xml|ya?ml|toml|ini|cfg|conf|log|html?|css|js|ts|py|sh|cpp|java|exe"
+    r"|zip|gz|tar|jpe?g|png|gif|svg|webp|mp[34]|wav|ogg|avi|mkv|mov)"
+)
+_PATH = r"(?<![^\s(\"'«„“])(?:~|\.{1,2})?(?:/[\w.-]{0,63}[\w-]){2,20}/?(?![\w/])"
 _ADDRESS = (
     rf"[\w.+-]{{1,64}}@{_LABEL}(?:\.{_LABEL}){{1,5}}(?![A-Za-z0-9_])|(?:https?://|www\.)[^\s,;!]{{0,400}}[^\s,;!.:?)]"
     rf"|{_LABEL}(?:\.{_LABEL}){{0,3}}\.{_TLD}(?![A-Za-z0-9_])(?!\.\w)(?:/[^\s,;!]{{0,400}}[^\s,;!.:?)])?"
+    rf"|[\w-]{{1,64}}(?:\.[\w-]{{1,64}}){{0,3}}\.{_EXTENSION}(?!\w)|[A-Z]:(?:\\[\w.-]{{0,63}}[\w-]){{1,20}}"
 )
 _ROMAN = rf"(?P<roman>[IVXLCDM]{{1,15}})(?P<suffix>{{suffix}}\.?)?(?!{LETTER}|['’-]{LETTER}|[0-9])"
 _POWER = r"(?<=[\w)])(?:\^(?P<digits>-?[0-9]{1,4})(?!\w)|(?P<raised>⁻?[⁰¹²³⁴⁵⁶⁷⁸⁹]{1,4})(?![⁰¹²³⁴⁵⁶⁷⁸⁹⁻]))"
@@ -50,7 +57,7 @@ class Scanner:
     by_word: Mapping[str, tuple[Form, ...]]
     by_sign: Mapping[str, tuple[Form, ...]]
     address: Form
-    romans: tuple[Form, ...]
+    capitals: tuple[Form, ...]
     ending: Form
 
     def at(self, found: re.Match[str], text: str) -> Iterable[Form]:
@@ -78,7 +85,7 @@ class Scanner:
         if small != word:
             yield from self.by_word.get(small, ())
         if word.isupper() or word.rstrip("abcdefghijklmnopqrstuvwxyz").isupper():
-            yield from self.romans
+            yield from self.capitals
 
 
 _VULGAR = r"[\u00bc-\u00be\u2150-\u215e]"
@@ -135,9 +142,9 @@ _NUMBER_FORMS: tuple[tuple[str, Reader], ...] = (
         counted.read_measure,
     ),
     (r"‹signed› ?(?P<magnitude>‹magnitude›)‹end›", counted.read_magnitude),
-    (r"(?P<digits>[0-9]{1,4})\.(?= ‹letter›)", ordinals.read_dotted_ordinal),
+    (r"(?P<digits>[0-9]{1,4})\.(?=,| ‹letter›|\s*\Z)", ordinals.read_dotted_ordinal),
     (r"(?![0-9]{1,3}(?:\.[0-9]{3})+(?![0-9.]))[0-9]{1,4}(?:\.[0-9]{1,4}){2,6}(?!\w)", digit_groups.read_version),
-    (r"[0-9]{1,4}‹other decimal›(?:[0-9]{1,2}|[0-9]{4})(?![0-9]|\.[0-9])", digit_groups.read_version),
+    (r"[0-9]{1,4}‹other decimal›(?:[0-9]{1,2}|[0-9]{4,20})(?![0-9]|\.[0-9])", digit_groups.read_version),
     (r"(?P<first>[0-9]{1,3}):(?P<second>[0-9]{1,7})(?![0-9:])", digit_groups.read_score),
     (r"‹signed›‹tail›", counted.read_number),
 )
@@ -155,7 +162,7 @@ def _parts(locale: Locale) -> dict[str, str]:
     named = {name.replace("_", " "): locale.setting(name) for name in ("hour_sign", "time_words", "day_ending")}
     named |= {kind: alternatives(locale, kind) for kind in ("unit", "currency", "suffix")}
     return named | {
-        "magnitude": alternatives(locale, "magnitude") + rf"(?!(?<=[{_LATIN}])[{_LATIN}])",  # 3 MW are no millions
+        "magnitude": alternatives(locale, "magnitude") + rf"(?!(?<=[{_LATIN}])[{_LATIN}Ω])",  # 3 MW, 2 MΩ
         "amount": amount,
         "signed": rf"(?P<amount>(?:[-+]|± ?)?{amount})",
         "letter": letter,
@@ -189,7 +196,7 @@ def scanner(locale: Locale) -> Scanner:
     address = Form(re.compile(_ADDRESS), words.read_address)
     suffix = alternatives(locale, "suffix")
     pattern = _ROMAN.replace("{suffix}", suffix)
-    numerals = [Form(re.compile(pattern), roman.read_roman)]
+    numerals = [Form(re.compile(_INITIALISM), initialisms.read_initialism), Form(re.compile(pattern), roman.read_roman)]
     if locale.setting("roman_stop"):  # XIV. is an ordinal
         stop = rf"(?P<roman>[IVXLCDM]{{1,15}})\.(?=,| {LETTER})"
         numerals = [Form(re.compile(stop), roman.read_roman_with_stop), *numerals]
@@ -285,6 +292,7 @@ def _forms_by_sign(locale: Locale) -> dict[str, tuple[Form, ...]]:
 
 def _forms_of_signs(locale: Locale) -> Iterator[tuple[str, Form]]:
     """Powers, dashes and signs with words of their own, with the character at which each is tried."""
+    yield from ((first, Form(re.compile(_PATH), words.read_address)) for first in "/~.")
     yield from ((first, Form(re.compile(_POWER), words.read_power)) for first in "^⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
     yield from ((dash, Form(re.compile(rf"{dash}(?=[0-9])"), words.read_dash)) for dash in "-–")
     for first, written in _grouped(locale.rows("sign")).items():

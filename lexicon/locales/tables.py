@@ -20,7 +20,7 @@ currency     currency; details ``cents=`` have its hundredth part
 month        number of a month: its name in dates, and written forms in details
 weekday      name of a short one; without a full stop only in a span (Mo-Fr)
 abbreviation its words; details: ``number`` (before a number only), ``after`` (behind a number), ``name`` (before a
-             capital), ``end`` (may end a sentence), or a case with the form in it
+             capital), ``end`` (may end a sentence), or forms: by case, and before the name of a king (``ruler``)
 ending       abbreviation at the end of a word (str.)
 roman        word before or behind a Roman number, and the kind of number that it is (``cardinal``, ``ordinal``)
 ruler        names whose Roman numbers are those of rulers
@@ -28,6 +28,7 @@ sign         sign that is spoken, by its words
 fraction     words of a fraction
 word         word of another language, as the language says it (those of `loan_words.tsv`, too)
 letter       name of a letter
+initialism   capitals that are read letter by letter (``letters``), or their words
 form         written form with a pattern and a template of its own (`lexicon.locales.templates`)
 kana         Chinese characters of numbers in kana, for Japanese without its reader
 numeral      words of numbers of which CLDR has no grammatical forms

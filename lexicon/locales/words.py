@@ -11,6 +11,7 @@ from lexicon.locales.tables import Row
 from lexicon.sentence_ends import ends_sentence
 
 _CONTEXT = 40
+_ARROWS = frozenset("-=<>")  # before < or >: -> 5
 _SILENT = frozenset("<>~·*")  # where they stand between no numbers
 
 
@@ -48,11 +49,14 @@ def _is_in_context(place: Place, details: Collection[str], following: str) -> bo
 
 
 def _form_in_context(place: Place, row: Row) -> str:
-    """Form of an abbreviated word behind the word before it: its case, or the ending of the adjective (XX w.)."""
+    """Form of an abbreviated word: its case by the word before it, that of an adjective (XX w.), or of a king."""
     before = (place.said or place.before).lower()
     for name, form in row.details.items():
         if name[0] == "~" and before.endswith(name[1:]):
             return form
+    ruler = place.locale.rows("ruler").get(place.after)
+    if ruler is not None and "ruler" in row.details and ruler.spoken == "m":
+        return row.details["ruler"]
     return row.details.get(before) or row.details.get(place.grammar("abbreviation").case, row.spoken)
 
 
@@ -84,7 +88,8 @@ def read_sign(place: Place) -> str | None:
     row = place.locale.rows("sign")[place.match.group()]
     before = place.text[max(place.match.start() - 2, 0) : place.match.start()].rstrip(" ")[-1:]
     after = place.text[place.match.end() : place.match.end() + 2].lstrip(" ")[:1]
-    if "number" in row.details and not (_is_term(after) and (_is_term(before) or row.details.get("number") == "sign")):
+    is_led = _is_term(before) or (row.details.get("number") == "sign" and before not in _ARROWS)
+    if "number" in row.details and not (_is_term(after) and is_led):
         return " " if place.match.group() in _SILENT else row.spoken
     if "math" in row.details and not (_is_term(before) and _is_term(after) and _has_equals(place)):
         return None
@@ -130,7 +135,7 @@ def read_unit_alone(place: Place) -> str:
 def read_address(place: Place) -> str:
     """Parts of an address with the names of the signs between them."""
     locale = place.locale
-    names = locale.rows("address")
+    names = {**locale.rows("sign"), **locale.rows("address")}
     written = re.sub(r"\Ahttps?://", "", place.match.group()).rstrip("/")
     said = []
     for part in re.findall(r"[^\W\d_]+|[0-9]+|[^\w]|_", written):
