@@ -43,7 +43,7 @@ from importlib import resources
 from types import MappingProxyType
 
 COLUMNS = 4
-_LIKE_NO_WORD = re.compile("[a-z][A-ZΩ]|[µμ]")  # kHz, mA, but not mm, MB or Pa
+_LIKE_NO_WORD = re.compile("[a-zа-я][A-ZА-ЯΩ]|[µμ]")  # kHz, кВт, mA, but not mm, MB or Pa
 _NO_FORMS = frozenset({"alone", "last", "quote", "gender", "si"})  # details that are no forms of the noun in a case
 _BEFORE_NOUN = re.compile(r"=|.*\{\} ?")  # a form that holds its number, or has it before the noun
 _NO_ROWS: Mapping[str, "Row"] = MappingProxyType({})
