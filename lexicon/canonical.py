@@ -36,6 +36,7 @@ _TRANSLATION = (
     | {ord(c): ". " for c in _FULL_STOPS}
     | {ord(c): ", " for c in "，、،؛；"}
     | {ord(c): "? " for c in "？؟"}
+    | {ord("٫"): ".", ord("٬"): ","}  # between Arabic digits
     | {ord("！"): "! ", ord("："): ": ", ord("¿"): " ", ord("¡"): " "}
 )
 _SPOKEN_PUNCTUATION = frozenset(".,;:!?'-–/&@#%‰§¶^")

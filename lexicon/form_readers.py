@@ -112,6 +112,12 @@ def read_version(m: re.Match[str], _: str) -> str:
     return " point ".join(number_words(part) for part in m.group().split("."))
 
 
+def read_points(m: re.Match[str], _: str) -> str:
+    """0.2 pp is zero point two percentage points, 25 bps twenty-five basis points."""
+    number, is_basis = m.group().rstrip(" bps"), m.group().endswith("bps")
+    return f"{number_words(number)} {'basis' if is_basis else 'percentage'} point{'s' if number != '1' else ''}"
+
+
 def read_power(m: re.Match[str], _: str) -> str:
     """^2 is squared."""
     return {"2": "squared", "3": "cubed"}.get(
@@ -202,7 +208,12 @@ def _number(written: str, previous: str) -> str:
     return readings.signed_number_words(written)
 
 
-def read_fraction(m: re.Match[str], _: str) -> str:
+def read_fraction(m: re.Match[str], previous: str) -> str:
+    """-1/2 is minus one half; without the sign see `_fraction_words`."""
+    return f"minus {_fraction_words(m)}" if m["fractionminus"] else _fraction_words(m)
+
+
+def _fraction_words(m: re.Match[str]) -> str:
     """3/4 is three quarters, 10/10 ten out of ten, 120/80 one hundred twenty over eighty, 245/3 for three wickets."""
     top, bottom = m["top"], m["bottom"]
     unit = m["funit"]

@@ -13,7 +13,8 @@ from lexicon.kept_signs import INCH, RANGE, STAR
 _START, _STOP = r"(?<![^\W\d_])", r"(?![^\W\d_])"  # no letter before, after
 _FULL_MONTH = "|".join(readings.MONTHS)
 _MONTH = rf"(?:{_FULL_MONTH}|(?:Jan|Feb|Mar|Apr|Jun|Jul|Aug|Sept?|Oct|Nov|Dec)\b\.?)"
-_AMOUNT = r"(?:[0-9]{1,3}(?:,[0-9]{3}){1,6}(?:\.[0-9]{1,20})?(?!,?[0-9])|[0-9]{1,400}(?:\.[0-9]{1,20})?|\.[0-9]{1,20})"
+_THOUSANDS = r"(?:(?:,[0-9]{3}){1,6}(?:\.[0-9]{1,20})?(?!,?[0-9])|(?:'[0-9]{3}){1,6}(?:\.[0-9]{1,20})?(?!'?[0-9]))"
+_AMOUNT = rf"(?:[0-9]{{1,3}}{_THOUSANDS}|[0-9]{{1,400}}(?:\.[0-9]{{1,20}})?|\.[0-9]{{1,20}})"
 _SIGNED = rf"(?:(?<![\w.)])[+-])?{_AMOUNT}"
 _SIGN = rf"(?:{_START}(?:{'|'.join(readings.DOLLARS)})\$|[$£€¥₹₩₽₺₿])"
 _CODE = "|".join(code for code in readings.CURRENCIES if code.isalpha())
@@ -41,6 +42,17 @@ def _unit_pattern() -> str:
     return rf"(?:(?:{words})(?:/(?:{words}))?(?![\w^/'])|{signs})"
 
 
+def _scripture_pattern() -> str:
+    """A book of scripture with chapter and verses (Psalm 23:1), of a book with a number also a chapter (1 John 3)."""
+    books = "|".join(sorted(readings.read_table("scripture.tsv"), key=len, reverse=True))
+    verses = r"[0-9]{1,3}:[0-9]{1,3}(?:[-–][0-9]{1,3}(?::[0-9]{1,3})?)?(?!\w|[:.][0-9])"
+    more = r"(?:(?:; ?| and )[0-9]{1,3}:[0-9]{1,3}(?:[-–][0-9]{1,3})?(?![\w:]| ?[ap]\.?m\b))"
+    return (
+        rf"{_START}(?:(?P<part>[1-4]|I{{1,3}}) )?(?:(?P<book>{books})\.?|[Vv]erses?) "
+        rf"(?P<places>{verses}{more}{{0,6}}|(?(part)[0-9]{{1,3}}|(?!))(?![\w:]|[.,][0-9]))(?! ?[ap]\.?m\b)"
+    )
+
+
 def _rate_pattern() -> str:
     """Two units with a slash, without a number: in mg/dL, km/h."""
     words = "|".join(unit for unit in sorted(readings.read_table("units.tsv"), key=len, reverse=True) if unit.isalpha())
@@ -57,7 +69,10 @@ def _abbreviation_pattern() -> str:
     table = readings.read_table("abbreviations.tsv")
     written = sorted(table, key=len, reverse=True)
     titles = "|".join(title.upper() for title in written if table[title][1] in forms.TITLES)
-    dotless = rf"(?:(?:Mr|Mrs|Ms|Dr|Prof|etc|vs|approx)|(?<=[a-z] )(?:Ave|Blvd|Rd|Hwy|Pkwy)){_STOP}"
+    dotless = (
+        r"(?:(?:Mr|Mrs|Ms|Dr|Prof|etc|vs|approx)|(?:St|Mt|Ft)(?= [A-Z])"
+        rf"|(?<=[a-z] )(?:Ave|Blvd|Rd|Hwy|Pkwy|St(?![^\W_]| [A-Z0-9]))){_STOP}"
+    )
     return rf"(?P<abbr>(?:{'|'.join(map(re.escape, written))})(?=\.)|(?:{titles})(?=\. ?[A-Z])|{dotless})\.?"
 
 
@@ -71,12 +86,14 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         (
             "quick",
             "a",
-            r"(?!(?:etc|vs|approx|et)\b)[a-z]+(?= |$|[,;!?—…](?: |$))"
+            r"(?!(?:etc|vs|approx|et|verses?(?= [0-9]))\b)[a-z]+(?= |$|[,;!?—…](?: |$))"
             rf"|(?<!{RANGE} )(?!(?:Mrs?|Ms|Dr|Prof|Et)\b)[A-Z][a-z]+(?= [a-z])",
             codes.read_word,
         ),
         ("space", ".", r" +", forms.read_nothing),
         ("mark", ".", r"[.,;:!?—…](?= |$)", forms.read_punctuation),
+        ("relation", ".", r"!=|<=|>=|==+|=>|&&", formulas.read_relation),
+        ("scripture", "a0", _scripture_pattern(), contexts.read_scripture),
         (
             "email",
             "a0.",
@@ -162,7 +179,22 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
             rf"(?: ?(?P<sunit>{unit}))?",
             forms.read_scientific,
         ),
+        (
+            "address",
+            "0",
+            r"(?P<host>[0-9]{1,3}(?:\.[0-9]{1,3}){3})(?::(?P<port>[0-9]{2,5}))?(?![\w:]|\.[0-9])",
+            contexts.read_network_address,
+        ),
         ("version", "0", r"[0-9]{1,4}(?:\.[0-9]{1,4}){2,6}(?!\w)", forms.read_version),
+        (
+            "angle",
+            "0",
+            r"(?P<degrees>[0-9]{1,3})° ?(?P<arcminutes>[0-9]{1,2})'"
+            rf"(?: ?(?P<arcseconds>[0-9]{{1,2}}(?:\.[0-9]{{1,3}})?){INCH})?"
+            r"(?: ?(?P<pole>[NSEW])(?!\w))?",
+            formulas.read_angle,
+        ),
+        ("points", "0", r"(?P<points>[0-9]{1,3}(?:\.[0-9]{1,2} ?pp| ?bps))(?!\w)", forms.read_points),
         (
             "lap",
             "0",
@@ -250,7 +282,8 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         ),
         (
             "fraction",
-            "0",
+            "0.",
+            r"(?P<fractionminus>(?<![\w.)])-(?=[0-9]))?"
             r"(?:(?P<whole>[0-9]{1,6})[ -])?(?P<frac>(?P<top>[0-9]{1,3})/(?P<bottom>[0-9]{1,3}))(?![\w/])"
             rf"(?: ?(?P<funit>{unit}|in(?= (?:thick|wide|long|deep|high)\b)))?(?:\.(?= [a-z]))?",
             forms.read_fraction,

@@ -5,9 +5,10 @@ import re
 from lexicon import written_forms as readings
 from lexicon.dictionary import word_set
 from lexicon.english import CAPITALISED_WORDS
-from lexicon.kept_signs import BACKSLASH, FACTORIAL, HOME, MINUS, OVER, RANGE
-from lexicon.number_words import number_words
+from lexicon.kept_signs import ARROW, BACKSLASH, FACTORIAL, HOME, MINUS, OVER, RANGE
+from lexicon.number_words import number_words, ordinal_words
 
+CONTEXT = 48  # characters before a mark that decide what it is
 ELEMENTS = word_set(
     "H He Li Be B C N O F Ne Na Mg Al Si P S Cl Ar K Ca Sc Ti V Cr Mn Fe Co Ni Cu Zn Ga Ge As Se Br Kr Rb Sr Y Zr Nb "
     "Mo Tc Ru Rh Pd Ag Cd In Sn Sb Te I Xe Cs Ba La Ce Pr Nd Sm Eu Gd Tb Dy Ho Er Yb Lu Hf Ta W Re Os Ir Pt Au Hg Tl "
@@ -16,7 +17,23 @@ ELEMENTS = word_set(
 # Second parts of formulas without digits: KCl, NaOH, ZnS; others (CoSy, LaTi) are rarely formulas.
 _ANIONS = word_set("Cl Br F I O S OH CN H N As Se Te P Cl-")
 _PART = re.compile(r"([A-Z][a-z]?)([0-9]{0,3})")
-STAND_INS = {FACTORIAL: "factorial", MINUS: "minus", RANGE: "to", BACKSLASH: "backslash", HOME: "tilde", OVER: "over"}
+STAND_INS = {
+    FACTORIAL: "factorial",
+    MINUS: "minus",
+    RANGE: "to",
+    BACKSLASH: "backslash",
+    HOME: "tilde",
+    OVER: "over",
+    ARROW: "to",
+}
+_POLES = {"N": "north", "S": "south", "E": "east", "W": "west"}
+_RELATIONS = {
+    "!=": "is not equal to", "<=": "less than or equal to", ">=": "greater than or equal to", "=>": "to",
+    "&&": "and",
+}  # fmt: skip
+_PLAYED_BEFORE = re.compile(
+    r"\b(?:goals?|scor\w+|draw|drew|equali[sz]\w+|penalt\w+|substitut\w+|booked|kick-?off|match|half-?time)\b[^.!?]*\Z"
+)
 _SYMBOLS_AFTER = re.compile(r" ?(?:long|wide|tall|high|deep|thick|across|by|x|×|of|in|from|and|or|to)\b|[.,;:!?]|\s*\Z")
 
 
@@ -81,9 +98,13 @@ def read_inch_mark(m: re.Match[str], _: str) -> str:
     return f"{words} {'inches' if follows and words != 'one' else 'inch'}"
 
 
-def read_feet(m: re.Match[str], _: str) -> str:
+def read_feet(m: re.Match[str], previous: str) -> str:
     """5'10 is five foot ten, 12' x twelve feet by, a 10' ladder a ten foot ladder."""
     feet = number_words(m["feet"])
+    # of football: a goal in the 67'
+    if not m["inches"] and _PLAYED_BEFORE.search(m.string[max(0, m.start() - CONTEXT) : m.start()]):
+        is_named = previous.lower() == "the"
+        return f"{ordinal_words(int(m['feet']))} minute" if is_named else f"{feet} minute{'s' if feet != 'one' else ''}"
     if m["inches"]:
         return f"{feet} foot {number_words(m['inches'])}"
     return f"{feet} {'feet' if _SYMBOLS_AFTER.match(m.string, m.end()) and feet != 'one' else 'foot'}"
@@ -92,6 +113,18 @@ def read_feet(m: re.Match[str], _: str) -> str:
 def read_by(_m: re.Match[str], _: str) -> str:
     """The x between two lengths: 12' x 14'."""
     return "by"
+
+
+def read_angle(m: re.Match[str], _: str) -> str:
+    """51°30'26" N is fifty-one degrees thirty minutes twenty-six seconds north."""
+    parts = [(m["degrees"], "degree"), (m["arcminutes"], "minute"), (m["arcseconds"], "second")]
+    words = [f"{number_words(count)} {name}{'' if count == '1' else 's'}" for count, name in parts if count]
+    return " ".join([*words, *([_POLES[m["pole"]]] if m["pole"] else [])])
+
+
+def read_relation(m: re.Match[str], _: str) -> str:
+    """!= is is not equal to, >= greater than or equal to, => to."""
+    return _RELATIONS.get(m.group(), "equals")
 
 
 def read_bar(m: re.Match[str], _: str) -> str:

@@ -8,15 +8,16 @@ import re
 from collections.abc import Callable
 from types import MappingProxyType
 
-INCH, FACTORIAL, MINUS, RANGE, BAR, BACKSLASH, STAR, HOME, UNDERSCORE = "∹⊣∸∼∣∖✮∿⎵"
+INCH, FACTORIAL, MINUS, RANGE, BAR, BACKSLASH, STAR, HOME, UNDERSCORE, ARROW = "∹⊣∸∼∣∖✮∿⎵⟶"
 _SIGN_OF = MappingProxyType({
     INCH: '"', FACTORIAL: "!", MINUS: "-", RANGE: "–", BAR: "|", BACKSLASH: "\\", STAR: "★", HOME: "~", UNDERSCORE: "_",
+    ARROW: "->",
     "∕": ")/",
 })  # fmt: skip
 OVER = "∕"  # the bar of a fraction behind a bracket
 _WRITTEN = str.maketrans(dict(_SIGN_OF))
 _SIGNS = re.compile("['’`\"”″|★⭐\\*_−–—⁺⁻!/~-]")
-_ANY = re.compile(r"[0-9]['’]|`|[\"”″|★⭐\\*]|[0-9a-zA-Z)°%]\)?\s?[-–—−!/]|~/|_|[⁺⁻]")
+_ANY = re.compile(r"[0-9]['’]|`|[\"”″|★⭐\\*]|[0-9a-zA-Z)°%]\)?\s?[-–—−!/]|~/|_|[⁺⁻]|->|[1-7]\*")
 _DAY = r"(?:(?:Mon|Tues?|Wed|Thu(?:rs?)?|Fri|Sat|Sun)\b\.?|(?:Mon|Tues|Wednes|Thurs|Fri|Satur|Sun)days?\b)"
 _MONTH = (
     r"(?:(?:Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sept?|Oct|Nov|Dec)\b\.?|"
@@ -33,6 +34,11 @@ _RANGE_BEFORE = re.compile(
     r"\b(?:pages?|pp\.|chapters?|ages?|aged|grades?|weeks?|days?|years?|from|between|lines?|rows?|verses?|items?|steps?|"
     r"floors?|rooms?|numbers?|sections?|parts?|vols?\.|nos?\.|figs?\.|(?:jan|feb|mar|apr|may|june?|july?|aug|sept?|oct|nov|dec)[a-z]*\.?|\d\s?(?:[ap]m)?)\s*\Z",
     re.IGNORECASE,
+)
+_STARRED = (
+    r"(?:hotels?|resorts?|rat(?:ings?|ed)|reviews?|restaurants?|service|accommodation|luxury|b&bs?|lodges?|inns?|villas?|"
+    r"apartments?|hostels?|motels?|spas?|safety|generals?|stays?|quality|standards?|experience|products?|sellers?|scores?|"
+    r"books?|films?|movies?|games?|apps?|drivers?|hosts?|guests?|places?|treatment|energy|recruits?)\b"
 )
 _PLAIN = str.maketrans("²³", "23")
 _CONTEXT = 60  # characters before a dash between spaces that decide what it is
@@ -110,6 +116,9 @@ _STEPS: tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...]
     (re.compile(r"(?<=[0-9])!(?=\s*[=+×÷*/<>≤≥)-]|\s?[-−] ?[0-9])|(?<=\b[nkmr])!(?=\s*[=+×÷/])"), FACTORIAL),
     (re.compile(r"\b([A-Z]:)\\"), rf"\1{BACKSLASH}"),
     (re.compile(r"(?<=[\w.∖])\\(?=[\w.])"), BACKSLASH),
+    (re.compile(r"(?<![-<])-{1,3}>"), ARROW),
+    # a 5* hotel; behind another number a star is the sign of a footnote
+    (re.compile(rf"(?<![\w.,$£€])([1-7])\*(?=[ -]{_STARRED})|(?<=[Rr]ated )([1-7])\*"), rf"\1\2{STAR}"),
     (re.compile(r"[★⭐]"), STAR),
     (re.compile(r"(?<![\w~])~(?=/\w)"), HOME),
     (re.compile(r"(?<=[A-Za-z0-9])_(?=[\w.+-]{0,62}@\w)"), UNDERSCORE),

@@ -5,13 +5,14 @@ What a number is follows from the words before and after it; ``states.tsv`` has 
 
 import re
 
-from lexicon.number_words import cardinal_words, digit_words, number_words
+from lexicon.number_words import cardinal_words, digit_words, number_words, ordinal_words
 from lexicon.written_forms import read_table
 
 CONTEXT = 48  # characters on each side that decide
 _HALVES_BEFORE = re.compile(
-    r"(?:\b(?:rooms?|rm\.?|suite|ste\.?|apartment|apt\.?|gate|(?:p\.? ?o\.? )?box|locker|cabin|ward|studio|hall|bay|"
-    r"unit|flight(?: [a-z][a-z0-9])?|highway|hwy\.?|route|rte\.?|interstate|freeway|turnpike|exit|"
+    r"(?:\b(?:rooms?|rm\.?|suites?|ste\.?|apartments?|apt\.?|gates?|(?:p\.? ?o\.? )?box(?:es)?|lockers?|cabins?|wards?|"
+    r"studios?|halls?|bays?|units?|flights?(?: [a-z][a-z0-9])?|highways?|hwy\.?|routes?|rte\.?|interstates?|freeways?|"
+    r"turnpike|exits?|"
     r"(?:county|state|farm) road|(?:error|status|response|exit)(?: codes?)?|https?(?: status| error)?|"
     r"boeing|airbus|porsche|peugeot)"
     r"|\bU\.?S\.?|(?-i:\bI))[ -]\Z",
@@ -35,9 +36,13 @@ _CODE_BEFORE = re.compile(
     r" (?:ends|ended|ending) (?:in|with))(?: code| number)? \Z"
 )
 _CALL_BEFORE = re.compile(
-    r"\b(?:[Cc]all(?:s|ed|ing)?|[Rr]ang|[Rr]ing|[Pp]hon(?:e|es|ed|ing)|[Dd]ial(?:s|l?ed|l?ing)?)(?: at| on)? \Z"
+    r"\b(?:[Cc]all(?:s|ed|ing)?|[Rr]ang|[Rr]ing|[Pp]hon(?:e|es|ed|ing)|[Dd]ial(?:s|l?ed|l?ing)?|[Tt]ext(?:s|ed|ing)?)"
+    r"(?: at| on)? \Z|\b[Ee]mergency (?:numbers?|lines?|calls?|services?)\b[^.!?;0-9]{0,20}\Z"
 )
+# The numbers before one that is read as they are: call 911 or 112, rooms 305 and 306.
+_OTHERS_BEFORE = re.compile(r"(?:[0-9]{3,20}(?:, ?(?:and |or )?| (?:and|or|then) )){1,4}\Z")
 _THINGS_AFTER = re.compile(r" (?:more |other |new |different )?(?:people|men|women|children|[a-z]{3,}s)\b")
+_VERSION_BEFORE = re.compile(r"\b(?:[Vv]ersion|[Rr]elease|[Ss]ection|[Uu]pdate|v) ?\Z")
 SHORT_NUMBERS = frozenset({"911"})  # digit by digit without a verb, too, but where a car or a road has it
 
 
@@ -57,12 +62,37 @@ def words_in_context(m: re.Match[str], written: str) -> str:
         return ""
     before = m.string[max(0, m.start() - CONTEXT) : m.start()]
     after = m.string[m.end() : m.end() + CONTEXT]
+    is_counted = _THINGS_AFTER.match(after) is not None
+    if not is_counted:
+        before = _OTHERS_BEFORE.sub("", before)
     if len(written) <= 4 and (_HALVES_BEFORE.search(before) or _HALVES_AFTER.match(after)):
         return halves_words(written)
-    is_called = _CALL_BEFORE.search(before) is not None and not _THINGS_AFTER.match(after)
+    is_called = _CALL_BEFORE.search(before) is not None and not is_counted
     if is_called or written in SHORT_NUMBERS or _CODE_BEFORE.search(before):
         return digit_words(written)
     return ""
+
+
+def read_scripture(m: re.Match[str], _: str) -> str:
+    """1 Cor. 13:4-7 is First Corinthians thirteen four to seven."""
+    part = {"I": "1", "II": "2", "III": "3"}.get(m["part"] or "", m["part"])
+    name = read_table("scripture.tsv")[m["book"]][0] if m["book"] else m.group().partition(" ")[0]
+    places = re.sub(r"[-–]", " to ", m["places"]).replace(":", " ").replace(";", ",")
+    places = re.sub(r"[0-9]+", lambda number: f" {number_words(number[0])} ", places)
+    head = f"{ordinal_words(int(part)).capitalize()} {name}" if part else name
+    return " ".join(f"{head} {places}".replace(" ,", ",").split())
+
+
+def read_network_address(m: re.Match[str], _: str) -> str:
+    """10.0.0.101:8080 is ten dot zero dot zero dot one oh one colon eighty eighty; 1.2.3.4 is a version."""
+    parts = m["host"].split(".")
+    before = m.string[max(0, m.start() - CONTEXT) : m.start()]
+    if _VERSION_BEFORE.search(before) or (not m["port"] and max(map(len, parts)) < 3):
+        return " point ".join(number_words(part) for part in parts)
+    host = " dot ".join(halves_words(part) if len(part) > 2 else number_words(part) for part in parts)
+    if not m["port"]:
+        return host
+    return f"{host} colon {halves_words(m['port']) if len(m['port']) in {3, 4} else number_words(m['port'])}"
 
 
 def read_zip_code(m: re.Match[str], _: str) -> str:

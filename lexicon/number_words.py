@@ -47,8 +47,8 @@ def cardinal_words(value: int) -> str:
 
 
 def number_words(written: str) -> str:
-    """A number with thousands commas, decimals or leading zeros: 3.14 is three point one four."""
-    whole, _, decimals = written.replace(",", "").partition(".")
+    """A number with signs between thousands, decimals or leading zeros: 3.14 is three point one four."""
+    whole, _, decimals = written.replace(",", "").replace("'", "").partition(".")
     if len(whole) > MAX_CARDINAL_DIGITS or (len(whole) > 1 and whole[0] == "0" and not decimals):
         words = digit_words(whole)
     else:

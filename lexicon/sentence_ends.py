@@ -2,7 +2,7 @@
 
 The rules of ``sentence_ends.tsv`` state, for an abbreviation of a language (``*``: of every language without a table of
 its own), what may follow it within a sentence; an English one without a row follows its context in
-``abbreviations.tsv``:
+``abbreviations.tsv``, and one of a book in ``scripture.tsv`` goes on before a number:
 
 ========== ===============================================================================================
 ``never``  anything: the full stop ends no sentence (Dr. Smith)
@@ -49,6 +49,9 @@ def _rule_table() -> dict[str, dict[str, _StopRule]]:
     for written, (_, context) in readings.read_table("abbreviations.tsv").items():
         is_lower = written.islower() and context in {"any", "after"}
         found["en"].setdefault(written, _StopRule("number" if is_lower else _OF_CONTEXT[context]))
+    for written, (spoken,) in readings.read_table("scripture.tsv").items():
+        if written != spoken:  # Rom. 8:28
+            found["en"].setdefault(written, _StopRule("number"))
     return found
 
 

@@ -77,7 +77,7 @@ def money_words(amount: str, currency: str, magnitude: str) -> str:
     singular, many, cent, cents = CURRENCIES[currency]
     sign = "minus " if amount.startswith("-") else ""
     amount = amount.lstrip("+-")
-    whole, _, decimals = amount.replace(",", "").partition(".")
+    whole, _, decimals = amount.replace(",", "").replace("'", "").partition(".")
     if magnitude:
         return f"{sign}{number_words(amount)} {MAGNITUDES.get(magnitude, magnitude)} {many}"
     if decimals and (len(decimals) != 2 or not cent):
