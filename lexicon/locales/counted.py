@@ -1,6 +1,6 @@
 """Readers of numbers with what they count: measures, money, ranges, fractions, ordinals, telephone numbers."""
 
-from lexicon.locales.nouns import behind, count, gender_of, is_plural, noun_form
+from lexicon.locales.nouns import behind, case_of, construct, count, gender_of, is_plural, noun_form
 from lexicon.locales.numbers import Amount, Grammar, is_round_million, number, ordinal, whole, year
 from lexicon.locales.place import Place, read_amount
 from lexicon.locales.tables import Locale, Row
@@ -36,7 +36,8 @@ def _magnified(place: Place, row: Row, case: str) -> str:
 def read_magnitude(place: Place) -> str:
     """Number with a magnitude: 3,5 Mio."""
     magnitude = place.locale.rows("magnitude")[place.match["magnitude"]]
-    return count(place.locale, place.amount("amount"), magnitude, place.grammar("cardinal").case)
+    said = count(place.locale, place.amount("amount"), magnitude, place.grammar("cardinal").case)
+    return construct(place.locale, said) if noun_behind(place) else said
 
 
 def read_money(place: Place) -> str:
@@ -95,12 +96,16 @@ def read_number(place: Place) -> str:
     amount = place.amount("amount")
     noun = noun_behind(place)
     agrees = noun and (amount.is_one or not locale.setting("only_one_agrees"))
-    own = gender_of(locale, noun, plural=is_plural(locale, amount)) if agrees else ""
+    several = is_plural(locale, amount)
+    own = gender_of(locale, noun, plural=several) if agrees else ""
     gender = grammar.gender or own or (locale.setting("default_gender") if agrees else "")
+    grammar = Grammar(gender, (case_of(locale, noun) if several else "") or grammar.case)
     if amount.sign or amount.decimals or not written.isdigit():
-        said = number(locale, amount, Grammar(gender, grammar.case))
+        said = number(locale, amount, grammar)
     else:
-        said = year_or_number(locale, written, Grammar(gender, grammar.case))
+        said = year_or_number(locale, written, grammar)
+    if noun:
+        said = construct(locale, said)
     link = locale.setting("of_million")
     if is_round_million(amount) and noun and link and noun not in {link, link[:1]}:
         return behind(locale, said, place.after, links=True).removesuffix(place.after).rstrip(" ")
@@ -109,7 +114,7 @@ def read_number(place: Place) -> str:
 
 def noun_behind(place: Place) -> str:
     """Word behind a number if it may be a noun, else empty."""
-    word = place.after
+    word = "" if place.before in place.locale.words("uncounted") else place.after
     # Arabic has no capitals
     is_noun = bool(word) and word[0].isupper() == bool(place.locale.setting("capital_nouns"))
     return word if is_noun and word not in place.locale.words("function_words") else ""

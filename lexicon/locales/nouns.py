@@ -7,6 +7,7 @@ from lexicon.locales.numbers import Amount, Grammar, is_round_million, number
 from lexicon.locales.tables import Locale, Row
 
 _WHOLE = "="  # before a form that says its number: كيلومتران is two kilometres
+_MAX_ENDING = 7  # letters of the longest ending in a table
 _VOWELS = "aeiouyéèêàâîôûh"
 
 
@@ -82,14 +83,33 @@ def gender_of(locale: Locale, word: str, *, plural: bool = False) -> str:
     """Gender of a noun by its ending, of one or of several; empty where the language does not tell."""
     small = word.lower().split(" ")[0]
     rows = locale.rows("gender")
-    whole = rows.get("^" + small)
-    if whole is not None:
-        return whole.spoken
-    for length in range(min(len(small), 7), 0, -1):
-        row = rows.get(small[-length:])
+    row = rows.get("^" + small) or _by_ending(rows, small)
+    if row is None:
+        return ""
+    return row.details.get("plural", row.spoken) if plural else row.spoken
+
+
+def case_of(locale: Locale, noun: str) -> str:
+    """Case that the ending of a plural noun tells (z dwoma kotami, в двух случаях); empty where it does not."""
+    row = _by_ending(locale.rows("case"), noun.lower(), "+")
+    return row.spoken if row else ""
+
+
+def _by_ending(rows: Mapping[str, Row], word: str, mark: str = "") -> Row | None:
+    """Row of the longest ending of a word; a mark stands before the endings of the rows."""
+    for length in range(min(len(word), _MAX_ENDING), 0, -1):
+        row = rows.get(mark + word[-length:])
         if row is not None:
-            return row.details.get("plural", row.spoken) if plural else row.spoken
-    return ""
+            return row
+    return None
+
+
+def construct(locale: Locale, said: str) -> str:
+    """Words of a number directly before its noun: Arabic duals lose their n (مئتا كتاب)."""
+    for ending, row in locale.rows("construct").items():
+        if said.endswith(ending):
+            return said.removesuffix(ending) + row.spoken
+    return said
 
 
 def count(locale: Locale, amount: Amount, row: Row, case: str = "") -> str:
@@ -109,6 +129,7 @@ def count(locale: Locale, amount: Amount, row: Row, case: str = "") -> str:
 
 def behind(locale: Locale, said: str, noun: str, *, links: bool) -> str:
     """A noun behind the words of a number, joined by de in Romance languages where the number is itself a noun."""
+    said = construct(locale, said)
     link = locale.setting("of_million") if links else ""
     if link == "de" and locale.setting("elision") and noun[:1].lower() in _VOWELS:
         return f"{said} d'{noun}"

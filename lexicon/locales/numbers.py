@@ -190,7 +190,8 @@ def _spelt(locale: Locale, n: int, kind: str, grammar: Grammar) -> str:
     except NoRuleForNumberError:  # CLDR has no Russian ordinals of millions
         return digits(locale, str(n))
     for pattern, row in locale.rows("fix").items():
-        if row.details.get("gender", grammar.gender) == grammar.gender:
+        own = Grammar(row.details.get("gender", grammar.gender), row.details.get("case", grammar.case))
+        if own == grammar:
             said = re.sub(pattern, row.spoken, said)
     return said
 

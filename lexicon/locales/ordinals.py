@@ -26,6 +26,8 @@ def read_suffixed(place: Place) -> str | None:
 def read_dotted_ordinal(place: Place) -> str | None:
     """Ordinal with a full stop (der 5. Platz, 2. gün), also at the end of a sentence (am 3.); else None."""
     locale, following = place.locale, place.after
+    if place.requires_ordinal:  # it is one without a full stop: na peronie 4. Potem ...
+        return None
     grammar = place.grammar("ordinal")
     starts_sentence = following in locale.words("function_words") and following[:1].isupper()
     if (not following or starts_sentence) and not place.ends_in_ordinal:

@@ -70,7 +70,8 @@ def _in_context(place: Place, value: int) -> str | None:
 
 def _word_after(place: Place) -> str:
     following = place.text[place.match.end() : place.match.end() + _CONTEXT].lstrip(" ")
-    return following.split(" ")[0].rstrip(",;:!?").lower() if following else ""
+    word = following.split(" ")[0].rstrip(",;:!?").lower() if following else ""
+    return word if f"+{word}" in place.locale.rows("roman") else word.rstrip(".")
 
 
 def _by_word(place: Place, value: int, word: str) -> str:
@@ -79,9 +80,9 @@ def _by_word(place: Place, value: int, word: str) -> str:
     if row.spoken == "cardinal" or (row.spoken == "ruler" and value > int(locale.setting("ruler_ordinals", "99"))):
         return cardinal(locale, value)
     is_after = word.startswith("+")
-    before = place.before.lower() if is_after else ""
-    case = row.details.get(before) or row.details.get("case") or place.grammar("ordinal").case
-    case = case or (row.details.get("noun", "") if before and place.before.islower() else "")
+    before = (place.said or place.before) if is_after else ""
+    case = row.details.get(before.lower()) or row.details.get("case") or place.grammar("ordinal").case
+    case = case or (row.details.get("noun", "") if before.islower() else "")
     return ordinal(locale, value, Grammar(row.details.get("gender") or gender_of(locale, word.lstrip("+")), case))
 
 

@@ -136,7 +136,10 @@ _NUMBER_FORMS: tuple[tuple[str, Reader], ...] = (
     ),
     (r"(?P<amount>‹amount›)(?:[-–](?=[0-9])| – (?=[0-9]))(?!‹amount›[-–][0-9])", counted.read_range),
     (rf"(?P<integer>[0-9]{{1,4}}){_FRACTION} (?P<noun>‹letter›{{3,24}})", fractions.read_divided),
-    (rf"(?:(?P<integer>[0-9]{{1,4}}){_FRACTION}|{_ALONE})(?: (?P<noun>‹unit›)(?!‹letter›))?", fractions.read_fraction),
+    (
+        rf"(?:(?P<integer>[0-9]{{1,4}}){_FRACTION}|{_ALONE})(?: (?P<noun>‹unit›)(?!‹letter›))?‹tail›",
+        fractions.read_fraction,
+    ),
     (
         r"‹signed›(?: ?(?P<magnitude>‹magnitude›))?(?: ?|-)(?P<unit>‹unit›)(?:/(?P<per>‹unit›))?‹end›‹tail›",
         counted.read_measure,

@@ -8,7 +8,9 @@ setting      signs and templates of the language, by the names that `lexicon.loc
 rule         rule set of CLDR by kind, gender and case (``cardinal f genitive``)
 fix          pattern and replacement in words of numbers that CLDR misspells
 ordinal      ordinals that CLDR lacks, in the masculine nominative; ``inflection`` has endings by gender and case
-case         gender or case that a word requires of the number behind it; details: of which kind of number
+case         gender or case that a word requires of the number behind it; details: of which kind of number; behind a
+             plus sign, ending of a plural noun, and the case that it has
+construct    end of the words of a number before its noun
 gender       endings of nouns, longest first, and whole nouns (with a caret) of a gender; details: ``plural``, the
              gender of plurals with this ending
 unit         unit or noun behind a number; ``{}`` is the number where it does not come first; details: ``alone`` (also
