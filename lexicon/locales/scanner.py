@@ -21,7 +21,7 @@ _VOWEL_SIGNS = "\u064b-\u065f\u0670\u0900-\u0903\u093a-\u094f\u0955-\u0957\u0962
 WORD = rf"(?:[{_LATIN}]+|(?:(?![{_LATIN}]){LETTER}|[{_VOWEL_SIGNS}])+)"
 PLACE = re.compile(rf"(?P<number>[0-9\u00bc-\u00be\u2150-\u215e])|(?P<word>{WORD})|[^\w\s]|\S")
 _LEADING_LETTERS = re.compile(rf"{WORD}?")
-_INITIALISM = rf"(?P<letters>[A-ZÄÖÜÀ-ÞĄ-Ž]{{2,8}})(?P<ending>s)?(?!{LETTER})"
+_INITIALISM = r"(?P<letters>[A-ZÄÖÜÀ-ÞĄ-ŽА-ЯЁ]{2,8})(?P<ending>s)?(?!{letter})"
 _LABEL = r"[A-Za-z0-9][A-Za-z0-9-]{0,62}"
 _TLD = (
     r"(?:com|org|net|edu|gov|io|ai|app|dev|info|eu|de|fr|es|it|pt|br|nl|be|pl|ru|tr|gr|at|ch|uk|us|mx|cn|jp|kr|in|vn)"
@@ -199,7 +199,10 @@ def scanner(locale: Locale) -> Scanner:
     address = Form(re.compile(_ADDRESS), words.read_address)
     suffix = alternatives(locale, "suffix")
     pattern = _ROMAN.replace("{suffix}", suffix)
-    numerals = [Form(re.compile(_INITIALISM), initialisms.read_initialism), Form(re.compile(pattern), roman.read_roman)]
+    numerals = [
+        Form(re.compile(_INITIALISM.replace("{letter}", _letter(locale))), initialisms.read_initialism),
+        Form(re.compile(pattern), roman.read_roman),
+    ]
     if locale.setting("roman_stop"):  # XIV. is an ordinal
         stop = rf"(?P<roman>[IVXLCDM]{{1,15}})\.(?=,| {LETTER})"
         numerals = [Form(re.compile(stop), roman.read_roman_with_stop), *numerals]
