@@ -30,6 +30,7 @@ _SINGLE_LETTER = re.compile(r"(?<![^\W\d_])[^\W\d_](?![^\W\d_])")
 _LONG_WORD = re.compile(r"[^\W\d_\u0900-\U0010ffff]{100}(?=[^\W\d_\u0900-\U0010ffff])")
 # espeak-ng reads aujourd’hui in English, and 12 345 with a narrow space as two numbers
 _AS_ESPEAK_READS = str.maketrans({"’": "'", "ʼ": "'", "\u00a0": " ", "\u202f": " ", "\u2009": " "})
+_WORD = re.compile(r"\s*\S+\s*")
 _LONG_NUMBER = re.compile(rf"[0-9]{{{MAX_CARDINAL_DIGITS + 1},}}")
 
 
@@ -110,11 +111,21 @@ def spoken_forms(text: str, language: str) -> list[WrittenForm]:
     forms = read_forms(text, language)
     if language == "ja":
         forms = [form if form.source == form.spoken else _in_kana(form) for form in forms]
-    return [replace(form, spoken=_readable(form.spoken, language)) for form in forms]
+    return [part for form in forms for part in _readable_parts(form, language)]
 
 
 def _in_kana(form: WrittenForm) -> WrittenForm:
     return replace(form, spoken=numbers_in_kana(form.spoken))
+
+
+def _readable_parts(form: WrittenForm, language: str) -> Iterator[WrittenForm]:
+    """A form in letters that the language reads; of words that differ from what is written each is one for itself."""
+    spoken = _readable(form.spoken, language)
+    if spoken == form.spoken or len(form.source) != len(form.spoken):
+        yield replace(form, spoken=spoken)
+        return
+    for word in _WORD.finditer(form.spoken):
+        yield WrittenForm(form.source[slice(*word.span())], _readable(word.group(), language))
 
 
 def _readable(spoken: str, language: str) -> str:

@@ -1,6 +1,6 @@
 """Readers of numbers with what they count: measures, money, ranges, fractions, ordinals, telephone numbers."""
 
-from lexicon.locales.nouns import behind, case_of, construct, count, gender_of, is_plural, noun_form
+from lexicon.locales.nouns import behind, case_of, construct, count, gender_of, is_plural, noun_form, one_before
 from lexicon.locales.numbers import Amount, Grammar, is_round_million, number, ordinal, whole, year
 from lexicon.locales.place import Place, read_amount
 from lexicon.locales.tables import Locale, Row
@@ -100,7 +100,9 @@ def read_number(place: Place) -> str:
     own = gender_of(locale, noun, plural=several) if agrees else ""
     gender = grammar.gender or own or (locale.setting("default_gender") if agrees else "")
     grammar = Grammar(gender, (case_of(locale, noun) if several else "") or grammar.case)
-    if amount.sign or amount.decimals or not written.isdigit():
+    if written == "1" and noun and (one := one_before(locale, gender, noun)):
+        said = one
+    elif amount.sign or amount.decimals or not written.isdigit():
         said = number(locale, amount, grammar)
     else:
         said = year_or_number(locale, written, grammar)

@@ -144,8 +144,9 @@ def read_time(place: Place) -> str | None:
     if match["second"]:
         said = f"{said} {locale.setting('and')} {cardinal(locale, int(match['second']))} {locale.setting('seconds')}"
     is_named = match["word"] or match["sign"] == "h"
-    if is_named and locale.setting("hour_word") and locale.setting("hour_word") not in said:
-        said = f"{said} {locale.setting('hour_word')}"
+    hours = noun_form(locale, Row(locale.setting("hour_word"), {}), Amount("", str(hour)))
+    if is_named and hours and hours not in said:
+        said = f"{said} {hours}"
     return said
 
 

@@ -2,8 +2,8 @@
 
 import re
 
-from lexicon.locales.numbers import cardinal, digits, whole
-from lexicon.locales.place import Place, amount_pattern
+from lexicon.locales.numbers import cardinal, digits, number, whole
+from lexicon.locales.place import Place, amount_pattern, read_amount
 from lexicon.locales.tables import Locale
 
 
@@ -45,6 +45,15 @@ def read_version(place: Place) -> str | None:
         most = int(locale.setting("decimals", "0"))
         return dot.join([whole(locale, parts[0]), (whole if len(parts[1]) <= most else digits)(locale, parts[1])])
     return dot.join(whole(locale, part) for part in parts)
+
+
+def read_scientific(place: Place) -> str:
+    """Number with a power of ten: 1.5e-6."""
+    locale = place.locale
+    power = locale.setting("power").format(number(locale, read_amount(locale, place.match["exponent"])))
+    written = re.sub("[.,]", locale.setting("decimal", ","), place.match["amount"])
+    parts = (number(locale, read_amount(locale, written)), locale.rows("sign")["×"].spoken, cardinal(locale, 10), power)
+    return locale.setting("join", " ").join(parts)
 
 
 def read_score(place: Place) -> str:

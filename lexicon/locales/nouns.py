@@ -1,11 +1,13 @@
 """Nouns behind numbers: their gender, their plural category, and the case that a number requires."""
 
+import re
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from lexicon.locales.numbers import Amount, Grammar, is_round_million, number
 from lexicon.locales.tables import Locale, Row
 
+_ONE = Amount("", "1")
 _WHOLE = "="  # before a form that says its number: كيلومتران is two kilometres
 _MAX_ENDING = 7  # letters of the longest ending in a table
 _VOWELS = "aeiouyéèêàâîôûh"
@@ -112,10 +114,17 @@ def construct(locale: Locale, said: str) -> str:
     return said
 
 
+def one_before(locale: Locale, gender: str, noun: str) -> str:
+    """Form of one before the first letters of a noun (un'ora, uno zaino); empty where the language has no such form."""
+    start = f"{gender} {noun.lower()}"
+    return next((row.spoken for pattern, row in locale.rows("one").items() if re.match(pattern, start)), "")
+
+
 def count(locale: Locale, amount: Amount, row: Row, case: str = "") -> str:
     """A number with its noun: trois kilomètres, un million de kilomètres, yüzde yirmi."""
     gender = row.details.get("gender") or gender_of(locale, row.forms[0]) or locale.setting("default_gender")
-    said = number(locale, amount, Grammar(gender, case))
+    said = one_before(locale, gender, row.forms[0]) if amount == _ONE else ""
+    said = said or number(locale, amount, Grammar(gender, case))
     if amount.whole == "2" and not amount.decimals and not amount.sign:
         said = locale.setting("two") or said  # 两公里, but 二
     noun = noun_form(locale, row, amount, case)

@@ -12,7 +12,8 @@ from lexicon.written_forms import WrittenForm, read_table
 
 # one character for one, so that the written form of each word stays known
 _PLAIN = {0xA0: " ", 0x202F: " ", 0x2009: " ", 0x2007: " ", 0x2212: "-", 0x2010: "-", 0x2011: "-", 0x2044: "/",
-          0xFF05: "%", 0x66A: "%", 0x66B: ".", 0x66C: ",", 0x2019: "'", 0x2BC: "'", 0x2126: "\u03a9"}  # fmt: skip
+          0x7C: " ", 0xFF05: "%", 0x66A: "%", 0x66B: ".", 0x66C: ",", 0x2019: "'", 0x2BC: "'",
+          0x2126: "\u03a9"}  # fmt: skip
 _MINUS = re.compile(r"(?<![\w.,])([-−][0-9]{1,400}(?:[.,][0-9]{1,400})?)")
 _LAST_WORD = re.compile(r"[^\W\d_]+\Z")
 

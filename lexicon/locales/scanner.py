@@ -43,10 +43,21 @@ _PART = re.compile("‹([a-z ]+)›")
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """A written form."""
+    """A written form; its pattern is compiled when it is tried, because most texts have few of some hundred forms."""
 
-    pattern: re.Pattern[str]
+    source: str
     reader: Reader
+    flags: int = 0
+
+    @property
+    def pattern(self) -> re.Pattern[str]:
+        """Pattern of the form."""
+        return _compiled(self.source, self.flags)
+
+
+@functools.cache
+def _compiled(source: str, flags: int) -> re.Pattern[str]:
+    return re.compile(source, flags)
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,6 +145,10 @@ _NUMBER_FORMS: tuple[tuple[str, Reader], ...] = (
         r"‹tail›",
         counted.read_money,
     ),
+    (
+        r"(?P<amount>[-+]?[0-9]{1,20}(?:[.,][0-9]{1,20})?)[eE](?P<exponent>[-+]?[0-9]{1,3})(?!\w)",
+        digit_groups.read_scientific,
+    ),
     (r"(?P<amount>‹amount›)(?:[-–](?=[0-9])| – (?=[0-9]))(?!‹amount›[-–][0-9])", counted.read_range),
     (rf"(?P<integer>[0-9]{{1,4}}){_FRACTION} (?P<noun>‹letter›{{3,24}})", fractions.read_divided),
     (
@@ -188,7 +203,7 @@ def _number_forms(locale: Locale) -> Iterator[Form]:
     for template, reader in _NUMBER_FORMS:
         names = _PART.findall(template)
         if all(parts[name] for name in names):
-            yield Form(re.compile(_PART.sub(lambda part: parts[part[1]], template)), reader)
+            yield Form(_PART.sub(lambda part: parts[part[1]], template), reader)
 
 
 @functools.cache
@@ -196,20 +211,18 @@ def scanner(locale: Locale) -> Scanner:
     """Forms of a language."""
     own = (Form(pattern, reader) for places, pattern, reader in template_forms(locale) if not places)
     numbers = (*own, *_number_forms(locale))
-    address = Form(re.compile(_ADDRESS), words.read_address)
+    address = Form(_ADDRESS, words.read_address)
     suffix = alternatives(locale, "suffix")
     pattern = _ROMAN.replace("{suffix}", suffix)
     numerals = [
-        Form(re.compile(_INITIALISM.replace("{letter}", _letter(locale))), initialisms.read_initialism),
-        Form(re.compile(pattern), roman.read_roman),
+        Form(_INITIALISM.replace("{letter}", _letter(locale)), initialisms.read_initialism),
+        Form(pattern, roman.read_roman),
     ]
     if locale.setting("roman_stop"):  # XIV. is an ordinal
         stop = rf"(?P<roman>[IVXLCDM]{{1,15}})\.(?=,| {LETTER})"
-        numerals = [Form(re.compile(stop), roman.read_roman_with_stop), *numerals]
+        numerals = [Form(stop, roman.read_roman_with_stop), *numerals]
     endings = locale.rows("ending")
-    ending = Form(
-        re.compile(rf"(?P<stem>{LETTER}{{2,40}}?)(?P<ending>{_any_of(endings) or '(?!)'})"), words.read_ending
-    )
+    ending = Form(rf"(?P<stem>{LETTER}{{2,40}}?)(?P<ending>{_any_of(endings) or '(?!)'})", words.read_ending)
     return Scanner(numbers, _forms_by_word(locale), _forms_by_sign(locale), address, tuple(numerals), ending)
 
 
@@ -250,12 +263,12 @@ def _forms_by_word(locale: Locale) -> dict[str, tuple[Form, ...]]:
 
     def add(written: Iterable[str], template: str, reader: Reader, flags: int = 0) -> None:
         for first, forms in _grouped(written).items():
-            pattern = re.compile(template.replace("{}", _any_of(forms)), flags)
-            found.setdefault(first.lower() if flags else first, []).append(Form(pattern, reader))
+            pattern = template.replace("{}", _any_of(forms))
+            found.setdefault(first.lower() if flags else first, []).append(Form(pattern, reader, flags))
 
     end = rf"(?!{letter}|[0-9])"
     for first, forms in _grouped(locale.rows("currency")).items():
-        pattern = re.compile(_money_before(locale, _any_of(forms)))
+        pattern = _money_before(locale, _any_of(forms))
         found.setdefault(first, []).append(Form(pattern, counted.read_money))
     short = locale.rows("abbreviation")
     letters = {*short, *(form[:1].upper() + form[1:] for form in short)}
@@ -268,6 +281,7 @@ def _forms_by_word(locale: Locale) -> dict[str, tuple[Form, ...]]:
     link = f"(?:(?:{of}) )?" if of else ""
     add(months, rf"(?P<month>{{}})\.?(?:/| {link})(?P<year>[12][0-9]{{3}})(?![0-9])", dates.read_month_year)
     add((word.lower() for word in locale.rows("word")), rf"(?:{{}}){end}(?!-{letter})", words.read_word, re.IGNORECASE)
+    add((sign for sign in locale.rows("sign") if sign.isalpha()), "{}", words.read_sign)  # π
     add(
         (unit for unit in locale.rows("unit") if "alone" in locale.rows("unit")[unit].details),
         rf"(?P<unit>{{}}){end}",
@@ -280,26 +294,34 @@ def _forms_by_sign(locale: Locale) -> dict[str, tuple[Form, ...]]:
     found = _templates_by_place(locale)
     for first, forms in _grouped(locale.rows("currency")).items():
         if not first.isalpha():
-            pattern = re.compile(_money_before(locale, _any_of(forms)))
+            pattern = _money_before(locale, _any_of(forms))
             found.setdefault(first, []).append(Form(pattern, counted.read_money))
             minus = _money_before(locale, _any_of(forms)).replace("(?P<minus>(?!))?", "(?P<minus>-)", 1)
-            found.setdefault("-", []).append(Form(re.compile(minus), counted.read_money))
+            found.setdefault("-", []).append(Form(minus, counted.read_money))
     if locale.setting("percent_first"):
         percent = rf"(?P<unit>%) ?(?P<amount>{amount_pattern(locale)})(?P<magnitude>(?!))?(?P<per>(?!))?"
         percent += rf"(?:['’](?P<tail>{LETTER}{{1,12}}))?"
-        found.setdefault("%", []).append(Form(re.compile(percent), counted.read_measure))
+        found.setdefault("%", []).append(Form(percent, counted.read_measure))
     for first, forms in _grouped(locale.rows("abbreviation")).items():
         if not first.isalpha():
-            found.setdefault(first, []).append(Form(re.compile(_any_of(forms)), words.read_abbreviation))
-    for first, form in _forms_of_signs(locale):
+            found.setdefault(first, []).append(Form(_any_of(forms), words.read_abbreviation))
+    for first, form in (*_forms_of_signs(locale), *_units_alone(locale)):
         found.setdefault(first, []).append(form)
     return {first: tuple(forms) for first, forms in found.items()}
 
 
+def _units_alone(locale: Locale) -> Iterator[tuple[str, Form]]:
+    """Signs of units and currencies without a number, with the sign at which each is tried."""
+    units = {unit for unit, row in locale.rows("unit").items() if "quote" not in row.details}
+    for first, written in _grouped({*units, *locale.rows("currency")}).items():
+        if not first[0].isalpha():
+            yield first, Form(f"(?P<unit>{_any_of(written)})", words.read_unit_alone)
+
+
 def _forms_of_signs(locale: Locale) -> Iterator[tuple[str, Form]]:
     """Powers, dashes and signs with words of their own, with the character at which each is tried."""
-    yield from ((first, Form(re.compile(_PATH), words.read_address)) for first in "/~.")
-    yield from ((first, Form(re.compile(_POWER), words.read_power)) for first in "^⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-    yield from ((dash, Form(re.compile(rf"{dash}(?=[0-9])"), words.read_dash)) for dash in "-–")
+    yield from ((first, Form(_PATH, words.read_address)) for first in "/~.")
+    yield from ((first, Form(_POWER, words.read_power)) for first in "^⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+    yield from ((dash, Form(rf"{dash}(?=[0-9])", words.read_dash)) for dash in "-–")
     for first, written in _grouped(locale.rows("sign")).items():
-        yield first, Form(re.compile(_any_of(written)), words.read_sign)
+        yield first, Form(_any_of(written), words.read_sign)

@@ -11,6 +11,7 @@ ordinal      ordinals that CLDR lacks, in the masculine nominative; ``inflection
 case         gender or case that a word requires of the number behind it; details: of which kind of number; behind a
              plus sign, ending of a plural noun, and the case that it has
 construct    end of the words of a number before its noun
+one          form of the number one, by a pattern of the gender and the noun behind it
 gender       endings of nouns, longest first, and whole nouns (with a caret) of a gender; details: ``plural``, the
              gender of plurals with this ending
 unit         unit or noun behind a number; ``{}`` is the number where it does not come first; details: ``alone`` (also
@@ -45,7 +46,7 @@ from importlib import resources
 from types import MappingProxyType
 
 COLUMNS = 4
-_LIKE_NO_WORD = re.compile("[a-zа-я][A-ZА-ЯΩ]|[µμ]")  # kHz, кВт, mA, but not mm, MB or Pa
+_LIKE_NO_WORD = re.compile("[a-zа-я][A-ZА-ЯΩ]|[µμ]|.*/")  # kHz, кВт, mA, Mbit/s, but not mm, MB or Pa
 _NO_FORMS = frozenset({"alone", "last", "quote", "gender", "si"})  # details that are no forms of the noun in a case
 _BEFORE_NOUN = re.compile(r"=|.*\{\} ?")  # a form that holds its number, or has it before the noun
 _NO_ROWS: Mapping[str, "Row"] = MappingProxyType({})
@@ -109,7 +110,7 @@ def _read(name: str) -> dict[str, dict[str, Row]] | None:
     for line in path.read_text(encoding="utf-8").splitlines()[1:]:
         kind, written, spoken, details = (line.split("\t") + [""] * COLUMNS)[:COLUMNS]
         row = Row(spoken, MappingProxyType(dict(_detail(part) for part in details.split(";") if part)))
-        for form in [written] if kind in {"fix", "form"} or len(written) == 1 else written.split("|"):
+        for form in [written] if kind in {"fix", "form", "one"} or len(written) == 1 else written.split("|"):
             kinds.setdefault(kind, {})[form] = row
     return kinds
 

@@ -20,12 +20,12 @@ _KIND = "form"
 _DIGITS = frozenset("0123456789")  # rows of a kind with all of them are looked up digit by digit
 
 
-def template_forms(locale: Locale) -> Iterator[tuple[tuple[str, ...], re.Pattern[str], Reader]]:
+def template_forms(locale: Locale) -> Iterator[tuple[tuple[str, ...], str, Reader]]:
     """The words and signs at which each form is tried (none: at numbers), its pattern and its reader."""
     amount = amount_pattern(locale)
     for written, row in locale.rows(_KIND).items():
         places = tuple(row.details["at"].split("|")) if "at" in row.details else ()
-        yield places, re.compile(written.replace("#", amount)), _reader(row)
+        yield places, written.replace("#", amount), _reader(row)
 
 
 def _reader(row: Row) -> Reader:

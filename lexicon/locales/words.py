@@ -125,9 +125,9 @@ def _stands_between_units(place: Place) -> bool:
 
 
 def read_unit_alone(place: Place) -> str:
-    """Unit without a number: one of them behind a word for per, else several."""
-    locale = place.locale
-    row = locale.rows("unit")[place.match["unit"]]
+    """Unit or currency without a number: one of them behind a word for per, else several."""
+    locale, written = place.locale, place.match["unit"]
+    row = locale.rows("unit").get(written) or locale.rows("currency")[written]
     is_one = place.before.lower() in locale.words("per_words") or place.said.lower() in locale.words("per_words")
     return noun_form(locale, row, Amount("", "1" if is_one else "100")).replace("{}", "").strip()
 
