@@ -76,8 +76,7 @@ def run_prepared(prepared: "PreparedRequest", picture: Picture, options: SpeakOp
 def _make(prepared: "PreparedRequest", picture: Picture, options: SpeakOptions) -> None:
     from tts2face.sound.voice_pool import VoicePool
 
-    for note in () if options.quiet else prepared.notes:
-        write_message(f"tts2face: note: {note}")
+    _write_notes(prepared.notes, options)
     voices = VoicePool()
     person = options.models.shown_person()
     fitting = prepared.fitting(person)
@@ -88,9 +87,16 @@ def _make(prepared: "PreparedRequest", picture: Picture, options: SpeakOptions) 
         _write_clip(prepared, picture, options, voices)
 
 
+def _write_notes(notes: Sequence[str], options: SpeakOptions) -> None:
+    for note in () if options.quiet else notes:
+        write_message(f"tts2face: note: {note}")
+
+
 def _write_clip(prepared: "PreparedRequest", picture: Picture, options: SpeakOptions, voices: "VoicePool") -> None:
     _tell_what_is_heard(prepared.request, options)
     session = _open_session(options, voices)
+    n_known, prepared = len(prepared.notes), session.prepare(prepared)
+    _write_notes(prepared.notes[n_known:], options)
     resume_collection()
     explanations: list[PhoneExplanation] = []
 

@@ -19,15 +19,23 @@ _REST = re.compile(
     re.IGNORECASE,
 )
 _MAX_NAME_WORDS = 2
+_SEPARATORS = re.compile(r"[\s_:=-]+")
+_WORD = re.compile(r"[^\W\d_]{2,}")
 
 
 @functools.lru_cache(maxsize=1000)
 def is_gesture(written: str) -> bool:
-    """Whether words between brackets are written as a gesture, also one with values out of range."""
+    """Whether words between brackets are written as a gesture, also one with values that cannot be read or used.
+
+    Behind the name of one stand no other words than directions: ``[nod x]``, not ``[listen to the radio]``.
+    """
     try:
-        return parse_gesture(written, 0) is not None
+        if parse_gesture(written, 0) is not None:
+            return True
     except InputError:
         return True
+    named = _split_name(written)
+    return named is not None and all(word.casefold() in DIRECTIONS for word in _WORD.findall(named[1]))
 
 
 def parse_gesture(written: str, at: int) -> GestureMark | None:
@@ -38,12 +46,18 @@ def parse_gesture(written: str, at: int) -> GestureMark | None:
     InputError
         A value is out of range, or a gesture without direction has one.
     """
-    words = re.split(r"[\s_-]+", written.strip(), maxsplit=_MAX_NAME_WORDS)
+    named = _split_name(written)
+    return None if named is None else _parse_rest(*named, at)
+
+
+def _split_name(written: str) -> tuple[str, str] | None:
+    """The name of a gesture and what stands behind it; None where no gesture has that name."""
+    words = _SEPARATORS.split(written.strip(), maxsplit=_MAX_NAME_WORDS)
     for n_words in range(min(_MAX_NAME_WORDS, len(words)), 0, -1):
         name = gesture_name("_".join(words[:n_words]))
         if name is not None:
-            return _parse_rest(name, " ".join(words[n_words:]), at)
-    return _parse_rest("look_at", " ".join(words[1:]), at) if words[0].casefold() == "look" else None
+            return name, " ".join(words[n_words:])
+    return ("look_at", " ".join(words[1:])) if words[0].casefold() == "look" else None
 
 
 def _parse_rest(name: str, rest: str, at: int) -> GestureMark | None:

@@ -31,11 +31,18 @@ OWN_MARK = (
     r"|\[(?P<name>/?(?:style|pause)\b|/nod\b|phoneme(?=:)|/phoneme(?=\]))(?P<rest>[^\[\]]*)(?P<end>\]?)"
     rf"|\[(?P<gesture>(?i:{'|'.join(FIRST_WORDS)})(?![^\W_])[^\[\]]*)(?P<gesture_end>\]?)"
 )
+# Marks of SSML in square brackets, and of bulletin boards; a level of emphasis stands behind a space.
+_FOREIGN_MARK = (
+    r"\[(?:/(?P<ended>[A-Za-z][\w-]{0,30})|(?:emphasis|prosody)(?:\s(?:strong|moderate|none|reduced))?"
+    r"|(?:emphasis|prosody|say-as|lang|express-as|url|color|font|quote)[:=]\S[^\[\]\n]{0,80})\]"
+    r"|\[(?P<board>[bius])\](?=[^\[\n]{1,200}\[/(?P=board)\])"
+)
 _URL = r"\([^()\s]{0,2000}(?:\([^()\s]{0,200}\)[^()\s]{0,200})?(?:\s+\"[^\"\n]{0,200}\")?\)"
 _ATTRIBUTES = r"(?P<attributes>(?:\s[^<>]{0,400})?)"
 _KINDS: Mapping[str, str] = MappingProxyType({
     "escape": r"\\[*_#\[\]()~`>|!{}<-]",
     "code": r"(?P<ticks>`{1,2})(?P<source>[^`\n]{1,500})(?P=ticks)|`+",
+    "foreign": _FOREIGN_MARK,
     "link": rf"!?\[(?=[^\[\]\n]{{0,300}}\]{_URL})|(?<=[^\s\[])\]{_URL}|\[\^[\w-]{{1,20}}\]:?|<(?=https?://[^<>\s]{{1,500}}>)",
     "entity": r"&(?:[A-Za-z][A-Za-z0-9]{1,31}|#[0-9]{1,7}|#[xX][0-9A-Fa-f]{1,6});",
     "tag": rf"<(?P<closing>/?)(?P<element>[A-Za-z][\w:.-]{{0,40}}){_ATTRIBUTES}\s?/?>",
@@ -63,7 +70,7 @@ _PASSED = word_set(
     "title section article header footer main nav img th td tbody thead details summary center strike tt label w token "
     "speak voice lang audio phoneme say-as prosody emphasis express-as bookmark desc meta metadata lexicon lookup "
     "answer response output final result message speech say text reply assistant user system content dialogue dialog "
-    "script narration "
+    "script narration url color quote "
 )
 _UNFOLLOWED = frozenset(["voice", "lang", "audio", "phoneme", "say-as", "prosody"])
 _MOOD_TAGS = word_set("emotion mood expression style tone feeling gesture action express-as")
@@ -206,6 +213,7 @@ class _Scanner:
         self._readers: Mapping[str, Callable[[re.Match[str]], Part | None]] = {
             "escape": lambda match: Text(*match.span(), match[0][1]),
             "code": self._code,
+            "foreign": self._foreign,
             "link": lambda match: Silent(*match.span()),
             "entity": self._entity,
             "tag": self._tag,
@@ -282,6 +290,15 @@ class _Scanner:
         if is_gesture(match["gesture"]):
             return Own(*match.span(), match)
         return self._bracket(match, match["gesture"])
+
+    def _foreign(self, match: "re.Match[str]") -> Part | None:
+        """A mark of another markup, whose words are spoken; the end of a direction ends its style."""
+        ended = match["ended"]
+        if ended and self._direction(ended, is_strict=False) is not None:
+            return Cue(*match.span(), (), ends_style=True)
+        if ended and ended.casefold() not in _PASSED:
+            return None  # [/tmp]
+        return Silent(*match.span(), f"the mark {match[0][:MAX_QUOTED_CHARACTERS]} is not followed; its text is spoken")
 
     def _code(self, match: "re.Match[str]") -> Part:
         return Text(*match.span(), match["source"].strip()) if match["source"] else Silent(*match.span())

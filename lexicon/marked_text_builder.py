@@ -43,6 +43,7 @@ class MarkedTextBuilder:
         self._marks: list[Mark] = []
         self._open_spans: list[_OpenSpan] = []
         self._last_pause: tuple[int, PauseMark | None] = (0, None)
+        self._silent_s = 0.0  # of the pauses since the last letter
         self._notes: dict[str, int | None] = {}  # with the line of the first
         self._foreign_styles: set[str] = set()
 
@@ -55,7 +56,9 @@ class MarkedTextBuilder:
         """Append text."""
         self._pieces += [text] if text else []
         self._length += len(text)
-        self._n_letters += len("".join(text.split()))
+        n_letters = len("".join(text.split()))
+        self._n_letters += n_letters
+        self._silent_s = 0.0 if n_letters else self._silent_s
 
     def note(self, text: str, line: int | None = None) -> None:
         """Note what is not followed, once; with its line in SSML."""
@@ -63,13 +66,13 @@ class MarkedTextBuilder:
 
     def add_pause(self, seconds: float, line: int | None = None) -> None:
         """Add silence at the current position, as far as `MAX_PAUSE_S` reaches, with a note on the rest."""
-        earlier = self._last_pause[1]
-        room = MAX_PAUSE_S - (earlier.seconds if earlier is not None and earlier.at == self._length else 0.0)
+        room = MAX_PAUSE_S - self._silent_s
         if seconds > room + LEAST_CUT:
             self.note(
                 f"silence at one place is {MAX_PAUSE_S:g} s, the limit, not {seconds - room + MAX_PAUSE_S:g}", line
             )
         if min(seconds, room) > 0:
+            self._silent_s += min(seconds, room)
             self.add_mark(PauseMark(self._length, min(seconds, room)))
 
     def add_mark(self, mark: Mark) -> None:

@@ -14,7 +14,7 @@ from lexicon.capitals import sentence_case
 from lexicon.gesture_names import GESTURES
 from lexicon.given_phones import TextWord, ToneSpan, phrase_words
 from lexicon.ipa import IpaPhone
-from lexicon.marked_text import GestureMark, Mark, MarkedText, PauseMark, PhoneMark, StyleRun
+from lexicon.marked_text import MAX_PAUSE_S, GestureMark, Mark, MarkedText, PauseMark, PhoneMark, StyleRun
 from lexicon.normalize import spoken_form
 from lexicon.pauses import PARAGRAPH_S, pause_behind
 from lexicon.sentence_length import n_letters, overlapping_runs, pieces_of_text
@@ -191,11 +191,6 @@ def index_by_letters(text: MarkedText) -> MarkedText:
     """A marked text with positions in letters; at one position the last run, the sum of pauses, the largest gestures.
 
     Gestures behind the last word get a pause in which they are seen.
-
-    Raises
-    ------
-    InputError
-        The sum of the pauses at one position is too long.
     """
     ends = (mark.end for mark in text.marks if isinstance(mark, PhoneMark))
     positions = sorted({0, len(text.text), *(run.start for run in text.runs), *(mark.at for mark in text.marks), *ends})
@@ -209,7 +204,8 @@ def index_by_letters(text: MarkedText) -> MarkedText:
     for mark in text.marks:
         at = letters[mark.at]
         if isinstance(mark, PauseMark):
-            pauses[at] = PauseMark(at, mark.seconds + (pauses[at].seconds if at in pauses else 0.0))
+            seconds = mark.seconds + (pauses[at].seconds if at in pauses else 0.0)
+            pauses[at] = PauseMark(at, min(seconds, MAX_PAUSE_S))
         elif isinstance(mark, GestureMark):
             gesture, earlier = replace(mark, at=at), gestures.get((at, mark.name))
             gestures[at, mark.name] = earlier if earlier and earlier.size > mark.size else gesture

@@ -10,12 +10,10 @@ from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.given_phones import pronounce_words
 from lexicon.languages import language_code
 from lexicon.marked_text import MarkedText
-from lexicon.moods import is_auto, with_moods
 from lexicon.normalize import split_tokens, spoken_forms
 from lexicon.pronounce import NOTHING, Pronunciation, Word, pronounce
 from lexicon.sentences import Phrase, split_sentences
 from lexicon.sources import sources_of
-from lexicon.text_marks import is_ssml, parse_marks
 
 
 def pronounce_marked(
@@ -37,19 +35,6 @@ def pronounce_marked(
     if not words:
         raise SilentTextError(NOTHING)
     return Pronunciation(text.text, language, tuple(words))
-
-
-def reading_notes(text: str, language: str, markup: str = "auto", style: str | None = None) -> tuple[str, ...]:
-    """Notes on marks that are not followed, on words that a language does not read, and on moods of ``--style auto``.
-
-    Raises as `parse_marks`.
-    """
-    is_plain = text.isascii() and markup != "ssml" and not is_ssml(text) and "[" not in text and "<" not in text
-    if is_plain and not is_auto(style):
-        return ()
-    marked = parse_marks(text, language, markup)
-    readable, notes = make_readable(marked, language)
-    return (*marked.notes, *notes, *(with_moods(readable, language)[1] if is_auto(style) else ()))
 
 
 def pronounce_phrase(phrase: Phrase, language: str, dictionary: Dictionary | None = None) -> tuple[Word, ...]:

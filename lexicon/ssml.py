@@ -56,6 +56,7 @@ EMPHASES = MappingProxyType({"strong": (1.0, 1.0), "moderate": (0.6, 0.6), "none
 STRETCH_ENDS = MappingProxyType({"p": "\n\n", "s": "\u2028"})  # a blank line, and a line separator
 SPAN_KINDS = frozenset({"emphasis", "prosody", "express-as", "voice", "lang"})
 LEAF_KINDS = frozenset({"break", "mark", "sub", "phoneme", "say-as"})  # contain no elements
+PASSED = ""  # in place of the name of an element that is not followed, whose text is spoken
 REPLACED_KINDS = frozenset({"phoneme", "say-as"})  # speak other words than their text
 TYPICAL_HZ = 165.0  # between the usual pitch of men and of women, for a voice of which it is not known
 Attributes = Mapping[str, str]
@@ -173,15 +174,16 @@ class _SsmlReader:
             raise InputError("<speak> must be the only root element; put everything into one")
         if len(self._elements) > 2 * MAX_NESTING:
             raise InputError(f"<{tag[:40]}> is nested in {len(self._elements)} others; reduce the nesting")
-        if self._elements and self._elements[-1] in LEAF_KINDS:
-            raise InputError(f"<{self._elements[-1]}> cannot contain elements; close it before <{tag[:40]}>")
         check_lengths(tag, attributes)
+        if self._inside in LEAF_KINDS:
+            self._note(f"<{tag[:40]}> within <{self._inside}> is not followed; its text is that of <{self._inside}>")
+            name = PASSED
         self._stand_apart(name)
         self._elements.append(name)
         self._spans.append("")
         self._final_pauses_s.append(0.0)
         self._n_unspoken += self._n_unspoken > 0 or name in UNSPOKEN
-        if self._n_unspoken > 1:
+        if self._n_unspoken > 1 or name == PASSED:
             return
         if name not in self._starts or (name == "speak" and len(self._elements) > 1):
             shown = f"<{tag[:40]}> is not supported; its text is spoken"
@@ -191,7 +193,11 @@ class _SsmlReader:
         for attribute in unread:
             self._note(f"the attribute {attribute[:40]} of <{tag}> is not followed")
         self._spans[-1], self._tag = name if name in SPAN_KINDS else "", tag
-        self._starts[name](read)
+        try:
+            self._starts[name](read)
+        except InputError as wrong:
+            self._elements[-1], self._spans[-1] = PASSED, ""
+            self._note(f"<{tag}> is not followed: {wrong}")
 
     def _end(self, tag: str) -> None:
         name, span = self._elements.pop(), self._spans.pop()
@@ -204,16 +210,24 @@ class _SsmlReader:
         self._stand_apart(name)
         self._builder.add_pause(pause_s, self.line)
         if span:
-            self._builder.close(span, f"</{tag}>")
+            try:
+                self._builder.close(span, f"</{tag}>")
+            except InputError as wrong:
+                self._note(f"<{tag}> is not followed: {wrong}")
         if name in {"p", "s"}:
             self._builder.add_text(STRETCH_ENDS[name])
 
+    @property
+    def _inside(self) -> str:
+        """The innermost element that is followed."""
+        return next((name for name in reversed(self._elements) if name), "")
+
     def _words(self, text: str) -> None:
-        inside = self._elements[-1]
+        inside = self._inside
         if inside == "sub" or self._n_unspoken:
             return
         if inside in {"break", "mark"} and text.strip():
-            raise InputError(f"<{inside}> cannot contain text; close it before {text.strip()[:20]!r}")
+            self._note(f"<{inside}> cannot contain text; {text.strip()[:20]!r} is spoken behind it")
         if inside in REPLACED_KINDS:
             self._replaced_text.append(text)
         else:
@@ -287,7 +301,11 @@ class _SsmlReader:
         alphabet, wanted = attributes.get("alphabet", "ipa"), attributes.get("interpret-as", "").strip()
         if kind == "phoneme" and alphabet in ALPHABETS:
             self._add_text(" " if self._is_apart and self._builder.last_character.isalnum() else "")
-            _add_phonemes(self._builder, text, attributes["ph"], alphabet)
+            try:
+                _add_phonemes(self._builder, text, attributes["ph"], alphabet)
+            except InputError as wrong:
+                self._note(f"<phoneme> is not followed: {wrong}")
+                self._add_text(text)
         elif kind == "say-as" and reads_kind(wanted, self._current_language):
             self._add_text(self._said_as(wanted, text, attributes.get("format", "")))
         else:

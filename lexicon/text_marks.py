@@ -196,7 +196,8 @@ def _read_mark(builder: MarkedTextBuilder, match: "re.Match[str]") -> None:
     try:
         if match["gesture"] is not None:
             gesture = parse_gesture(match["gesture"], builder.at)
-            assert gesture is not None  # else it is no mark
+            if gesture is None:
+                raise InputError(f"write {_mark_syntax('nod')}")
             builder.add_mark(gesture)
         elif match["name"] is None:
             _add_phonemes(builder, match["words"], match["phones"], "ipa")

@@ -204,14 +204,6 @@ def test_invalid_requests_give_one_sentence_and_nothing_is_written(
     assert set(here.iterdir()) == before
 
 
-def test_an_unknown_style_in_the_text_is_refused(
-    tones: World, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    assert run(["[style:cross]Hi.[/style]", *tones.flags, "--out", str(tmp_path / "x.mp4"), *SMALL]) == 2
-    assert "no style 'cross'" in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
-
-
 def test_a_capture_becomes_a_style_of_the_starter_palette(
     capture: Path, tones: World, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

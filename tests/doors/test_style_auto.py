@@ -7,7 +7,8 @@ import pytest
 
 from cli.main import run
 from tts2face.request import Request
-from tts2face.session.prepared import prepare, with_styles_of
+from tts2face.session.marked_styles import with_styles_of
+from tts2face.session.prepared import prepare
 from tts2face.session.session import Session
 
 TEXT = "We won the cup! The door is open. I am so sorry, he died."
@@ -26,8 +27,10 @@ def test_the_words_give_the_styles(shipped: Session) -> None:
 
 
 def test_a_palette_without_the_style_shows_the_sentence_as_it_is() -> None:
-    found = with_styles_of(prepare(Request(text=TEXT, style="auto")), ("neutral", "annoyed"))
-    assert {run.styles for run in found.text.runs} == {()}
+    text = prepare(Request(text=TEXT, style="auto")).text
+    found = with_styles_of(text, ("neutral", "annoyed"))
+    assert {run.styles for run in found.runs} == {()}
+    assert found.notes == text.notes
 
 
 def test_the_command_says_why(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,7 +10,8 @@ from lexicon.ssml_leniency import nearest_style, with_plain_entities
 from lexicon.text_marks import parse_marks
 from tts2face.models.palette_file import load_palette
 from tts2face.request import Request
-from tts2face.session.prepared import prepare, with_styles_of
+from tts2face.session.marked_styles import with_styles_of
+from tts2face.session.prepared import prepare
 
 
 def ssml(inside: str, language: str = "en-us") -> MarkedText:
@@ -226,9 +227,13 @@ def test_styles_of_services_that_are_not_known_are_spoken_around_unless_the_pale
     prepared = prepare(Request(text=f"<speak>{text}</speak>"))
     assert "the style santa of <mstts:express-as> is not followed, unless the palette" in prepared.notes[0]
     for names, styles in ((["delighted"], {(), ("delighted",)}), (["santa", "happy"], {(), ("santa",), ("happy",)})):
-        assert {run.styles for run in with_styles_of(prepared, names).text.runs} == styles
+        assert {run.styles for run in with_styles_of(prepared.text, names).runs} == styles
+        assert with_styles_of(prepared.text, names).notes == prepared.notes
     own = prepare(Request(text='<speak><express-as style="santa">a</express-as></speak>'))
-    assert with_styles_of(own, ["delighted"]).text.runs[0].styles == ("santa",)
+    found = with_styles_of(own.text, ["delighted"])
+    assert found.runs[0].styles == ()
+    assert found.notes == ("there is no style 'santa' in the palette; its words keep the style around them",)
+    assert with_styles_of(found, ["delighted"]).notes == found.notes
 
 
 def test_a_fragment_is_ssml_where_the_markup_says_so() -> None:

@@ -6,9 +6,10 @@ import pytest
 
 from lexicon import vowels
 from lexicon.canonical import signs_before_vowels
+from lexicon.foreign_words import make_readable
+from lexicon.marked_text import MarkedText
 from lexicon.normalize import spoken_form
 from lexicon.pronounce import pronounce
-from lexicon.spoken_words import reading_notes
 from lexicon.vowels import add_vowels, vowel_note, without_vowels
 from tests.packages import needs
 
@@ -39,7 +40,7 @@ def test_without_a_model_the_text_stays_and_the_note_says_so(language: str) -> N
     text, phones = TEXTS[language]
     assert spoken_form(text, language) == text
     assert "".join(pronounce(text, language).words[1].phones) != phones
-    assert any("tts2face[piper]" in note for note in reading_notes(text, language))
+    assert any("tts2face[piper]" in note for note in make_readable(MarkedText(text), language)[1])
 
 
 @pytest.mark.parametrize(

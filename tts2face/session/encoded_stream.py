@@ -113,7 +113,6 @@ def _encode_media(
         clips = (piece.clip for piece in models.pieces(prepared))
         return encode_movie(clips, renderer, format.name, threads=format.threads, pace=format.pace, path=path)
     if not isinstance(request.source, Recorded):
-        prepared = models.with_own_styles(prepared)
         pieces = timed_speech(prepared, models.for_request(prepared).speech, has_phones=False)
     else:
         pieces = models.pieces(prepared)

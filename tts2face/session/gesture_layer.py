@@ -30,7 +30,7 @@ from tts2face.request import FIELDS, OPTIONS
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.edits import ChannelEdits
 from tts2face.session.gesture_mouth import breath_of_gestures, mouth_gestures
-from tts2face.session.prepared import PreparedRequest, marked_styles
+from tts2face.session.prepared import PreparedRequest
 from tts2face.session.speech_stream import Piece
 from tts2face.source_options import SOURCE_OPTIONS
 from tts2face.storage.memory import NO_MEMORY, ResultMemory
@@ -110,8 +110,6 @@ class GestureLayer:
         palette, request = fields.palette, prepared.request
         self._palette = palette
         self._requested.check_styles(palette)
-        for style in marked_styles(prepared.text):
-            palette.require(style)
         face.check_gains(self._requested.gains.factors)
         self.edits = ChannelEdits(self._requested.edits, face)
         self._body = Body(face.channels, request.known_seed)

@@ -12,12 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from lexicon.mark_table import read_marks_table
 from lexicon.marked_text import GestureMark
 from lexicon.moods import is_auto
 from lexicon.pauses import pause_behind
-from lexicon.spoken_words import reading_notes
-from lexicon.text_marks import parse_marks
 from tts2face.gestures.elements import ListeningSpan
 from tts2face.gestures.listening import LASTS_S, responses
 from tts2face.gestures.timeline import Timeline
@@ -25,7 +22,8 @@ from tts2face.models.talker import speech_channels
 from tts2face.request import Idle, Listening, Request, Spoken
 from tts2face.session.joining import END_S, JOIN_LEAD_S
 from tts2face.session.live_gestures import WaitingGestures
-from tts2face.session.prepared import PreparedRequest, palette_style, prepare, unknown_styles
+from tts2face.session.marked_styles import palette_style
+from tts2face.session.prepared import PreparedRequest, prepare
 from tts2face.session.recording import select_audio_map
 from tts2face.session.shared_models import SessionModels
 from tts2face.session.speech_stream import Piece, after_listening
@@ -117,7 +115,6 @@ class LiveSpeech:
         if not isinstance(request.source, Spoken) or request.source.text or request.timeline is not None:
             raise InputError("a live request has options only; send its text in parts")
         self._request, self._models = request, models
-        self._table = read_marks_table(request.text_marks)
         self._spoken = request.source
         self._silent = replace(request, source=Idle(UNUSED_IDLE_S), dictionary=None)
         self._layer = models.gesture_layer(prepare(self._silent))
@@ -153,30 +150,35 @@ class LiveSpeech:
         """Duration of a number of frames."""
         return float(n_frames / self._rate)
 
-    def notes_on(self, text: str) -> tuple[str, ...]:
-        """Notes on a text: what is read otherwise than written, moods of the style auto; raises as `parse_marks`."""
-        return reading_notes(text, self.language, self.markup, self._request.style)
-
     def say(self, text: str) -> Iterator[Piece]:
         """Append the sentences of a text; errors as `Session.stream`.
 
-        Gestures of a text without words are those of the next piece.
+        Gestures of a text without words are those of the next piece. What is not followed is in `new_notes`.
         """
-        marked = parse_marks(text, self.language, self.markup, table=self._table)
-        if text.strip() and not any(map(str.isalnum, marked.text)):
-            return self.gesture(*(mark for mark in marked.marks if isinstance(mark, GestureMark)))
         spoken = replace(self._spoken, text=text)
         spoken = after_listening(spoken) if self._has_listened else spoken
-        self._has_listened = False
         if self._pause_s is not None:
             spoken = replace(spoken, lead=max(self._pause_s / spoken.rate - END_S, JOIN_LEAD_S))
-        yield from self._append(replace(self._request, source=spoken), is_speech=True)
+        prepared = prepare(replace(self._request, source=spoken), self._models.person)
+        self._notes += prepared.notes
+        if not isinstance(prepared.request.source, Spoken):
+            return self.gesture(*(mark for mark in prepared.text.marks if isinstance(mark, GestureMark)))
+        self._has_listened = False
+        n_known = len(prepared.notes)
+        prepared = self._models.with_own_styles(prepared)
+        self._notes += prepared.notes[n_known:]
+        yield from self._append(prepared, is_speech=True)
         self._pause_s = pause_behind(text)
+
+    def new_notes(self) -> list[str]:
+        """What of the texts since the last call is spoken or shown otherwise than a reader may expect."""
+        notes, self._notes = self._notes, []
+        return notes
 
     def idle(self, seconds: float) -> Iterator[Piece]:
         """Append silence."""
         self.rest()
-        yield from self._append(replace(self._silent, source=Idle(seconds)))
+        yield from self._append(prepare(replace(self._silent, source=Idle(seconds))))
 
     def listen(self, seconds: float, cues: Sequence[float] | None = None) -> Iterator[Piece]:
         """Append silence in which the face listens.
@@ -192,7 +194,7 @@ class LiveSpeech:
         self._cues = [cue for cue in self._cues if cue > start - LASTS_S] + [start + cue for cue in cues or ()]
         responding = responses(self._cues, self._request.known_seed).restrict(start, start + seconds).shift(-start)
         listened = Timeline(listens=(ListeningSpan(0.0, seconds, reacts=cues is None),))
-        yield from self._append(replace(self._silent, source=Listening(seconds)), responding.merge(listened))
+        yield from self._append(prepare(replace(self._silent, source=Listening(seconds))), responding.merge(listened))
         self._has_listened = True
 
     def gesture(self, *gestures: GestureMark) -> None:
@@ -229,9 +231,8 @@ class LiveSpeech:
         self._pause_s = None
 
     def _append(
-        self, request: Request, listening: Timeline | None = None, *, is_speech: bool = False
+        self, prepared: PreparedRequest, listening: Timeline | None = None, *, is_speech: bool = False
     ) -> Iterator[Piece]:
-        prepared = self._models.with_own_styles(self._without_unknown(prepare(request, self._models.person)))
         gestures, waiting = self.gestures, self.gestures.waiting
         prepared = gestures.in_speech(prepared) if is_speech else gestures.in_silence(prepared, listening)
         models = self._models.for_request(prepared)
@@ -240,19 +241,3 @@ class LiveSpeech:
             gestures.note(piece, waiting)
             waiting = ()
             yield piece
-
-    def _without_unknown(self, prepared: PreparedRequest) -> PreparedRequest:
-        """A text without marks of styles that the palette lacks, which are noted."""
-        palette, text = self._models.palette, prepared.text
-        unknown = unknown_styles(text, palette.names) if palette is not None else ()
-        self._notes += [
-            f"there is no style {name[:40]!r}; its words keep the style around them"
-            for name in unknown
-            if name not in text.foreign_styles
-        ]
-        return replace(prepared, text=replace(text, foreign_styles=text.foreign_styles | {*unknown}))
-
-    def style_notes(self) -> list[str]:
-        """Styles in marks since the last call that the palette lacks."""
-        notes, self._notes = self._notes, []
-        return notes

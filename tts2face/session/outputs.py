@@ -17,7 +17,8 @@ from tts2face.interchange.exports.writer import ExportFile, ExportWriter, mesh_o
 from tts2face.models.person import Person
 from tts2face.processes.threads import Prefetch
 from tts2face.request import Recorded
-from tts2face.session.prepared import HEARING_STEPS, PreparedRequest, marked_styles
+from tts2face.session.marked_styles import marked_styles
+from tts2face.session.prepared import HEARING_STEPS, PreparedRequest
 from tts2face.session.speech import MarkTime
 from tts2face.session.speech_stream import Piece, SpeechModels, spoken_pieces
 from tts2face.sound.fitting import fitted_voices

@@ -1,9 +1,9 @@
 """A request that is parsed and checked once: its text and marks, its timelines and its options of synthesis."""
 
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,19 +20,20 @@ from lexicon.scripts import check_readable
 from lexicon.sentence_length import check_silence, marked_silence_s
 from lexicon.sentences import MAX_LAST_GESTURE_S, Sentence, split_sentences
 from lexicon.sequence import PhoneSequence
-from lexicon.ssml_leniency import nearest_style
 from lexicon.ssml_prosody import semitones_factor
-from lexicon.text_marks import parse_marks
+from lexicon.text_marks import is_ssml, parse_marks
 from lexicon.values.checks import check_limits
 from lexicon.values.files import is_file
 from tts2face.gestures.elements import Gesture
-from tts2face.gestures.timeline import Timeline, parse_style
+from tts2face.gestures.timeline import Timeline
 from tts2face.lips.options import METHOD_OPTIONS, ExcludedToken, SynthesisOptions
+from tts2face.models.palette_file import load_palette
 from tts2face.models.person import Person
 from tts2face.picture.options import Picture
 from tts2face.request import Idle, Listening, Recorded, Request, Source, Spoken, option_fields
 from tts2face.session.corrections import SentenceEdges, StaleEdgesError
 from tts2face.session.joining import Excerpt
+from tts2face.session.marked_styles import marked_styles, with_styles_of
 from tts2face.session.request_timeline import build_request_timeline, listening_timeline
 from tts2face.sound.fitting import Fitting, fitting_voice
 from tts2face.sound.voice_pool import usual_pitch_hz
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
 
 HEARING_STEPS, RECORDING_STEPS = 300, 700  # steps of progress of a recording: until its phones are known, and then
 IDLE_STEPS = 1000  # steps of progress of idle animation
+_NOTED = re.compile(r"[\[<]")  # characters of marks that may get notes
 SILENT_S = 0.5  # of a text without words, as of the pause behind a sentence
 
 
@@ -71,8 +73,8 @@ class PreparedRequest:
         What the face does while it listens, in seconds from the beginning of ``listen``.
     excerpt
         What of the speech is kept; None: all.
-    notes
-        What is spoken in another way than a reader may expect, each a sentence without its stop.
+    notes_on_sound
+        What is guessed about the recordings.
     """
 
     request: Request
@@ -84,7 +86,12 @@ class PreparedRequest:
     excluded: tuple[ExcludedToken, ...] = ()
     listening: Timeline = field(default_factory=Timeline)
     excerpt: Excerpt | None = None
-    notes: tuple[str, ...] = ()
+    notes_on_sound: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is spoken or shown otherwise than a reader may expect, each a sentence without its stop."""
+        return (*self.text.notes, *self.notes_on_sound)
 
     @property
     def fps(self) -> Fraction:
@@ -157,11 +164,8 @@ def prepare(request: Request, person: Person | None = None) -> PreparedRequest:
     for path in recordings(source).values():
         if not is_file(path):
             raise InputError(f"there is no recording {path}; check the path")
-    written = read_marks(request, person)
-    text, notes = make_readable(written, request.language)
-    if is_auto(request.style):
-        text, of_moods = with_moods(text, request.language)
-        request, notes = replace(request, style=None), (*notes, *of_moods)
+    written, text = read_text(request, person)
+    request = replace(request, style=None) if is_auto(request.style) else request
     prepared = PreparedRequest(
         request,
         text,
@@ -169,7 +173,7 @@ def prepare(request: Request, person: Person | None = None) -> PreparedRequest:
         synthesis_options(request),
         read_dictionary(request.dictionary).entries if request.dictionary else {},
         listening=listening_timeline(request),
-        notes=(*written.notes, *notes, *_notes_on(source)),
+        notes_on_sound=_notes_on(source),
     )
     if not source.text and not isinstance(source, Spoken):
         return prepared
@@ -185,20 +189,48 @@ def prepare(request: Request, person: Person | None = None) -> PreparedRequest:
 def _silent(prepared: PreparedRequest) -> PreparedRequest:
     """A request whose text has no word, as silence with the gestures and the pauses of its marks."""
     request, source = prepared.request, prepared.request.source
-    gestures = [mark for mark in prepared.text.marks if isinstance(mark, GestureMark)]
+    gestures = tuple(mark for mark in prepared.text.marks if isinstance(mark, GestureMark))
     moving_s = max((mark.seconds or GESTURES[mark.name].seconds for mark in gestures), default=0.0)
     seconds = max(SILENT_S, min(moving_s, MAX_LAST_GESTURE_S), marked_silence_s(prepared.text))
     timeline = Timeline(gestures=tuple(gesture_of(mark, 0.0) for mark in gestures))
     silent = replace(source, then=None) if isinstance(source, Listening) else Idle(min(seconds, IDLE_LIMITS_S[1]))
     return replace(
-        prepared, request=replace(request, source=silent), text=MarkedText(""),
-        listening=prepared.listening.merge(timeline),
+        prepared, request=replace(request, source=silent),
+        text=MarkedText("", marks=gestures, notes=prepared.text.notes), listening=prepared.listening.merge(timeline),
     )  # fmt: skip
 
 
 def gesture_of(mark: GestureMark, time: float) -> Gesture:
     """The gesture of a mark, at a second."""
     return Gesture(time, mark.name, mark.size, mark.seconds, mark.down_deg, mark.left_deg)
+
+
+def read_text(request: Request, person: Person | None = None) -> tuple[MarkedText, MarkedText]:
+    """Text of a request with its marks, as it is written, and as it is spoken with the moods of the style auto.
+
+    The notes of the second one are those on the whole. Raises as `parse_marks`.
+    """
+    written = with_styles_of(read_marks(request, person), None)
+    text, notes = make_readable(written, request.language)
+    text, moods = with_moods(text, request.language) if is_auto(request.style) else (text, ())
+    return written, replace(text, notes=(*written.notes, *notes, *moods))
+
+
+def reading_notes(request: Request, palette: str | Path | None) -> tuple[str, ...]:
+    """Notes on the text of a request, with those on styles that a palette lacks; without preparing the request.
+
+    Raises
+    ------
+    InputError, DataError
+        As `read_text` and `load_palette`.
+    """
+    text, is_ssml_of_auto = request.source.text, request.markup == "ssml" or is_ssml(request.source.text)
+    if text.isascii() and not is_ssml_of_auto and not _NOTED.search(text) and not is_auto(request.style):
+        return ()
+    _, found = read_text(request)
+    if palette is not None and request.has_gestures and marked_styles(found):
+        found = with_styles_of(found, load_palette(str(palette)).names)
+    return found.notes
 
 
 def read_marks(request: Request, person: Person | None = None) -> MarkedText:
@@ -293,53 +325,6 @@ def input_paths(request: Request, picture: Picture) -> dict[str, AnyPath]:
     }
 
 
-@lru_cache(maxsize=1000)
-def innermost_styles(nested: tuple[str, ...]) -> Mapping[str, str]:
-    """Style of each feature under nested marks; the innermost mark of a feature applies."""
-    chosen: dict[str, str] = {}
-    for written in nested:
-        chosen |= parse_style(written)
-    return chosen
-
-
-def marked_styles(text: MarkedText) -> tuple[str, ...]:
-    """Names of all styles in the marks of a text, in order of first use; raises as `check_marks`."""
-    runs = dict.fromkeys(run.styles for run in text.runs)
-    return tuple(dict.fromkeys(style for styles in runs for style in innermost_styles(styles).values()))
-
-
-def palette_style(names: Sequence[str], written: str) -> str:
-    """Style of a palette with these names for which a written one stands; the written one if it stands for none."""
-    return written if written in names else nearest_style(written) or written
-
-
-def unknown_styles(text: MarkedText, names: Sequence[str]) -> tuple[str, ...]:
-    """Styles in the marks of a text that a palette with these names lacks, and that stand for none of it."""
-    used = dict.fromkeys(name for run in text.runs for name in run.styles)
-    return tuple(name for name in used if not _has_style(names, name))
-
-
-def _has_style(names: Sequence[str], written: str) -> bool:
-    """Whether each style that is written is of a palette with these names, or near one of it."""
-    return all(style in names or nearest_style(style) for style in parse_style(written).values())
-
-
-def with_styles_of(prepared: PreparedRequest, names: Sequence[str]) -> PreparedRequest:
-    """A request whose marks name styles of a palette, and not those of a speech service that are none of it.
-
-    A style of the user's table of marks that the palette lacks is an `InputError`.
-    """
-    text, path = prepared.text, prepared.request.text_marks
-    wrong = [style for style in sorted(read_marks_table(path).own_styles) if not _has_style(names, style)]
-    if wrong:
-        raise InputError(f"{path}: there is no style {wrong[0][:40]!r} in the palette; it has {', '.join(names)}")
-    used = {name for run in text.runs for name in run.styles}
-    nearest = {name: palette_style(names, name) for name in used}
-    known = {name: near for name, near in nearest.items() if near in names or name not in text.foreign_styles}
-    runs = [replace(run, styles=tuple(known[name] for name in run.styles if name in known)) for run in text.runs]
-    return replace(prepared, text=replace(text, runs=tuple(runs)))
-
-
 def check_marks(text: MarkedText, request: Request) -> None:
     """Reject marks that are invalid or do not go with the request, in time linear in the length of the text."""
     if isinstance(request.source, Recorded) and text.has_voice_changes:
@@ -350,7 +335,6 @@ def check_marks(text: MarkedText, request: Request) -> None:
     # en-GB in a request of en-us is one language, de is another
     if text.language is not None and _primary(language_code(text.language)) != _primary(request.language):
         raise InputError(f"the text names the language {text.language}, not {request.language}; choose one of them")
-    marked_styles(text)
     check_silence(text)
     spoken = request.spoken or Spoken("")
     for what, marked, requested, (low, high) in (

@@ -133,6 +133,14 @@ class Session:
         """Face whose channels the clips of this session use; `tts2face.write_clip` draws clips on it."""
         return self._models.face()
 
+    def prepare(self, text: str | Request | PreparedRequest, **options: Any) -> PreparedRequest:
+        """Parse and check a text or request once for the methods of this session; its `notes` say what is not followed.
+
+        It has the seed of the face, where it has none, and styles of the palette in its marks. Arguments as for `clip`.
+        """
+        prepared = prepare_request(text, options, self._models.person).with_seed(self._models.seed)
+        return self._models.with_own_styles(prepared)
+
     def clip(self, text: str | Request | PreparedRequest, **options: Any) -> Clip:
         """Synthesise the whole clip of a text or request.
 
@@ -156,14 +164,14 @@ class Session:
 
     def stream(self, text: str | Request | PreparedRequest, **options: Any) -> Iterator[Piece]:
         """Synthesise the clip of a text or request piece by piece, in bounded memory; arguments as for `clip`."""
-        return self._models.pieces(self._prepared(text, options))
+        return self._models.pieces(self.prepare(text, **options))
 
     def measure_speech(self, text: str | Request | PreparedRequest, **options: Any) -> SpeechSpan:
         """Seconds at which the speech of a text begins and ends in its clip, without synthesis of motion.
 
         The last utterances are kept, so that a following `stream` of the same text does not speak it again.
         """
-        prepared = self._models.with_own_styles(self._prepared(text, options))
+        prepared = self.prepare(text, **options)
         return measure_speech(prepared, self._models.for_request(prepared, keeps_utterances=True).speech)
 
     def stream_to_length(self, text: str | Request | PreparedRequest, n_frames: int, **options: Any) -> Iterator[Clip]:
@@ -172,7 +180,7 @@ class Session:
         Idle animation follows the speech; speech beyond the last frame is cut. Head and face are at rest in the first
         and last frame, so that such clips can be joined. Arguments and errors as `clip`.
         """
-        prepared = self._prepared(text, options)
+        prepared = self.prepare(text, **options)
         sound_end = self.measure_speech(prepared).total if prepared.request.spoken is not None else None
         length = Length(n_frames, self._models.n_fixed_channels)
         yield from clips_of_length(prepared, sound_end, length, self._models.pieces)
@@ -182,7 +190,7 @@ class Session:
 
         Arguments and errors as `clip`; a recording is refused.
         """
-        prepared = self._models.with_own_styles(self._prepared(text, options))
+        prepared = self.prepare(text, **options)
         return timed_speech(prepared, self._models.for_request(prepared).speech)
 
     def live(self, **options: Any) -> LiveSpeech:
@@ -228,7 +236,7 @@ class Session:
             As `write`; or the format is unknown or cannot be transparent.
         """
         picture, options = split_picture(picture, options)
-        prepared = self._prepared(text, options)
+        prepared = self.prepare(text, **options)
         return encode_stream(prepared, self._models, StreamFormat(format, picture, threads, pace, is_complete))
 
     def write(
@@ -270,7 +278,7 @@ class Session:
             As `clip`; or the file cannot be written.
         """
         picture, options = split_picture(picture, options)
-        prepared = self._prepared(text, options)
+        prepared = self.prepare(text, **options)
         outputs = plan_outputs(out, exports, input_paths(prepared.request, picture))
         return self._write(prepared, outputs, picture, on_progress or ignore_progress, on_piece)
 
@@ -297,7 +305,7 @@ class Session:
         InputError, DataError, BackendError
             As `clip` and `tts2face.export`.
         """
-        prepared = self._prepared(text, options)
+        prepared = self.prepare(text, **options)
         exports = [paths] if isinstance(paths, str | Path) else paths
         outputs = plan_outputs(None, exports, input_paths(prepared.request, Picture()))
         return self._write(prepared, outputs, Picture(), on_progress or ignore_progress, on_piece)
@@ -353,10 +361,6 @@ class Session:
         new = copy(self)
         new._models = self._models.with_style(name, derived)
         return new
-
-    def _prepared(self, text: str | Request | PreparedRequest, options: dict[str, Any]) -> PreparedRequest:
-        """A request with the seed of the face, where it has none."""
-        return prepare_request(text, options, self._models.person).with_seed(self._models.seed)
 
     def _write(
         self,

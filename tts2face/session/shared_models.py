@@ -27,8 +27,9 @@ from tts2face.request import OWN_FACE, Request
 from tts2face.session.animated_face import AnimatedFace, mesh_face, own_appearance_face
 from tts2face.session.gesture_layer import METHODS, GestureLayer, GestureMethod
 from tts2face.session.lip_steps import SynthesisModels
+from tts2face.session.marked_styles import check_own_styles, marked_styles, with_styles_of
 from tts2face.session.phrase_delivery import NO_DELIVERIES
-from tts2face.session.prepared import PreparedRequest, marked_styles, with_styles_of
+from tts2face.session.prepared import PreparedRequest
 from tts2face.session.speech_stream import Piece, SpeechModels
 from tts2face.session.steps import pieces
 from tts2face.sound.fitting import fitted_voices
@@ -157,10 +158,19 @@ class SessionModels:
             return self._renderers[key]
 
     def with_own_styles(self, prepared: PreparedRequest) -> PreparedRequest:
-        """A request whose marks name styles of the palette, where there is one nearest to that of a speech service."""
-        has_styles = marked_styles(prepared.text) or prepared.request.text_marks is not None
-        palette = self.palette if prepared.request.has_gestures and has_styles else None
-        return prepared if palette is None else with_styles_of(prepared, palette.names)
+        """A request whose marks name styles of the palette, with notes on those that it lacks.
+
+        Raises
+        ------
+        InputError
+            The user's table of marks names a style that the palette lacks.
+        """
+        table = prepared.request.text_marks
+        palette = self.palette if prepared.request.has_gestures and (table or marked_styles(prepared.text)) else None
+        if palette is None:
+            return prepared
+        check_own_styles(table, palette.names)
+        return replace(prepared, text=with_styles_of(prepared.text, palette.names))
 
     def gesture_layer(self, prepared: PreparedRequest) -> GestureLayer | None:
         """Gestures of one clip from its beginning; None for a request without gestures."""
@@ -197,7 +207,6 @@ class SessionModels:
 
     def pieces(self, prepared: PreparedRequest, on_heard: Progress = ignore_progress) -> Iterator[Piece]:
         """Synthesise the clip of a request piece by piece; `on_heard` is called while a recording is heard."""
-        prepared = self.with_own_styles(prepared)
         return pieces(prepared, self.for_request(prepared), self.gesture_layer(prepared), on_heard)
 
     @property

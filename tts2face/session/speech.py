@@ -33,6 +33,7 @@ from tts2face.session.joining import (
     resampled_speech,
     silent_speech,
 )
+from tts2face.session.marked_styles import innermost_styles
 from tts2face.session.phrase_delivery import (
     NO_DELIVERIES,
     Deliveries,
@@ -42,7 +43,7 @@ from tts2face.session.phrase_delivery import (
     speak_phrase,
     text_of,
 )
-from tts2face.session.prepared import gesture_of, innermost_styles
+from tts2face.session.prepared import gesture_of
 from tts2face.sound.delivery import sound_with
 from tts2face.sound.level import level_speech
 from tts2face.sound.voice import ExpectingVoice, Voice, apply_volume

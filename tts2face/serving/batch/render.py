@@ -168,7 +168,7 @@ def _fit_recorded(session: Session, request: Request, segment: Segment) -> tuple
     if overlap > 0.0:
         warnings.append(f"{overlap:.2f} s of the speech sound on after the next cue has begun")
     fit = replace(fit, overlap_s=overlap)
-    prepared = prepare(request)
+    prepared = session.prepare(request)
     return prepared, _result(segment, fit, (n_frames, fps), cut, [*heard, *prepared.notes, *warnings])
 
 
@@ -267,12 +267,12 @@ class SegmentSpeech:
     def _prepared(self, spoken: Spoken, at: int, words: Sequence[str] | None = None) -> PreparedRequest:
         """The request of a part, of which only the first words may be kept."""
         if words is None and not self._segment.parts:
-            return prepare(replace(self._request, source=spoken), self._segment.models.shown_person())
+            return self._session.prepare(replace(self._request, source=spoken))
         part, first = self._parts[at], sum(part.n_letters for part in self._parts[:at])
         if self._segment.parts:
             spoken = replace(spoken, lead=part.lead_frames / self.fps)
         last = first + (part.n_letters if words is None else sum(map(n_letters, words)))
-        whole = prepare(replace(self._request, source=spoken), self._segment.models.shown_person())
+        whole = self._session.prepare(replace(self._request, source=spoken))
         return replace(whole, excerpt=Excerpt(first, last))
 
 

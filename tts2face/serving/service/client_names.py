@@ -16,9 +16,9 @@ from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.languages import language_code
 from lexicon.marked_text import RATE_LIMITS
-from lexicon.spoken_words import reading_notes
 from lexicon.text_language import guess_language
-from tts2face.serving.service.clip_options import check_voice, resolve_models
+from tts2face.request import Request
+from tts2face.serving.service.clip_options import OptionValues, check_voice, resolve_models
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.kokoro_text import with_marks
@@ -26,12 +26,14 @@ from tts2face.serving.service.library import CLIENT_MODELS
 from tts2face.serving.service.state import ServiceState
 from tts2face.session import catalogue
 from tts2face.session.named_models import Models
+from tts2face.session.prepared import reading_notes
 from tts2face.sound.fitting import FORMANT_SYNTHESIS, fitting_voice
 from tts2face.sound.voice_pool import find_voice
 from tts2face.source_options import AUTO, AUTO_MARKUP
 
 ADJUSTED = "X-Tts2face-Adjusted"
 FEMALE, MALE = "female", "male"
+READING_OPTIONS = {"text", "language", "markup", "style", "gestures"}  # that decide how a text is read
 VOICE_NAMES = {"markup", "voice_pitch", "voice_range"}  # options of clips beside the fields of OpenAI
 OPENAI_VOICES: Mapping[str, str] = MappingProxyType({
     "alloy": FEMALE, "ash": MALE, "ballad": MALE, "cedar": MALE, "coral": FEMALE, "echo": MALE, "fable": MALE,
@@ -67,12 +69,12 @@ class Adjustments:
         if language != DEFAULT_LANGUAGE:
             self.made.append(f"the language is {language}")
 
-    async def note_words(
-        self, state: ServiceState, text: str, language: str, markup: str = "auto", style: str | None = None
-    ) -> None:
+    async def note_words(self, state: ServiceState, options: OptionValues) -> None:
         """Note what of a text is not followed, words of other writing systems, and moods of the style auto."""
-        state.results.check_length(text)
-        notes = await asyncio.to_thread(reading_notes, text, language_code(language), markup, style)
+        fields = {name: value for name, value in options.request.items() if name in READING_OPTIONS}
+        state.results.check_length(fields.get("text", ""))
+        palette = options.models.get("palette", state.settings.palette)
+        notes = await asyncio.to_thread(lambda: reading_notes(Request(**fields), palette))
         self.made += [_in_header(note) for note in notes]
 
     def note_fitted(self, models: Models, language: str) -> None:
@@ -225,7 +227,6 @@ async def spoken_fields(state: ServiceState, key: ApiKey, asked: Any, adjustment
     markup = more.get("markup", AUTO_MARKUP)
     text = with_marks(asked.input) if markup == AUTO_MARKUP else asked.input
     name, code = await asyncio.to_thread(choose_voice, voice, language, text, adjustments)
-    await adjustments.note_words(state, text, code, markup)
     talker = await choose_talker(state, key, asked.model, adjustments)
     given = {"text": text, "rate": limited_rate(asked.speed, adjustments), "voice": name, "language": code}
     return given | more | ({} if talker is None else {"talker": talker})

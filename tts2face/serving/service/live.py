@@ -160,12 +160,9 @@ class LiveTask:
         self._begin_source("speech")
         try:
             check_words(sentence)
-            for note in self._speech.notes_on(sentence):
-                yield Event({"type": "note", "text": sentence, "message": note})
             for piece in self._speech.say(sentence):
                 begin = piece.begin + self._idle_s
-                for note in self._speech.style_notes():
-                    yield Event({"type": "note", "text": sentence, "message": note})
+                yield from self._new_notes(sentence)
                 yield _speech_event(piece, begin)
                 yield from self._shown_gestures()
                 yield _sound(piece.clip)
@@ -173,10 +170,15 @@ class LiveTask:
                 yield from self._read_inputs()
                 if self._n_cancels != n_cancels:
                     return
+            yield from self._new_notes(sentence)
         except InterruptedTaskError:
             return  # by a message that is read next
         except Tts2faceError as error:  # the stream goes on with the next sentence
             yield Event({"type": "error", "text": sentence, "message": " ".join(str(error).split())})
+
+    def _new_notes(self, sentence: str) -> Iterator[Event]:
+        for note in self._speech.new_notes():
+            yield Event({"type": "note", "text": sentence, "message": note})
 
     def _read_inputs(self) -> Iterator[Event]:
         while self._inputs:

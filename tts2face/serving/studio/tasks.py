@@ -87,7 +87,7 @@ def digest_of(parts: Iterable[bytes]) -> str:
 def _pieces(session: "Session", project: Project, have: frozenset[str]) -> Iterator[tuple[dict[str, Any], bytes]]:
     """Description and content of each piece; the content is empty if its digest is in `have`."""
     said: Counter[str] = Counter()
-    prepared = project.prepare()
+    prepared = session.prepare(project.prepare())
     for number, piece in enumerate(session.stream(prepared)):
         clip = piece.clip
         motion = clip.motion.values

@@ -7,6 +7,7 @@ from starlette.datastructures import UploadFile
 
 from tts2face.picture.options import Picture
 from tts2face.request import Request
+from tts2face.serving.service.client_names import Adjustments
 from tts2face.serving.service.clip_options import ClipRequest, divide_options
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.job_kinds.order import FormPart, JobKind, JobOrder, refuse_second
@@ -39,6 +40,9 @@ async def prepare_clip(order: JobOrder) -> dict[str, Any]:
     sounds = {name: Path(file) for name, file in FILES.items() if name != "timeline" and file in order.upload.files}
     Request(**fields.request | sounds)
     Picture(**fields.picture)
+    adjustments = Adjustments()
+    await adjustments.note_words(order.state, fields)
+    order.upload.folder.notes.extend(adjustments.made)
     work = order.state.results.work(models=fields.models, request=fields.request, picture=fields.picture, format=format)
     return work.as_json()
 

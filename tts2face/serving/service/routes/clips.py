@@ -113,9 +113,9 @@ async def _answer(
     given: dict[str, Any] = clip.model_dump(exclude_none=True, exclude_defaults=True)
     format = given.pop("format", "mp4")
     state = service_state(request)
-    language, markup = given.get("language", DEFAULT_LANGUAGE), given.get("markup", "auto")
-    await adjustments.note_words(state, given.get("text", ""), language, markup, given.get("style"))
+    state.results.check_length(given.get("text", ""))
     fields = await divide_options(state, request.state.key, given)
+    await adjustments.note_words(state, fields)
     picture = fields.picture | {name: files[name] for name in ("background",) if name in files}
     spoken = fields.request | {name: files[name] for name in (*SOUNDS, "timeline") if name in files}
     keeps_pace = format in MOVIE_KINDS and not clip.model_fields_set & {"quality", "supersampling"}

@@ -165,6 +165,7 @@ async def speech_work(
     if asked.volume_multiplier is not None:
         given["volume"] = asked.volume_multiplier
     options = await divide_options(state, key, given)
+    await adjustments.note_words(state, options)
     return state.results.work(models=options.models, request=options.request, **fields)
 
 
