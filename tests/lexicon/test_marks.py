@@ -83,6 +83,12 @@ def test_pauses_at_one_place_add_up() -> None:
         ("[sigh 90s]a", "a", "the duration of the gesture sigh must lie between 0.1 and 30 s, not 90 s"),
         ("[look at left 80]a", "a", "direction left of the gesture look at in degrees must lie between -35 and 35"),
         ("[blink left]a", "a", "the gesture blink has no direction; remove it, or choose look_at"),
+        ("[nod x]a", "a", "the mark [nod x] is not followed: write [nod], or [nod 0.5] for a small one"),
+        ("[wink up]a", "a", "the mark [wink up] is not followed"),
+        ("[tilt left 20]a", "a", "the mark [tilt left 20] is not followed"),
+        ("[emphasis strong]a[/emphasis]", "a", "the mark [emphasis strong] is not followed; its text is spoken"),
+        ("[lang:de]a[/lang]", "a", "the mark [/lang] is not followed; its text is spoken"),
+        ("[u]a[/u]", "a", "the mark [u] is not followed; its text is spoken"),
         ("[/nod]a", "a", "the mark [/nod] is not followed"),
         ("[style]a[/style]", "a", "the mark [style] is not followed: write [style:NAME] ... [/style]"),
         ("[style delighted]a", "a", "the mark [style delighted] is not followed"),
@@ -99,6 +105,11 @@ def test_a_mark_that_is_wrong_costs_the_mark(text: str, said: str, note: str) ->
     found = parse_marks(f"Hello {text}")
     assert found.text == f"Hello {said}"
     assert any(note in one for one in found.notes), found.notes
+
+
+def test_the_end_of_a_direction_ends_its_style() -> None:
+    found = parse_marks("[happy]Great.[/happy] Bye.")
+    assert [(run.start, run.styles) for run in found.runs] == [(0, ("happy",)), (6, ())]
 
 
 def test_a_pause_needs_no_number() -> None:

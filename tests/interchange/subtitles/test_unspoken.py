@@ -8,7 +8,7 @@ from tts2face.interchange.subtitles.unspoken import KINDS
 HELLO = (1, 3, "Hello there.")
 LEFT_OUT = {
     "a noise": ("annotations", srt(HELLO, (4, 5, "[door slams]")), ".srt", "door slams"),
-    "a manner": ("annotations", srt(HELLO, (4, 5, "(laughs) Bye.")), ".srt", "laughs Bye."),
+    "a manner": ("annotations", srt(HELLO, (4, 5, "(hoarse) Bye.")), ".srt", "hoarse Bye."),
     "a noise over two lines": ("annotations", srt(HELLO, (4, 5, "[rain\nfalls]")), ".srt", "rain falls"),
     "a song": ("lyrics", srt(HELLO, (4, 5, "♪ la la ♪")), ".srt", "la la"),
     "a song of a style": (
@@ -104,7 +104,7 @@ def test_what_nobody_says_is_said_in_a_note_and_can_be_kept(
 
 
 def test_kinds_are_counted(read: ReadText) -> None:
-    found = read(srt((0, 1, "[a bell] Well."), (1, 2, "(sighs)"), (2, 3, "♪ la ♪"), (3, 4, "Yes.")))
+    found = read(srt((0, 1, "[a bell] Well."), (1, 2, "(a sigh)"), (2, 3, "♪ la ♪"), (3, 4, "Yes.")))
     assert [note.message for note in found.notes] == [
         "2 annotations, such as '[a bell]', are not spoken; --keep annotations speaks them",
         "1 lyric, such as '♪ la ♪', is not spoken; --keep lyrics speaks it",

@@ -2,6 +2,7 @@
 
 import pytest
 
+from lexicon.text_marks import parse_marks
 from tests.interchange.subtitles.conftest import ReadText, srt, vtt
 
 LATE = (3, 4, "It is late.")
@@ -143,7 +144,23 @@ def test_a_number_of_a_dialogue_is_said_by_another_speaker(read: ReadText) -> No
     ],
 )
 def test_marks_end_where_somebody_speaks(text: str, words: str, read: ReadText) -> None:
-    assert read(srt((1, 2, text), LATE)).cues[0].text == words
+    said = parse_marks(read(srt((1, 2, text), LATE)).cues[0].text).text
+    assert " ".join(said.split()) == words
+
+
+@pytest.mark.parametrize(
+    ("text", "kept"),
+    [
+        ("[nod] Yes. [style:sad]No.[/style]", "[nod] Yes. [style:sad]No.[/style]"),
+        ("[happy] Great!\n(laughs)", "[happy] Great! (laughs)"),
+        ("[nod x] Yes [pause 1] no.", "[nod x] Yes [pause 1] no."),
+        ("[door creaks] Yes. (2 HOURS LATER)", "Yes."),
+        ("[listen to the radio] Yes. [applause]", "Yes."),
+    ],
+)
+def test_marks_of_any_text_stay_and_annotations_do_not(text: str, kept: str, read: ReadText) -> None:
+    assert read(srt((1, 2, text), LATE)).cues[0].text == kept
+    assert "[" not in read(srt((1, 2, text), LATE), markup="plain").cues[0].text
 
 
 def test_english_with_a_borrowed_word_is_of_the_west(read: ReadText) -> None:
@@ -178,8 +195,9 @@ def test_hours_of_time_code_without_drops_are_longer(attributes: str, begin: flo
 def test_manners_within_labels_are_counted_and_kept(read: ReadText) -> None:
     content = srt((1, 2, "ANNA (off): Hello."), (3, 4, "MAN (2): Bye."), (5, 6, "[loud] Go. (sighs)"))
     found = read(content)
-    assert [(cue.speaker, cue.text) for cue in found.cues] == [("ANNA", "Hello."), ("MAN", "Bye."), ("", "Go.")]
-    assert found.notes[0].message.startswith("3 annotations, such as '(off)'")
+    assert [cue.speaker for cue in found.cues] == ["ANNA", "MAN", ""]
+    assert [cue.text for cue in found.cues] == ["Hello.", "Bye.", "Go. (sighs)"]
+    assert found.notes[0].message.startswith("2 annotations, such as '(off)'")
     assert [cue.text for cue in read(content, keep=("annotations",)).cues] == ["off Hello.", "Bye.", "loud Go. sighs"]
 
 

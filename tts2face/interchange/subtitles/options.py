@@ -1,8 +1,12 @@
 """How a subtitle file is read, where its content leaves a choice."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from lexicon.errors import InputError
+from lexicon.g2p import DEFAULT_LANGUAGE
+from lexicon.inline_marks import Rules
+from lexicon.mark_table import read_marks_table
 from lexicon.values.checks import check_limits
 from lexicon.values.fields import check_fields
 from tts2face.interchange.subtitles.frames import RATE_LIMITS
@@ -25,6 +29,8 @@ class SubtitleOptions:
         Whether names before a colon are speakers; else they are words.
     markup
         Of the words, as of a request; tags of cues that are ``ssml`` are kept.
+    text_marks
+        Table of marks, as of a request.
     fps
         Frames a second of times that are written in frames; None: as the file or its film says.
     track
@@ -44,10 +50,18 @@ class SubtitleOptions:
     keep: tuple[str, ...] = ()
     speakers: bool = True
     markup: str = "auto"
+    text_marks: Path | None = None
     fps: float | None = None
     track: str | None = None
     shift: float = 0.0
     film_s: float | None = None
+
+    @property
+    def mark_rules(self) -> Rules | None:
+        """Rules by which brackets are marks; None where the markup reads none in plain text."""
+        if self.markup not in {"auto", "llm"}:
+            return None
+        return Rules(self.language or DEFAULT_LANGUAGE, read_marks_table(self.text_marks), self.markup == "llm")
 
     def __post_init__(self) -> None:
         """Refuse values of other types, unknown kinds, and numbers out of range."""

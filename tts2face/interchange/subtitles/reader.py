@@ -151,9 +151,15 @@ def _timed(
     latest = _latest_ends(written, said)
     cues: list[Cue] = []
     left_out: list[tuple[str, int, str]] = []
+    rules = options.mark_rules
     for number, (cue, is_said) in enumerate(zip(written, said, strict=True)):
         text = spoken_text(
-            cue.text, cue.markup, keep=options.keep, speakers=speakers, is_document=options.markup == "ssml"
+            cue.text,
+            cue.markup,
+            keep=options.keep,
+            speakers=speakers,
+            is_document=options.markup == "ssml",
+            rules=rules,
         )
         if is_said:
             left_out += [(kind, cue.line, words) for kind, words in text.left_out]

@@ -4,6 +4,7 @@ import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
+from lexicon.inline_marks import Cue, Own, Rules, read_parts
 from lexicon.text_marks import has_words, is_ssml
 from tts2face.interchange.subtitles.cues import CuePart
 from tts2face.interchange.subtitles.labels import divided_at_labels, split_label, without_manners
@@ -72,6 +73,7 @@ def spoken_text(
     keep: Collection[str] = (),
     speakers: Collection[str] | None = None,
     is_document: bool = False,
+    rules: Rules | None = None,
 ) -> SpokenText:
     """Divide the text of a cue into words, tags, noises, lyrics and speakers.
 
@@ -87,6 +89,8 @@ def spoken_text(
         Keys of the labels of the file; None: names in capitals.
     is_document
         The text is SSML, also without ``<speak>`` around it.
+    rules
+        By which brackets are marks, which stay in the text, rather than annotations; None: none are.
     """
     if markup.has_tags and (is_document or is_ssml(written)):
         document = " ".join(written.split())
@@ -94,7 +98,7 @@ def spoken_text(
     is_dialogue = markup.has_tags and len({name.strip() for name in _VOICE.findall(written)}) > 1
     plain = plain_text(_VOICE.sub("\n\x02\\1\x03", written) if is_dialogue else written, markup)
     turns = divided_at_labels(plain, speakers) if speakers else plain
-    said, left_out = _without_additions(without_manners(turns, speakers or ()), keep)
+    said, left_out = _without_additions(without_manners(turns, speakers or ()), keep, rules)
     lines = spoken_lines(said)
     if any(map(_DASH.match, lines)):  # between people, also the dash before a number is one
         lines = [_DASHED_NUMBER.sub(r"\1 ", line) for line in lines]
@@ -111,16 +115,41 @@ def spoken_text(
     return SpokenText(" ".join(part.text for part in spoken), shown, tuple(spoken), left_out)
 
 
-def _without_additions(text: str, keep: Collection[str]) -> tuple[str, tuple[tuple[str, str], ...]]:
-    """A text without noises and lyrics, and these with their kinds; kinds that are kept lose only their marks."""
+def _without_additions(
+    text: str, keep: Collection[str], rules: Rules | None
+) -> tuple[str, tuple[tuple[str, str], ...]]:
+    """A text without noises and lyrics, and these with their kinds; kinds that are kept lose only their brackets."""
     found: list[tuple[str, str]] = []
-    for kind, passage, marks in ((ANNOTATIONS, _ANNOTATION, _BRACKETS), (LYRICS, _LYRICS, _NOTES)):
-        if kind in keep:
-            text = passage.sub(lambda match, marks=marks: marks.sub(" ", match[0]), text)  # type: ignore[misc]
-            continue
-        found += [(kind, match[0]) for match in passage.finditer(text) if any(map(str.isalnum, match[0]))]
-        text = passage.sub(" ", text)
+    for kind, passage, brackets in ((ANNOTATIONS, _ANNOTATION, _BRACKETS), (LYRICS, _LYRICS, _NOTES)):
+        marks: tuple[tuple[int, int], ...] = ()
+        if kind == ANNOTATIONS and rules is not None:
+            marks = _mark_spans(text, rules, has_directions=kind not in keep)
+        parts, at = list[str](), 0
+        for match in passage.finditer(text):
+            if any(start <= match.start() and match.end() <= end for start, end in marks):
+                continue
+            parts += [text[at : match.start()], brackets.sub(" ", match[0]) if kind in keep else " "]
+            at = match.end()
+            if kind not in keep and any(map(str.isalnum, match[0])):
+                found.append((kind, match[0]))
+        text = "".join([*parts, text[at:]])
     return text, tuple(found)
+
+
+def _mark_spans(text: str, rules: Rules, *, has_directions: bool) -> tuple[tuple[int, int], ...]:
+    """Where a text has marks of this project, and directions that show something, with its lines as one."""
+    if not _BRACKETS.search(text):
+        return ()
+    parts = read_parts(text.replace("\n", " "), rules)
+    return tuple(
+        (part.start, part.end)
+        for part in parts
+        if isinstance(part, Own) or (has_directions and isinstance(part, Cue) and (part.ends_style or _shows(part)))
+    )
+
+
+def _shows(cue: Cue) -> bool:
+    return any(mark.style or mark.gesture or mark.pause_s for mark in cue.marks)
 
 
 def spoken_lines(text: str) -> list[str]:

@@ -14,7 +14,7 @@ def read_cue_file(path: Path, options: BatchOptions, request: Request, track: Pa
     """Cues of a file; a recording of the whole file (`track`) gives the length of the film and its frames a second."""
     film = None if track is None else film_facts(track)
     # the default language says nothing about a file
-    choices = options.subtitle_options(non_defaults(request).get("language"), film, request.markup)
+    choices = options.subtitle_options(non_defaults(request).get("language"), film, request)
     return read_subtitles(path, options.encoding, choices)
 
 

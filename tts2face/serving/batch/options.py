@@ -11,7 +11,7 @@ from tts2face.interchange.exports.table import batch_format
 from tts2face.interchange.subtitles.film_track import Film
 from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.option import option
-from tts2face.request import option_fields
+from tts2face.request import Request, option_fields
 from tts2face.source_options import AUTO_MARKUP
 
 MOVIE_FORMATS = ("mp4", "webm", "mov", "none")
@@ -97,14 +97,18 @@ class BatchOptions:
             raise InputError(f"there is no folder of recordings {self.audio}; check the path")
 
     def subtitle_options(
-        self, language: str | None = None, film: Film | None = None, markup: str = AUTO_MARKUP
+        self, language: str | None = None, film: Film | None = None, request: Request | None = None
     ) -> SubtitleOptions:
-        """Choices of the reader of subtitles, with what is known besides: how their words are read, and their film."""
+        """Choices of the reader of subtitles, with what is known besides: their request, and their film."""
+        markup = AUTO_MARKUP if request is None else request.markup
+        if self.audio is not None and markup != "ssml":
+            markup = "plain"  # a recording cannot follow [pause], which is an annotation there
         return SubtitleOptions(
             language=language,
             keep=self.keep,
             speakers=self.speakers,
             markup=markup,
+            text_marks=None if request is None else request.text_marks,
             fps=self.subtitle_fps or (None if film is None else film.fps),
             track=self.track,
             shift=self.shift,
