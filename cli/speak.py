@@ -246,14 +246,20 @@ def _warn_mismatches(mismatches: "Sequence[TextMismatch]") -> None:
 
 def _open_session(options: SpeakOptions, voices: "VoicePool") -> "Session":
     from tts2face.picture.film import check_output
-    from tts2face.session.warm_up import compile_kernels, kernels_are_compiled
 
     if options.out is not None:
         check_output(options.out)
-    draws = (options.out is not None or options.view) and options.models.face != OWN_FACE
+    return open_session(options.models, voices, draws=options.out is not None or options.view)
+
+
+def open_session(models: Models, voices: "VoicePool | None" = None, *, draws: bool) -> "Session":
+    """Session of models, with the kernels that it needs; those of pictures, too, if it draws."""
+    from tts2face.session.warm_up import compile_kernels, kernels_are_compiled
+
+    draws = draws and models.face != OWN_FACE
     if not kernels_are_compiled(None):  # the first run: before models are read, which needs some of the kernels
-        compile_kernels(options.models.shown_face() if draws else None)
-    session = options.models.open_session(voices)
+        compile_kernels(models.shown_face() if draws else None)
+    session = models.open_session(voices)
     drawn = session.face.mesh if draws else None
     if not kernels_are_compiled(drawn):
         compile_kernels(drawn)

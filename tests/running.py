@@ -2,6 +2,7 @@
 
 import json
 import os
+import socket
 import subprocess
 import sys
 import tempfile
@@ -33,6 +34,12 @@ def eventually(condition: Callable[[], Any], seconds: float = 60.0, what: str | 
         time.sleep(pause_s)
         pause_s = min(1.3 * pause_s, 0.2)
     return found
+
+
+def free_port() -> int:
+    """A port of this machine on which nothing listens."""
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        return int(probe.getsockname()[1])
 
 
 class Log:

@@ -12,7 +12,6 @@ import asyncio
 import json
 import os
 import random
-import socket
 import tempfile
 import time
 from collections import Counter, defaultdict
@@ -27,7 +26,7 @@ import numpy as np
 import websockets
 
 from tests.bench.key_attacks import ATTACKS, Target, socket_of
-from tests.running import ServeProcess
+from tests.running import ServeProcess, free_port
 from tts2face.serving.service.keys import add_key
 
 KINDS = ("mp3", "curves", "mp4", "live")
@@ -168,12 +167,6 @@ class Keys:
 
 class _RefusedError(Exception):
     """The service has refused a request."""
-
-
-def free_port() -> int:
-    """A port that nobody listens on."""
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return int(server.getsockname()[1])
 
 
 def family(pid: int) -> list[int]:

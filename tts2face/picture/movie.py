@@ -33,6 +33,9 @@ class MovieKind:
     audio_bits: int
     video_options: Mapping[str, str]
     container_options: Mapping[str, str] = field(default_factory=dict)
+    audio_options: Mapping[str, str] = field(default_factory=dict)
+    audio_layout: str = "mono"
+    video_bits: int = 0  # in a second; 0: constant quality by `crf`
 
 
 MP4_MOVIE = MovieKind(
@@ -76,6 +79,13 @@ STREAMED_WEBM = MovieKind(
 )  # fmt: skip
 
 
+# For servers of live streams: no picture waits for a later one, and a decoder can begin at each key picture.
+LIVE_H264: Mapping[str, str] = MappingProxyType({
+    "profile": "baseline", "preset": "veryfast", "tune": "zerolatency", "bf": "0",
+    "x264-params": "repeat-headers=1:cpu-independent=1",
+})  # fmt: skip
+
+
 def mux_pictures(container: Any, packets: Iterable[Any], sound: Any) -> None:
     """Write packets of pictures; the blocks of a WebM file stand in the order of their times, as players demand.
 
@@ -103,7 +113,7 @@ def _nearest(value: Fraction) -> int:
 
 
 class MovieWriter:
-    """Sink that encodes pictures and sound; `finish` completes the file.
+    """Sink that encodes pictures and sound; `finish` completes the file, or the stream of a server.
 
     Attributes
     ----------
@@ -113,13 +123,13 @@ class MovieWriter:
 
     def __init__(
         self,
-        path: Path | WriteBuffer,
+        path: Path | WriteBuffer | str,
         kind: MovieKind,
         shape: tuple[int, ...],
         clock: tuple[Fraction, int],
         notice: str = "",
     ) -> None:
-        """Open a file, or a stream, for pictures of `shape` (H, W, 3 or 4) and mono sound at `clock` (fps, Hz).
+        """Open a file, a stream, or the URL of a server, for pictures of `shape` (H, W, 3 or 4) at `clock` (fps, Hz).
 
         `notice` becomes the comment in its metadata, and in MP4 an XMP packet.
         """
@@ -130,6 +140,7 @@ class MovieWriter:
         self._has_alpha = shape[2] == 4
         self._fps, self._rate = clock
         self._path, self._notice = path, notice if kind.container == "mp4" else ""
+        self._layout = kind.audio_layout
         fps = self._fps
         self.n_frames = self._n_samples = 0
         self._fill_colour: NDArray[np.uint8] | None = None
@@ -142,14 +153,20 @@ class MovieWriter:
         video.pix_fmt = "yuva420p" if self._has_alpha else "yuv420p"
         video.codec_context.time_base = 1 / fps
         video.codec_context.thread_count = 1  # drawing uses the other cores; more threads double the work here
-        video.codec_context.bit_rate = 0  # constant quality by `crf`
+        video.codec_context.bit_rate = kind.video_bits
         video.codec_context.color_primaries = video.codec_context.color_trc = BT709
         video.codec_context.colorspace, video.codec_context.color_range = BT709, LIMITED_RANGE
         if self._has_alpha:
             video.metadata["alpha_mode"] = "1"
-        audio: Any = self._container.add_stream(kind.audio, rate=SOUND_RATE, layout="mono")
+        audio: Any = self._container.add_stream(
+            kind.audio, rate=SOUND_RATE, layout=kind.audio_layout, options=dict(kind.audio_options)
+        )
         audio.codec_context.bit_rate = kind.audio_bits
         self._video, self._audio = video, audio
+
+    def start(self) -> None:
+        """Write the header, or connect to the server; otherwise the first picture or sound does."""
+        self._container.start_encoding()
 
     def picture(self, pixels: NDArray[np.uint8]) -> None:
         """Append one picture (H, W, 3 or 4)."""
@@ -187,7 +204,11 @@ class MovieWriter:
         """Append mono samples (n,) in [-1, 1]."""
         import av
 
-        frame = av.AudioFrame.from_ndarray(np.ascontiguousarray(samples[None, :]), format="fltp", layout="mono")
+        if self._layout == "mono":
+            frame = av.AudioFrame.from_ndarray(np.ascontiguousarray(samples[None, :]), format="fltp", layout="mono")
+        else:  # both sides are alike: a conversion of the layout would be 3 dB quieter
+            both = np.repeat(samples, 2)[None, :]
+            frame = av.AudioFrame.from_ndarray(np.ascontiguousarray(both), format="flt", layout=self._layout)
         frame.sample_rate, frame.pts, frame.time_base = self._rate, self._n_samples, Fraction(1, self._rate)
         self._n_samples += len(samples)
         self._container.mux(self._audio.encode(frame))
@@ -197,7 +218,8 @@ class MovieWriter:
         mux_pictures(self._container, self._video.encode(None), self._audio)
         self._container.mux(self._audio.encode(None))
         self._container.close()
-        append_to_mp4(self._path, self._notice)
+        if not isinstance(self._path, str):
+            append_to_mp4(self._path, self._notice)
 
     def abandon(self) -> None:
         """Close the file without completing it."""

@@ -11,7 +11,7 @@ from tests.interchange.characters.made import split_glb
 from tests.interchange.exports import programs
 from tests.interchange.exports.made import arkit_clip, turned_clip
 from tts2face.interchange.exports.arkit import ARKIT_SHAPES, arkit_projection
-from tts2face.interchange.exports.vrma import ROUNDED, UNROUNDED, _blinks, _vowels
+from tts2face.interchange.exports.vowels import ROUNDED, UNROUNDED, blinks, vowel_projection
 from tts2face.types import Clip, Trajectory
 
 pytestmark = pytest.mark.formats
@@ -52,7 +52,7 @@ def posed(**weights):
 
 
 def of_pose(**weights):
-    return {name: float(track[0]) for name, track in _vowels(posed(**weights)).items()}
+    return {name: float(track[0]) for name, track in vowel_projection().weights(posed(**weights)).items()}
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_spoken_lips_close_where_lips_meet_and_open_at_vowels():
     session = tts2face.Session(palette=None)
     clip = session.clip("Papa, mama, Bob.", gestures="none")
     weights = arkit_projection(clip.motion.channels, session.mesh, "x").weights(clip.motion.values).astype(float)
-    total = np.sum([*_vowels(weights).values()], axis=0)
+    total = np.sum([*vowel_projection().weights(weights).values()], axis=0)
     phones = zip(clip.speech.phones.phones, clip.speech.phones.edges, clip.speech.phones.edges[1:], strict=False)
     at = [(phone, total[int(begin * clip.fps) : int(end * clip.fps) + 1]) for phone, begin, end in phones]
     assert max(values.min() for phone, values in at if phone in "pbm") < 0.05
@@ -90,8 +90,8 @@ def test_spoken_lips_close_where_lips_meet_and_open_at_vowels():
 
 
 def test_no_lid_closes_twice():
-    blinks = _blinks(np.vstack([posed(eyeBlinkLeft=0.9, eyeBlinkRight=0.4), posed(eyeBlinkRight=0.5)]))
-    assert {name: track.tolist() for name, track in blinks.items()} == {
+    closed = blinks(np.vstack([posed(eyeBlinkLeft=0.9, eyeBlinkRight=0.4), posed(eyeBlinkRight=0.5)]))
+    assert {name: track.tolist() for name, track in closed.items()} == {
         "blink": [0.4, 0.0], "blinkLeft": [0.5, 0.0], "blinkRight": [0.0, 0.5],
     }  # fmt: skip
 

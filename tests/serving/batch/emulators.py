@@ -21,18 +21,12 @@ from pathlib import Path
 import pytest
 
 from tests.packages import needs
+from tests.running import free_port
 
 ACCOUNT = "devstoreaccount1"  # azurite's own, as its documentation states it
 ACCOUNT_KEY = "Eby8vdM02xNOcqFlqUwJPLlmEtlCDXJ1OUzFT50uSRZ6IFsuFq2UVErCz4I6tq/K1SZFPTOtr/KBHBeksoGMGw=="
 SECRET = "a-secret-that-must-not-be-printed"
 START_S = 60.0
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 class Relay:

@@ -5,7 +5,6 @@ import io
 import json
 import os
 import shutil
-import socket
 import subprocess
 import tempfile
 import urllib.error
@@ -19,7 +18,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.running import eventually
+from tests.running import eventually, free_port
 
 CLICK = """
     // the name of an icon is a line of its own
@@ -57,13 +56,6 @@ def missing_program() -> str:
     if not chromium:
         return "chromium"
     return "" if shutil.which("chromedriver") else "chromedriver"
-
-
-def free_port() -> int:
-    """A port of this machine on which nothing listens."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 class Browser:
