@@ -237,7 +237,7 @@ def test_requests_that_cannot_be_spoken_are_refused(change: dict, reason: str, s
             {"idle": 5.0, "text": "", "voice": "espeak"},
             "--volume and --lead have no effect with --idle; remove them",
         ),
-        ({"idle": 0.0, "text": ""}, "idle must lie between 0.1 and 3600, not 0"),
+        ({"idle": 0.0, "text": ""}, "idle must lie between 0.01 and 3600, not 0"),
         (
             {"listen": 5.0, "audio": Path("speech.wav"), "text": ""},
             "--listen cannot be combined with --audio or --idle",

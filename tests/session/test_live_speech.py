@@ -11,7 +11,7 @@ import pytest
 import tts2face
 from tests.tones import WorldVoices
 from tests.world import World
-from tts2face.session.live import LiveSpeech
+from tts2face.session.live.speech import LiveSpeech
 from tts2face.session.speech_stream import Piece
 from tts2face.sound.voice_pool import VoicePool
 

@@ -161,7 +161,10 @@ class GestureLayer:
         times = self._now.seconds + piece.clip.motion.times
         timeline = self._requested.merge(self._marked(piece))
         timeline = with_responses(timeline, float(times[0]), float(times[-1]), self._seed)
-        plan = plan_speech(replace(piece.speech, waveform=sound), piece.script, self._language, is_last=piece.is_last)
+        plan = piece.plan
+        if plan is None:
+            said = replace(piece.speech, waveform=sound)
+            plan = plan_speech(said, piece.script, self._language, is_last=piece.is_last)
         history = self.key(times, sound, timeline, plan) if self._memory.is_used else self._now.history
         drawn = self._memory.recall(
             lambda: history,

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,9 @@ from tts2face.request import Request
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.encoded_stream import StreamFormat, encode_stream
 from tts2face.session.fixed_length import Length, clips_of_length
-from tts2face.session.live import LiveLips, LiveSpeech
+from tts2face.session.live.lips import LiveLips
+from tts2face.session.live.speech import LiveSpeech
+from tts2face.session.live.stream import AHEAD_S, FaceStream
 from tts2face.session.outputs import (
     OutputFiles,
     RequestSteps,
@@ -32,7 +35,16 @@ from tts2face.session.speech_stream import Piece, SpeechSpan, measure_speech, ti
 from tts2face.sound.features import FEATURE_RATE
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.storage.memory import ResultMemory
-from tts2face.types import Chunk, Clip, Progress, StageCallback, concatenate_clips, ignore_progress, ignore_stage
+from tts2face.types import (
+    SOUND_RATE,
+    Chunk,
+    Clip,
+    Progress,
+    StageCallback,
+    concatenate_clips,
+    ignore_progress,
+    ignore_stage,
+)
 
 if TYPE_CHECKING:
     from tts2face.session.performance import Performance
@@ -193,9 +205,47 @@ class Session:
         prepared = self.prepare(text, **options)
         return timed_speech(prepared, self._models.for_request(prepared).speech)
 
-    def live(self, **options: Any) -> LiveSpeech:
-        """A clip without an end, extended by `say`, `idle` and `listen` of the result; options and errors as `clip`."""
-        return LiveSpeech(self._models.seeded(Request(**options)), self._models)
+    def live(self, *, sound_rate: int | None = SOUND_RATE, **options: Any) -> LiveSpeech:
+        """A clip without an end, extended by `say`, `idle` and `listen` of the result; options and errors as `clip`.
+
+        All pieces have the sample rate `sound_rate` in Hz; None: that of their voice, in silence `SOUND_RATE`.
+        """
+        return LiveSpeech(self._models.seeded(Request(**options)), self._models, sound_rate)
+
+    def face_stream(
+        self,
+        picture: Picture | None = None,
+        *,
+        fps: float = 30.0,
+        idle: bool = True,
+        ahead_s: float = AHEAD_S,
+        draws: bool = True,
+        **options: Any,
+    ) -> FaceStream:
+        """One face on a clock: text or sound goes in, frames come out (docs/live.md).
+
+        Parameters
+        ----------
+        picture
+            Drawing options; if None, fields of `Picture` may be given among the options.
+        fps
+            Frames per second.
+        idle
+            Whether the face moves between utterances; otherwise there are frames of speech, listening and gestures
+            only.
+        ahead_s
+            Seconds of frames that are made, and drawn, before they are read.
+        draws
+            Whether frames have pictures; senders of curves need none.
+        options
+            Fields of `Request`, such as ``style="delighted"``; errors as `clip`.
+        """
+        picture, options = split_picture(picture, options)
+        speech = self.live(fps=fps, **options)
+        has_gestures = speech.request.has_gestures
+        renderer = partial(self.renderer, picture, has_gestures=has_gestures) if draws else None
+        channels = self.animated_face(has_gestures=has_gestures).channels
+        return FaceStream(speech, self.listen, renderer, channels, idle=idle, ahead_s=ahead_s)
 
     def listen(self, rate: int = FEATURE_RATE, *, audio_map: str | None = None) -> LiveLips:
         """Lip motion of speech that is still being spoken; arguments and errors as `LiveLips`."""

@@ -105,6 +105,7 @@ class SessionModels:
         self.voices = voices or VoicePool()
         shown = {**self.talker.metadata, "name": OWN_FACE} if mesh is None else mesh.metadata
         self.person, self.seed = person or person_of(shown), seed_of(shown)
+        self.idle_motions: OrderedDict[str, Any] = OrderedDict()  # of `tts2face.session.live.idle`, by their options
         self._without: tuple[tuple[ExcludedToken, ...], ExemplarModel] | None = None
         self.speech_face: AnimatedFace = (
             own_appearance_face(self.talker, self._exemplars)

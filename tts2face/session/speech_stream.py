@@ -17,6 +17,7 @@ from lexicon.marked_text import NameMark
 from lexicon.sentence_length import n_letters
 from lexicon.sentences import Sentence, text_prefix
 from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.gestures.speech_plan import SpeechPlan
 from tts2face.gestures.timeline import Timeline
 from tts2face.request import CONVERSATION, TURN_S, Idle, Listening, Recorded, Spoken
 from tts2face.session.joining import JOIN_LEAD_S, Excerpt, excerpt_of_speech, shift_start, silent_speech, word_bounds
@@ -99,6 +100,8 @@ class Piece:
         Words that are said, with their punctuation; empty where they are not known.
     is_last
         Whether the clip ends with it, as far as is known.
+    plan
+        Speech that gestures follow, in seconds of the piece; None for that which words and sound of the piece show.
     drawn
         Gestures that a thread draws (`tts2face.session.gesture_layer`), until they are added.
     """
@@ -116,6 +119,7 @@ class Piece:
     voice_sound: Waveform | None = None
     script: tuple[TextWord, ...] = ()
     is_last: bool = False
+    plan: SpeechPlan | None = None
     drawn: "Future[Any] | None" = None
 
     @property

@@ -4,7 +4,7 @@ The first step makes the pieces: `spoken_pieces` those of a text and of idle ani
 recording. Gestures are drawn in a thread from the step before the lips on. Shapes of combinations come last.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 from tts2face.face.combinations import with_combinations
@@ -14,7 +14,7 @@ from tts2face.session.lip_steps import Lips, RecordedLips, SynthesisModels
 from tts2face.session.prepared import PreparedRequest
 from tts2face.session.recorded_speech import hear, recorded_pieces
 from tts2face.session.speech_stream import Piece, spoken_ahead, spoken_pieces
-from tts2face.types import Progress, ignore_progress
+from tts2face.types import Progress, YieldTurn, ignore_progress
 
 Step = Callable[[Piece], Piece]
 
@@ -62,10 +62,17 @@ def pieces_from(
         started = spoken_pieces(prepared, speech, first_frame, ends_on_frame=ends_on_frame)
         if gestures is not None:
             started = spoken_ahead(started, prepared.timeline, speech.yield_turn)
+    yield from moved_pieces(started, lips, gestures, speech.yield_turn)
+
+
+def moved_pieces(
+    started: Iterable[Piece], lips: Step, gestures: GestureLayer | None, yield_turn: YieldTurn
+) -> Iterator[Piece]:
+    """Pieces that have speech, with lip motion and all that follows it."""
     steps: list[Step] = [lips] if gestures is None else [gestures.draw, lips, gestures, gestures.edits, gestures.body]
     for piece in started:
         for step in steps:
-            speech.yield_turn()
+            yield_turn()
             piece = step(piece)  # noqa: PLW2901 - it gains from step to step
         # no turn is given before: gestures continue from a piece that is interrupted here
         yield _combine_shapes(piece)

@@ -11,12 +11,13 @@ import pytest
 import tts2face
 from tts2face.processes.message import MORE, Message
 from tts2face.request import TURN_S
-from tts2face.serving.service import live_motion
 from tts2face.serving.service.live import LiveTask
-from tts2face.serving.service.live_motion import IDLE_PART_S, Projection, idle_motion
+from tts2face.serving.service.live_motion import Projection
 from tts2face.serving.service.messages import Event, Inputs, Line, Step, Wait, Work
 from tts2face.serving.service.scheduler import InterruptedTaskError
-from tts2face.session.live import LiveSpeech
+from tts2face.session.live import idle as idle_module
+from tts2face.session.live.idle import IDLE_PART_S, idle_motion
+from tts2face.session.live.speech import LiveSpeech
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.types import Chunk
 
@@ -127,7 +128,7 @@ def test_idle_motion_is_that_of_a_clip() -> None:
 
 def test_speech_and_idle_motion_join_without_a_jump(monkeypatch: pytest.MonkeyPatch) -> None:
     """From idle motion to speech, back, and where idle motion repeats: no step is larger than those within."""
-    monkeypatch.setattr(live_motion, "IDLE_LOOP_S", IDLE_PART_S)
+    monkeypatch.setattr(idle_module, "IDLE_LOOP_S", IDLE_PART_S)
     session, inputs = tts2face.Session(), Inputs()
     inputs.append(Message(MORE, {"type": "say", "text": "Yes."}))
     spoken = frames_of(idle_events(session, 8.0, inputs, seed=3))
@@ -142,11 +143,10 @@ def test_speech_and_idle_motion_join_without_a_jump(monkeypatch: pytest.MonkeyPa
 def test_another_stream_waits_while_idle_motion_is_made() -> None:
     """A turn in the middle of the making shows another stream nothing half made."""
     session = tts2face.Session()
-    idle = idle_motion(session, {})
-    idle._is_growing = True
-    steps = LiveTask(session, Work(kind="live"), deque(), clock=lambda: 0.0).steps()
-    assert isinstance(next(steps), Wait)
-    idle._is_growing = False
+    idle = idle_motion(session.live(sound_rate=None))
+    with idle._growing:
+        steps = LiveTask(session, Work(kind="live"), deque(), clock=lambda: 0.0).steps()
+        assert isinstance(next(steps), Wait)
     assert type_of(next(steps)) == "curves"
 
 

@@ -2,7 +2,6 @@
 
 import itertools
 import time
-from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
@@ -11,21 +10,21 @@ import numpy as np
 
 from lexicon.errors import Tts2faceError
 from lexicon.marked_text import GestureMark
-from tts2face.gestures.listening import PartnerSound
 from tts2face.processes.message import Message
-from tts2face.serving.service.live_motion import Curves, idle_motion
+from tts2face.serving.service.live_motion import Curves
 from tts2face.serving.service.messages import Event, Inputs, Line, Step, Wait, Work
 from tts2face.serving.service.scheduler import InterruptedTaskError, check_words
+from tts2face.session.live.blocks import Block, Note
+from tts2face.session.live.joins import Joins
+from tts2face.session.live.live_face import LiveFace
 from tts2face.types import Chunk, Clip
 
 if TYPE_CHECKING:
-    from tts2face.session.live import LiveSpeech
     from tts2face.session.session import Session
     from tts2face.session.speech_stream import Piece
 
 
 IDLE_S = 0.4  # of idle motion at a time, so that speech can begin soon
-LISTEN_S = 0.2  # likewise of a listener's
 AHEAD_S = 0.1  # by which idle motion is ahead of the clock at least
 LEAST_WAIT_S = 1e-3  # a shorter wait is none: of a clock that counts otherwise than the frames
 GROWING_S = 0.02  # after which is looked again whether another stream has made more of the idle motion
@@ -34,7 +33,8 @@ GROWING_S = 0.02  # after which is looked again whether another stream has made 
 class LiveTask:
     """One live stream: inputs are ``say``, ``gesture``, ``style``, ``listen``, ``heard``, ``cancel`` and ``end``.
 
-    Results are events and sound.
+    Results are events and sound. What the face does next are the rules of `tts2face.session.live.live_face.LiveFace`;
+    this class gives it inputs, waits for the clock, and writes what it makes.
 
     The text of ``say`` is a sentence; ``said`` with their number ``n`` names those that are spoken or forgotten. From
     ``listen`` to the next sentence the face listens; the payload of ``heard`` is 16-bit sound of the partner. A
@@ -47,44 +47,34 @@ class LiveTask:
     """
 
     def __init__(self, session: "Session", work: Work, inputs: Inputs, clock: Any = time.monotonic) -> None:
-        self._session, self._options = session, dict(work.request)
-        self._has_idle = bool(self._options.pop("with_idle", True))
-        self._speech: LiveSpeech = session.live(**self._options)
-        self._curves = Curves(session)
-        self._idle = idle_motion(session, self._options) if self._has_idle else None
-        self._idle_at = self._n_idle = 0  # next frame of the idle motion; frames of it that the stream has
+        options = dict(work.request)
+        self._has_idle = bool(options.pop("with_idle", True))
+        self._face = LiveFace(session.live(sound_rate=None, **options), session.listen)
+        self._joins, self._curves = Joins(self._face.speech.fps), Curves(session)
         self._inputs, self._clock = inputs, clock
-        self._sentences: deque[str] = deque()
+        self._n_frames = self._n_sentences = 0
         self._is_ended = False
         self._began: float | None = None  # of the stream on the clock
         self._n_cancels = 0
-        self._listens = False
-        self._partner: PartnerSound | None = None
-        self._source = ""  # of the last curves
 
     @property
     def _seconds(self) -> float:
         """Duration of the stream so far."""
-        return self._speech.seconds + self._idle_s
-
-    @property
-    def _idle_s(self) -> float:
-        """Seconds by which a piece of speech begins later than in a stream without idle motion."""
-        return self._speech.seconds_of(self._n_idle)
+        return self._face.speech.seconds_of(self._n_frames)
 
     def steps(self) -> Iterator[Step]:
         """Yield results until ``end`` and all its text are done."""
+        face = self._face
         while True:
             yield from self._read_inputs()
-            is_alive = self._has_idle or self._listens or self._speech.has_gestures
-            if self._began is None and (self._sentences or is_alive):
+            is_alive = self._has_idle or face.is_moved
+            if self._began is None and (face.has_speech or is_alive):
                 self._began = self._clock() - self._seconds
-            if self._sentences:
-                self._listens = False
-                yield from self._say(self._sentences.popleft())
+            if face.has_speech:
+                yield from self._speak()
                 yield _said(1)
                 continue
-            if self._is_ended and not self._speech.has_gestures:
+            if self._is_ended and not face.speech.has_gestures:
                 return
             if not is_alive or self._began is None:
                 yield Wait()
@@ -97,88 +87,55 @@ class LiveTask:
                 yield from self._be_silent()
 
     def _be_silent(self) -> Iterator[Step]:
-        if self._listens:
-            yield from self._listen()
-        elif self._speech.has_gestures:
-            yield from self._gesture()
-        else:
-            yield from self._be_idle()
+        face = self._face
+        if face.is_moved:
+            for block in face.silence():
+                yield from self._written(block)
+            return
+        n_frames = max(1, round(IDLE_S * face.speech.fps))
+        if not face.idle.has(n_frames) and not face.idle.motion.grow():
+            yield Wait(GROWING_S)
+            return
+        face.rest()
+        yield from self._written(face.idle.next(n_frames))
 
-    def _gesture(self) -> Iterator[Step]:
-        """Idle motion of this stream alone, while a gesture is made."""
-        self._begin_source("gestures")
-        for piece in self._speech.idle(IDLE_S):
-            yield from self._shown_gestures()
-            yield from self._curves.of_clip(piece.clip, piece.begin + self._idle_s)
-
-    def _shown_gestures(self) -> Iterator[Event]:
-        for shown in self._speech.gestures.shown():
-            yield Event({"type": "gesture", "name": shown.name, "at": round(shown.time + self._idle_s, 4)})
+    def _written(self, block: Block) -> Iterator[Step]:
+        """Events and sound of a block at the end of the stream."""
+        begin = self._seconds
+        if block.piece is not None:
+            yield _speech_event(block.piece, begin)
+        for shown in block.shown:
+            yield Event({"type": "gesture", "name": shown.name, "at": round(begin + shown.time, 4)})
+        if block.piece is not None:
+            yield _sound(block.piece.clip)
+        self._n_frames += len(block.motion)
+        yield from self._curves.of_block(self._joins.add(block), begin)
 
     def _change_style(self, style: str) -> Event:
         try:
-            self._options["style"] = self._speech.change_style(style)
+            self._face.change_style(style)
         except Tts2faceError as error:
             return Event({"type": "error", "message": " ".join(str(error).split())})
-        if self._has_idle:
-            self._idle, self._idle_at = idle_motion(self._session, self._options), 0
         return Event({"type": "style", "style": style, "at": round(self._seconds, 4)})
 
-    def _listen(self) -> Iterator[Line | Event]:
-        cues = None if self._partner is None else self._partner.new_cues()
-        self._begin_source("listening")
-        for piece in self._speech.listen(LISTEN_S, cues):
-            yield from self._shown_gestures()
-            yield from self._curves.of_clip(piece.clip, piece.begin + self._idle_s)
-
-    def _be_idle(self) -> Iterator[Step]:
-        idle, at = self._idle, self._idle_at
-        assert idle is not None
-        n = max(1, round(IDLE_S * self._speech.fps))
-        if not idle.is_whole and at + n > len(idle.frames) and not idle.grow():
-            yield Wait(GROWING_S)
-            return
-        self._speech.rest()
-        if at == 0:
-            self._source = ""  # it begins again
-        self._begin_source("idle")
-        part = slice(at, min(at + n, len(idle.frames)))
-        begin = self._seconds
-        self._n_idle += part.stop - at
-        self._idle_at = 0 if idle.is_whole and part.stop == len(idle.frames) else part.stop
-        yield self._curves.of_idle(idle, part, begin)
-
-    def _begin_source(self, name: str) -> None:
-        if name != self._source:
-            self._source = name
-            self._curves.begin_source()
-
-    def _say(self, sentence: str) -> Iterator[Step]:
+    def _speak(self) -> Iterator[Step]:
         n_cancels = self._n_cancels
         if self._clock() - (self._began or 0.0) > self._seconds:
-            self._speech.rest()  # the sentence before it has been heard
-        self._begin_source("speech")
+            self._face.rest()  # the sentence before it has been heard
+        text = self._face.next_text
         try:
-            check_words(sentence)
-            for piece in self._speech.say(sentence):
-                begin = piece.begin + self._idle_s
-                yield from self._new_notes(sentence)
-                yield _speech_event(piece, begin)
-                yield from self._shown_gestures()
-                yield _sound(piece.clip)
-                yield from self._curves.of_clip(piece.clip, begin)
-                yield from self._read_inputs()
-                if self._n_cancels != n_cancels:
-                    return
-            yield from self._new_notes(sentence)
+            for item in self._face.speak():
+                if isinstance(item, Note):
+                    yield Event({"type": "note", "text": item.text, "message": item.message})
+                elif isinstance(item, Block):
+                    yield from self._written(item)
+                    yield from self._read_inputs()
+                    if self._n_cancels != n_cancels:
+                        return
         except InterruptedTaskError:
             return  # by a message that is read next
         except Tts2faceError as error:  # the stream goes on with the next sentence
-            yield Event({"type": "error", "text": sentence, "message": " ".join(str(error).split())})
-
-    def _new_notes(self, sentence: str) -> Iterator[Event]:
-        for note in self._speech.new_notes():
-            yield Event({"type": "note", "text": sentence, "message": note})
+            yield _refused(text, error)
 
     def _read_inputs(self) -> Iterator[Event]:
         while self._inputs:
@@ -188,38 +145,46 @@ class LiveTask:
                 case "listen" | "heard":
                     self._hear(given)
                 case "say":
-                    self._sentences.append(content["text"])
+                    yield from self._add(content["text"])
                 case "end":
                     self._is_ended = True
                 case "gesture":
-                    self._speech.gesture(GestureMark(**content["gesture"]))
+                    self._face.gesture(GestureMark(**content["gesture"]))
                 case "style":
                     yield self._change_style(content["style"])
                 case "cancel":
                     yield from self._cancel(content["arrived"])
 
     def _cancel(self, arrived: float) -> Iterator[Event]:
-        if self._sentences:
-            yield _said(len(self._sentences))
-            self._sentences.clear()
+        if n_waiting := self._face.interrupt():
+            yield _said(n_waiting)
         self._n_cancels += 1
         self._began = self._clock() - self._seconds  # what follows is due now
-        self._speech.rest()
-        self._speech.gestures.clear()
         after_ms = 1000 * (self._clock() - arrived)
         yield Event({"type": "cancelled", "at": round(self._seconds, 4), "after_ms": round(after_ms, 1)})
+
+    def _add(self, text: str) -> Iterator[Event]:
+        try:
+            check_words(text)
+        except Tts2faceError as error:
+            yield _refused(text, error)
+            yield _said(1)
+            return
+        self._n_sentences += 1
+        self._face.say(self._n_sentences, text)
 
     def _hear(self, given: Message) -> None:
         """Begin to listen, or hear a block of the partner's sound."""
         if given.content["type"] == "heard":
-            if self._partner is not None:
-                self._partner.add(np.frombuffer(given.payload, "<i2").astype(np.float32) / np.float32(32768))
+            self._face.hear(np.frombuffer(given.payload, "<i2").astype(np.float32) / np.float32(32768))
             return
-        self._listens = True
-        rate = given.content["rate"]
-        self._partner = None if rate is None else PartnerSound(rate)
+        self._face.listen(given.content["rate"])
         if self._began is None or self._clock() - self._began > self._seconds:
             self._began = self._clock() - self._seconds  # it listens from now on
+
+
+def _refused(text: str, error: Tts2faceError) -> Event:
+    return Event({"type": "error", "text": text, "message": " ".join(str(error).split())})
 
 
 def _said(n_sentences: int) -> Event:

@@ -1,98 +1,29 @@
-"""Clips that are made while they play: a sound that is still being spoken, and growing text.
-
-`LiveLips` moves lips by their sound alone.
-`LiveSpeech` appends sentences, and idle motion between them, to one continuous clip.
-"""
+"""A clip that is made while it plays: sentences, with idle motion and listening between them."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from functools import partial
 
 from lexicon.errors import InputError
 from lexicon.marked_text import GestureMark
 from lexicon.moods import is_auto
 from lexicon.pauses import pause_behind
+from lexicon.sequence import PhoneSequence
 from tts2face.gestures.elements import ListeningSpan
 from tts2face.gestures.listening import LASTS_S, responses
+from tts2face.gestures.speech_plan import SpeechPlan
 from tts2face.gestures.timeline import Timeline
-from tts2face.models.talker import speech_channels
 from tts2face.request import Idle, Listening, Request, Spoken
 from tts2face.session.joining import END_S, JOIN_LEAD_S
-from tts2face.session.live_gestures import WaitingGestures
+from tts2face.session.live.waiting_gestures import ShownGesture, WaitingGestures
 from tts2face.session.marked_styles import palette_style
 from tts2face.session.prepared import PreparedRequest, prepare
-from tts2face.session.recording import select_audio_map
 from tts2face.session.shared_models import SessionModels
 from tts2face.session.speech_stream import Piece, after_listening
-from tts2face.session.steps import pieces_from
-from tts2face.sound.features import FEATURE_RATE
-from tts2face.sound.listener import StreamingAudioMap
-from tts2face.types import Trajectory, exact_rate
+from tts2face.session.steps import moved_pieces, pieces_from
+from tts2face.types import SOUND_RATE, Clip, Speech, Trajectory, Waveform, exact_rate
 
-RATE_LIMITS = (8_000, 192_000)  # Hz
 UNUSED_IDLE_S = 1.0  # of the request from which the gestures of the whole are made
-
-
-class LiveLips:
-    """Lip motion of a sound that arrives in blocks; independent of the blocks at 16 kHz. Not thread-safe.
-
-    Parameters
-    ----------
-    rate
-        Sample rate of the sound in Hz; rates other than 16 kHz are resampled.
-    audio_map
-        Name of an audio map of the talker; None for the default.
-    """
-
-    def __init__(self, models: "SessionModels", rate: int = FEATURE_RATE, audio_map: str | None = None) -> None:
-        low, high = RATE_LIMITS
-        if not low <= rate <= high:
-            raise InputError(f"the sample rate must lie between {low} and {high} Hz, not {rate}; convert the sound")
-        talker = models.talker
-        chosen = select_audio_map(audio_map, talker)
-        self._stream = StreamingAudioMap(chosen)
-        self._face = models.speech_face
-        self._channels = speech_channels(talker.model)
-        self.fps = chosen.fps
-        self._resampler: Any = None
-        if rate != FEATURE_RATE:
-            import soxr
-
-            self._resampler = soxr.ResampleStream(rate, FEATURE_RATE, 1, dtype="float32")
-
-    @property
-    def look_ahead_s(self) -> float:
-        """Seconds of sound after a frame that are needed to compute it."""
-        return self._stream.look_ahead_s
-
-    def add_samples(self, samples: NDArray[np.floating]) -> Trajectory | None:
-        """Motion of the frames that are known after samples (m,) in [-1, 1]; None if there are none.
-
-        Raises
-        ------
-        InputError
-            The block is not a vector of finite samples.
-        """
-        if self._resampler is not None:
-            samples = self._resampler.resample_chunk(np.asarray(samples, np.float32))
-        return self._motion(self._stream.add_samples(samples))
-
-    def finish(self) -> Trajectory | None:
-        """Motion of the remaining frames."""
-        parts = []
-        if self._resampler is not None:
-            parts.append(self._stream.add_samples(self._resampler.resample_chunk(np.zeros(0, np.float32), last=True)))
-        if not self._stream.n_samples:
-            return None
-        return self._motion(np.concatenate([*parts, self._stream.finish()]))
-
-    def _motion(self, parameters: NDArray[np.float32]) -> Trajectory | None:
-        if not len(parameters):
-            return None
-        return self._face.motion_of_parameters(Trajectory(self._channels, parameters, self.fps))
 
 
 class LiveSpeech:
@@ -104,6 +35,13 @@ class LiveSpeech:
     ----------
     request
         Options of all pieces; without text, recording and idle time.
+    sound_rate
+        Sample rate of all pieces in Hz; None: that of the voice, in silence `SOUND_RATE`.
+
+    Attributes
+    ----------
+    models
+        Of the session.
 
     Raises
     ------
@@ -111,10 +49,10 @@ class LiveSpeech:
         The request has a text, recording or timeline, or an option is invalid.
     """
 
-    def __init__(self, request: Request, models: SessionModels) -> None:
+    def __init__(self, request: Request, models: SessionModels, sound_rate: int | None = SOUND_RATE) -> None:
         if not isinstance(request.source, Spoken) or request.source.text or request.timeline is not None:
             raise InputError("a live request has options only; send its text in parts")
-        self._request, self._models = request, models
+        self._request, self.models, self._sound_rate = request, models, sound_rate
         self._spoken = request.source
         self._silent = replace(request, source=Idle(UNUSED_IDLE_S), dictionary=None)
         self._layer = models.gesture_layer(prepare(self._silent))
@@ -125,6 +63,15 @@ class LiveSpeech:
         self._cues: list[float] = []  # seconds of the clip at which the face responds
         self.gestures = WaitingGestures()
         self._notes: list[str] = []
+
+    @property
+    def request(self) -> Request:
+        """Options of what is appended next."""
+        return self._request
+
+    def without_pieces(self) -> "LiveSpeech":
+        """Another clip with the options of this one."""
+        return LiveSpeech(self._request, self.models, self._sound_rate)
 
     @property
     def seconds(self) -> float:
@@ -159,13 +106,13 @@ class LiveSpeech:
         spoken = after_listening(spoken) if self._has_listened else spoken
         if self._pause_s is not None:
             spoken = replace(spoken, lead=max(self._pause_s / spoken.rate - END_S, JOIN_LEAD_S))
-        prepared = prepare(replace(self._request, source=spoken), self._models.person)
+        prepared = prepare(replace(self._request, source=spoken), self.models.person)
         self._notes += prepared.notes
         if not isinstance(prepared.request.source, Spoken):
             return self.gesture(*(mark for mark in prepared.text.marks if isinstance(mark, GestureMark)))
         self._has_listened = False
         n_known = len(prepared.notes)
-        prepared = self._models.with_own_styles(prepared)
+        prepared = self.models.with_own_styles(prepared)
         self._notes += prepared.notes[n_known:]
         yield from self._append(prepared, is_speech=True)
         self._pause_s = pause_behind(text)
@@ -197,6 +144,25 @@ class LiveSpeech:
         yield from self._append(prepare(replace(self._silent, source=Listening(seconds))), responding.merge(listened))
         self._has_listened = True
 
+    def follow(self, sound: Waveform, lips: Trajectory, plan: SpeechPlan | None = None) -> Piece:
+        """Append the sound of whole frames, which is spoken already, with its lip motion (T, K).
+
+        Parameters
+        ----------
+        plan
+            Its sentences and accents, in seconds of the piece; None for those that are heard in it.
+        """
+        self.rest()
+        made, fps = self.gestures.waiting, lips.fps
+        piece = Piece(
+            Clip.at_rest(len(lips), fps, Speech.without_phones(sound)), self.seconds, 0,
+            self.gestures.now().shift(self.seconds), plan=plan,
+        )  # fmt: skip
+        (piece,) = moved_pieces([piece], partial(_with_lips, lips), self._layer, self.models.voices.yield_turn)
+        self._n_frames += len(lips)
+        self.gestures.note(piece, made)
+        return piece
+
     def gesture(self, *gestures: GestureMark) -> None:
         """Make gestures with the next word of `say`, or at the beginning of the next `idle` or `listen`.
 
@@ -209,6 +175,10 @@ class LiveSpeech:
         """Whether a gesture waits or is being made."""
         return self.gestures.move_at(self.seconds)
 
+    def shown(self, begin: float) -> tuple[ShownGesture, ...]:
+        """Gestures that are made since the last call, in seconds from `begin` of the clip."""
+        return tuple(replace(gesture, time=gesture.time - begin) for gesture in self.gestures.shown())
+
     def change_style(self, style: str) -> str:
         """From the next word or the next silence on, the face and its voice have another style, whose name is returned.
 
@@ -219,7 +189,7 @@ class LiveSpeech:
         InputError
             There is no such style.
         """
-        names = self._models.palette.names if self._models.palette is not None else ()
+        names = self.models.palette.names if self.models.palette is not None else ()
         style = palette_style(names, style)
         if self._layer is not None:
             self._layer.change_style(None if is_auto(style) else style)
@@ -235,9 +205,25 @@ class LiveSpeech:
     ) -> Iterator[Piece]:
         gestures, waiting = self.gestures, self.gestures.waiting
         prepared = gestures.in_speech(prepared) if is_speech else gestures.in_silence(prepared, listening)
-        models = self._models.for_request(prepared)
+        models = self.models.for_request(prepared)
         for piece in pieces_from(prepared, models, self._layer, self._n_frames, ends_on_frame=True):
             self._n_frames += len(piece.clip.motion)
             gestures.note(piece, waiting)
             waiting = ()
-            yield piece
+            yield piece if self._sound_rate is None else _at_rate(piece, self._sound_rate)
+
+
+def _with_lips(lips: Trajectory, piece: Piece) -> Piece:
+    return replace(piece, clip=replace(piece.clip, motion=lips))
+
+
+def _at_rate(piece: Piece, rate: int) -> Piece:
+    """A piece with sound at another rate. Pieces begin and end in silence, so that each is resampled alone."""
+    speech = piece.clip.speech
+    if speech.waveform.rate == rate:
+        return piece
+    sound = speech.waveform.resampled(rate)
+    edges = speech.phones.edges.copy()
+    edges[-1] = sound.duration
+    speech = replace(speech, waveform=sound, phones=PhoneSequence(speech.phones.phones, edges))
+    return replace(piece, clip=replace(piece.clip, speech=speech))

@@ -51,8 +51,12 @@ class WaitingGestures:
 
     def in_silence(self, prepared: PreparedRequest, listening: Timeline | None) -> PreparedRequest:
         """A silence with the gestures that wait, at its start, and what the face does while it listens."""
-        now = Timeline(gestures=tuple(gesture_of(mark, 0.0) for mark in self.waiting))
+        now = self.now()
         return replace(prepared, listening=now if listening is None else now.merge(listening))
+
+    def now(self) -> Timeline:
+        """The gestures that wait, at 0 s."""
+        return Timeline(gestures=tuple(gesture_of(mark, 0.0) for mark in self.waiting))
 
     def note(self, piece: Piece, made: Sequence[GestureMark]) -> None:
         """Note that a piece has gestures, those which waited among them: they wait no longer."""

@@ -1,0 +1,472 @@
+"""A live face on a clock: text or sound goes in from any thread, frames come out."""
+
+import asyncio
+import threading
+import time
+import weakref
+from collections import deque
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import suppress
+from functools import partial
+from types import TracebackType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError, Tts2faceError
+from lexicon.gesture_marks import parse_gesture
+from lexicon.gesture_names import GESTURES
+from tts2face.picture.frame_renderer import FrameRenderer
+from tts2face.session.live.blocks import Item
+from tts2face.session.live.frames import Frame
+from tts2face.session.live.line import Line, Place
+from tts2face.session.live.lips import RATE_LIMITS, LiveLips
+from tts2face.session.live.live_face import LiveFace
+from tts2face.session.live.speech import LiveSpeech
+from tts2face.sound.features import FEATURE_RATE
+from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, resting_head
+
+AHEAD_S = 0.2  # of frames in the line: six at 30 a second
+MOST_AHEAD_S = 2.0  # frames of 512 x 512 are 0.8 MB each
+READY_S = 2.0  # of motion and sound that are made before the line has room: the next sentences
+IDLE_AHEAD_S = 2.0  # of idle motion that is made before it is needed
+SHARED_WAIT_S = 0.02  # after which is looked again whether another stream has made more of the idle motion
+MAX_LAG_S = 0.25  # by which a reader may be late; beyond it, the clock goes on from then, so that no burst follows
+FIRST_WAIT_S = 0.005  # between two looks of an asynchronous reader for the first frame
+THREAD = "live face"
+CLOSED = "the stream is closed; open another one"
+
+
+class FaceStream:
+    """One face on a clock; made by `tts2face.Session.face_stream`, and closed by `close` or a ``with`` block.
+
+    All methods may be called from any thread, and return at once but for `read`. A thread makes motion and sound,
+    another one draws. The next `read` raises what went wrong with a text or a sound; the stream goes on behind it.
+
+    Parameters
+    ----------
+    speech
+        Clip without an end, with the options of the stream.
+    lips
+        Returns the lip motion of sound with a rate in Hz.
+    renderer
+        Returns what draws the frames; None: they have no pictures.
+    channels
+        Names of the weights of all frames.
+    idle, ahead_s
+        As for `tts2face.Session.face_stream`.
+
+    Attributes
+    ----------
+    fps
+        Frames per second.
+    """
+
+    def __init__(
+        self,
+        speech: LiveSpeech,
+        lips: Callable[[int], LiveLips],
+        renderer: Callable[[], FrameRenderer] | None,
+        channels: tuple[str, ...],
+        *,
+        idle: bool = True,
+        ahead_s: float = AHEAD_S,
+    ) -> None:
+        if not 0.0 < ahead_s <= MOST_AHEAD_S:
+            raise InputError(f"ahead_s must be above 0 and at most {MOST_AHEAD_S:g} s, not {ahead_s:g}")
+        self.fps, self.channels = speech.fps, channels
+        self._lips, self._renderer = lips, renderer
+        length = max(round(ahead_s * self.fps), 2)
+        self._n_idle = round(IDLE_AHEAD_S * self.fps)
+        self._line = Line(self.fps, length, has_idle=idle, draws=renderer is not None)
+        self._face = LiveFace(speech, lips)
+        self._lock = threading.Lock()
+        self._changed = threading.Condition(self._lock)
+        self._inbox: deque[tuple[int, Callable[[], None]]] = deque()  # each with its utterance; 0: none
+        self._errors: deque[BaseException] = deque()
+        self._failure: BaseException | None = None  # that ended a thread
+        self._is_closed, self._can_draw = False, renderer is None
+        self._n_utterances, self._forgotten, self._all_forgotten = 0, set[int](), 0
+        self._open_text = 0
+        self._open_sound: tuple[int, int] = (0, 0)  # number and rate
+        works = [self._make, *([] if renderer is None else [partial(self._draw, renderer)])]
+        self._threads = [
+            threading.Thread(target=self._guarded, args=[work], name=THREAD, daemon=True) for work in works
+        ]
+        # a process that ends while native code runs in a thread aborts
+        self._at_exit = weakref.finalize(self, _join, self._threads)
+        for thread in self._threads:
+            thread.start()
+
+    # ------------------------------------------------------------------------------------------------ what goes in
+
+    def say(self, text: str) -> int:
+        """Speak a text, of one sentence or several, after everything before it; returns the number of the utterance."""
+        with self._lock:
+            number = self._next_number()
+            self._post(number, lambda: self._face.say(number, text))
+            return number
+
+    def push_text(self, part: str) -> int:
+        """Speak more of a text as it is written, sentence by sentence; until `end_text` it is one utterance."""
+        with self._lock:
+            number = self._open_text = self._open_text or self._next_number()
+            self._post(number, lambda: self._face.add_text(number, part))
+            return number
+
+    def end_text(self) -> None:
+        """Speak the rest of the text that was pushed."""
+        with self._lock:
+            number, self._open_text = self._open_text, 0
+            if number:
+                self._post(number, lambda: self._face.end(number))
+
+    def push_sound(self, samples: NDArray[np.floating], rate: int) -> int:
+        """Speak more of a sound, whose lips, head and brows follow it; until `end_sound` it is one utterance.
+
+        Parameters
+        ----------
+        samples : (m,)
+            In [-1, 1], of any number.
+        rate
+            Sample rate in Hz, the same until `end_sound`.
+        """
+        samples, (low, high) = _checked(samples), RATE_LIMITS
+        if not low <= rate <= high:
+            raise InputError(f"the sample rate must lie between {low} and {high} Hz, not {rate}; convert the sound")
+        with self._lock:
+            number, open_rate = self._open_sound
+            if number and rate != open_rate:
+                raise InputError(f"the sound began with {open_rate} Hz, not {rate}; end it before another rate")
+            number = number or self._next_number()
+            self._open_sound = number, rate
+            self._post(number, lambda: self._face.add_sound(number, samples, rate))
+            return number
+
+    def end_sound(self) -> None:
+        """The sound that was pushed is complete: the frames of its end can be made."""
+        with self._lock:
+            (number, _), self._open_sound = self._open_sound, (0, 0)
+            if number:
+                self._post(number, lambda: self._face.end(number))
+
+    def listen(self, samples: NDArray[np.floating] | None = None, rate: int | None = None) -> None:
+        """Listen until the next speech; `samples` are what the other one says, at whose pauses the face nods."""
+        heard = None if samples is None else _checked(samples)
+        if (heard is None) != (rate is None):
+            raise InputError("samples that are heard need their rate, and a rate its samples; give both, or neither")
+        with self._lock:
+            self._post(0, lambda: self._face.hear_at(rate, heard))
+
+    def gesture(self, written: str) -> None:
+        """Make a gesture, or look somewhere, with the next word that is not made yet, in silence at once.
+
+        `written` is as between the brackets of a mark of a text: ``nod``, ``wink left``, ``look left 20 2s``.
+        """
+        mark = parse_gesture(written, 0)
+        if mark is None:
+            raise InputError(f"there is no gesture {written[:40]!r}; choose {', '.join(GESTURES)}")
+        with self._lock:
+            self._post(0, lambda: self._face.gesture(mark))
+
+    def style(self, name: str) -> None:
+        """From the next word or the next silence on, face and voice have another style, as of `LiveSpeech`."""
+
+        def change() -> None:
+            self._face.change_style(name)
+
+        with self._lock:
+            self._post(0, change)
+
+    def interrupt(self, utterance: int | None = None) -> float:
+        """Forget an utterance, or all; the mouth closes within 0.15 s of the last frame that was read.
+
+        Returns
+        -------
+        The seconds of it (None: of the present one) that have been read.
+        """
+        with self._lock:
+            if utterance is None:
+                self._all_forgotten = self._n_utterances
+                self._open_text, self._open_sound = 0, (0, 0)
+            else:
+                self._forgotten.add(utterance)
+                self._open_text = 0 if self._open_text == utterance else self._open_text
+                self._open_sound = (0, 0) if self._open_sound[0] == utterance else self._open_sound
+            self._inbox = deque(one for one in self._inbox if not self._is_forgotten(one[0]))
+            self._post(0, lambda: self._forget(utterance))
+            return self._line.interrupt(utterance)
+
+    def _forget(self, utterance: int | None) -> None:
+        if utterance is None:
+            self._face.interrupt()
+        else:
+            self._face.forget(utterance)
+
+    def _next_number(self) -> int:
+        self._n_utterances += 1
+        return self._n_utterances
+
+    def _post(self, number: int, follow: Callable[[], None]) -> None:
+        if self._is_closed:
+            raise InputError(CLOSED)
+        self._inbox.append((number, follow))
+        self._changed.notify_all()
+
+    def _is_forgotten(self, number: int) -> bool:
+        return number in self._forgotten or 0 < number <= self._all_forgotten
+
+    # ------------------------------------------------------------------------------------------------ what comes out
+
+    @property
+    def late(self) -> int:
+        """Frames so far whose picture was not drawn in time."""
+        return self._line.late
+
+    @property
+    def look_ahead_s(self) -> float:
+        """Seconds of pushed sound behind a frame that are needed to make it; a text needs none."""
+        return self._lips(FEATURE_RATE).look_ahead_s
+
+    def read(self, timeout: float | None = None) -> Frame | None:
+        """The next frame, for a reader with a clock of its own: each call is one tick.
+
+        Parameters
+        ----------
+        timeout
+            Seconds to wait for it, after which idle motion fills a gap of an utterance that is not made in time; None:
+            until there is one, or the stream is closed.
+
+        Returns
+        -------
+        The frame; None if there is none in time, where no number is used, or if the stream is closed.
+
+        Raises
+        ------
+        InputError, DataError, BackendError
+            A text or a sound could not be spoken; the rest of what waits follows.
+        """
+        until = None if timeout is None else time.monotonic() + timeout
+        with self._lock:
+            while not self._is_closed:
+                self._raise_errors()
+                left = None if until is None else until - time.monotonic()
+                is_late = left is not None and left <= 0.0
+                frame = self._line.take(fills_gaps=is_late) if self._can_draw else None
+                if frame is not None:
+                    self._changed.notify_all()
+                if frame is not None or is_late:
+                    return frame
+                self._changed.wait(left)
+            return None
+
+    def frames(self, *, paced: bool = True) -> Iterator[Frame]:
+        """Frames until the stream is closed; errors as of `read`.
+
+        Parameters
+        ----------
+        paced
+            One a tick of a steady clock: frame n of a reader is due ``n / fps`` seconds after its first one, and where
+            no motion is made in time, the last pose stands. Otherwise as soon as each is made.
+        """
+        clock = _Clock(self.fps)
+        while (frame := self.read(None if clock.is_new or not paced else 0.0) or self._held()) is not None:
+            yield frame
+            if paced:
+                time.sleep(clock.wait_s())
+
+    async def __aiter__(self) -> AsyncIterator[Frame]:
+        """Frames on a steady clock, as `frames`; the event loop goes on meanwhile."""
+        clock = _Clock(self.fps)
+        while not self._is_closed:
+            frame = self.read(0.0) or (None if clock.is_new else self._held())
+            if frame is not None:
+                yield frame
+            await asyncio.sleep(FIRST_WAIT_S if frame is None else clock.wait_s())
+
+    def _held(self) -> Frame | None:
+        with self._lock:
+            return None if self._is_closed else self._line.hold()
+
+    def _raise_errors(self) -> None:
+        if self._failure is not None:
+            raise self._failure
+        if self._errors:
+            raise self._errors.popleft()
+
+    def close(self) -> None:
+        """End the stream and its threads; what waits is forgotten."""
+        with self._lock:
+            self._is_closed = True
+            self._changed.notify_all()
+        self._at_exit()
+
+    def __enter__(self) -> "FaceStream":
+        """Return the stream itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the stream."""
+        self.close()
+
+    async def __aenter__(self) -> "FaceStream":
+        """Return the stream itself."""
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the stream in a thread."""
+        await asyncio.to_thread(self.close)
+
+    # ------------------------------------------------------------------------------------------------ threads
+
+    def _guarded(self, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except BaseException as error:  # noqa: BLE001 - whoever reads gets it
+            with self._lock:
+                self._failure = error
+                self._changed.notify_all()
+
+    def _make(self) -> None:
+        """Make motion and sound until the stream is closed."""
+        face = self._face
+        while not self._is_closed:
+            with self._lock:
+                self._changed.wait_for(self._has_work)
+                messages, self._inbox = self._inbox, deque()
+                is_speaking = self._line.is_speaking
+            for number, follow in messages:
+                with self._reported():
+                    if not self._is_forgotten(number):
+                        follow()
+            if face.has_speech and not is_speaking:
+                face.rest()
+            with self._reported():
+                self._make_more()
+            with self._lock:
+                if len(face.idle.motion) and self._line.idle is not face.idle:
+                    self._line.idle = face.idle
+                    self._line.fill()
+                self._changed.notify_all()
+
+    def _make_more(self) -> None:
+        """Make the next sentence, some silence, or more of the idle motion."""
+        face = self._face
+        if face.has_speech:
+            self._put(face.speak())
+        elif face.is_moved and not self._line.has_blocks:
+            self._put(face.silence())
+        elif not face.idle.has(self._n_idle) and not face.idle.motion.grow():
+            time.sleep(SHARED_WAIT_S)
+
+    def _has_work(self) -> bool:
+        face = self._face
+        is_silent = face.is_moved and not self._line.has_blocks
+        return self._is_closed or bool(self._inbox) or face.has_speech or is_silent or not self._has_idle()
+
+    def _has_idle(self) -> bool:
+        return self._line.idle is self._face.idle and self._face.idle.has(self._n_idle)
+
+    def _reported(self) -> "_Reported":
+        return _Reported(self._report)
+
+    def _report(self, error: Tts2faceError) -> None:
+        with self._lock:
+            self._errors.append(error)
+            self._changed.notify_all()
+
+    def _put(self, items: Iterator[Item]) -> None:
+        """Put what is made in line, each when there is room for it; ends with an utterance that is forgotten."""
+        for item in items:
+            with self._lock:
+                number = getattr(item, "utterance", 0)
+                self._changed.wait_for(lambda: self._line.seconds_waiting < READY_S or self._has_ended(number))  # noqa: B023
+                if self._has_ended(number):
+                    return
+                self._line.add(item)
+                self._changed.notify_all()
+
+    def _has_ended(self, number: int) -> bool:
+        return self._is_closed or self._is_forgotten(number)
+
+    def _draw(self, load: Callable[[], FrameRenderer]) -> None:
+        """Draw frames of the line until the stream is closed."""
+        renderer = load()
+        silence = Speech.without_phones(Waveform(np.zeros(1, np.float32), 1_000_000))
+        rest = np.zeros((1, len(self.channels)), np.float32)
+        # kernels compile with the first picture
+        renderer.frame(Clip(Trajectory(self.channels, rest, self.fps), resting_head(1, self.fps), silence), 0)
+        with self._lock:
+            self._can_draw = True
+            self._changed.notify_all()
+        while (place := self._next_place()) is not None:
+            began = time.monotonic()
+            head = Trajectory(HEAD_CHANNELS, place.head[None], self.fps)
+            clip = Clip(Trajectory(self.channels, place.weights[None], self.fps), head, silence)
+            (pixels,) = renderer.frames(clip, threads=1, first=place.number)
+            with self._lock:
+                self._line.drawn(place, pixels, time.monotonic() - began)
+
+    def _next_place(self) -> Place | None:
+        """The next frame to draw; None when the stream is closed."""
+        with self._lock:
+            place = None
+            while not self._is_closed and (place := self._line.next_to_draw()) is None:
+                self._changed.wait()
+            return None if self._is_closed else place
+
+
+class _Reported(suppress):
+    """Suppresses errors of the product and reports them."""
+
+    def __init__(self, report: Callable[[Tts2faceError], None]) -> None:
+        super().__init__(Tts2faceError)
+        self._report = report
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> bool:
+        if isinstance(error, Tts2faceError):
+            self._report(error)
+        return super().__exit__(kind, error, trace)
+
+
+class _Clock:
+    """Instants at which the frames of one reader are due."""
+
+    def __init__(self, fps: float) -> None:
+        self._fps, self._n_frames = fps, 0
+        self._began = 0.0
+
+    @property
+    def is_new(self) -> bool:
+        """Whether no frame has been read."""
+        return self._n_frames == 0
+
+    def wait_s(self) -> float:
+        """Seconds from now until the frame after the present one is due."""
+        now = time.monotonic()
+        if self.is_new:
+            self._began = now
+        self._n_frames += 1
+        wait = self._began + self._n_frames / self._fps - now
+        if wait < -MAX_LAG_S:
+            self._began -= wait
+        return max(wait, 0.0)
+
+
+def _checked(samples: NDArray[np.floating]) -> NDArray[np.float32]:
+    found = np.array(samples, np.float32)  # a copy: the caller may write to its block again
+    if found.ndim != 1 or not np.isfinite(found).all():
+        raise InputError(f"a block of sound must be a vector of finite samples; its shape is {found.shape}")
+    return found
+
+
+def _join(threads: list[threading.Thread]) -> None:
+    for thread in threads:
+        if thread is not threading.current_thread():
+            thread.join()
