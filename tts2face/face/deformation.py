@@ -11,13 +11,14 @@ from tts2face.face.eyeballs import EyeballClearance, build_clearance
 from tts2face.models.face import Face
 from tts2face.models.landmarks import CHIN
 from tts2face.numeric.arrays import smoothstep
-from tts2face.numeric.kernels import kernel
+from tts2face.numeric.kernels import flat_view, kernel
 from tts2face.types import HEAD_CHANNELS
 
 REST_HEAD = np.zeros(len(HEAD_CHANNELS), np.float32)  # head pose at rest
 CHIN_MARGIN_MM = 8.0  # height below the chin that still moves rigidly with the head
 MIN_NECK_MM = 20.0  # meshes with a shorter neck move rigidly as a whole
 IDENTITY = np.eye(3)
+GAP = 16  # vertices between two that a shape moves, up to which all are added: a jump costs as much
 N_KEPT = 64  # poses whose transforms are kept: a frame takes the same ones several times
 
 
@@ -29,8 +30,10 @@ class FaceRig:
     ----------
     rest : (V, 3)
         The face at rest, mm.
-    starts, indices, deltas : (K + 1,), (N,), (N, 3)
-        Shape k moves vertex ``indices[i]`` by ``deltas[i]`` mm per weight, i in [starts[k], starts[k + 1]).
+    starts, runs, deltas : (K + 1,), (R, 3), (3 N,)
+        Shape k moves vertices in the runs [starts[k], starts[k + 1]). A run is the place of its first coordinate among
+        those of all vertices (3 V,), the end of these, and the place of its first delta, mm per weight; vertices that
+        the shape does not move lie between some that it does.
     eye_spans, eye_centres, eye_turns : (E, 2), (E, 3), (E, K, 3)
         First vertex and one past the last, centre in mm, rotation vector per weight in radians of each eyeball.
     pivot : (3,)
@@ -43,7 +46,7 @@ class FaceRig:
 
     rest: NDArray[np.float32]
     starts: NDArray[np.int64]
-    indices: NDArray[np.int32]
+    runs: NDArray[np.int64]
     deltas: NDArray[np.float32]
     eye_spans: NDArray[np.int64]
     eye_centres: NDArray[np.float32]
@@ -62,7 +65,7 @@ class FaceRig:
         """Vertices (V, 3), mm, for shape weights (K,), of a head that has not moved."""
         vertices = np.zeros_like(self.rest)
         weights = np.array(weights, np.float32)  # a copy that can be written: kernels are compiled for one kind
-        _apply_shapes(self.rest, self.starts, self.indices, self.deltas, weights, vertices)
+        _apply_shapes(self.rest, (self.starts, self.runs, self.deltas), weights, vertices)
         if not len(self.eye_spans):
             return vertices
         eyes = eye_rotations(self.eye_turns, weights)
@@ -83,20 +86,26 @@ class FaceRig:
 
 
 def build_rig(face: Face) -> FaceRig:
-    """Rig of a face; shapes keep only the vertices that they move."""
-    moves = [(shape[:, 0] != 0) | (shape[:, 1] != 0) | (shape[:, 2] != 0) for shape in face.shapes]
-    moved_vertices = [np.flatnonzero(moved).astype(np.int32) for moved in moves]
-    starts = np.concatenate([[0], np.cumsum([len(indices) for indices in moved_vertices])]).astype(np.int64)
-    deltas = [shape[indices] for shape, indices in zip(face.shapes, moved_vertices, strict=True)]
+    """Rig of a face; shapes keep only the vertices that they move, and short gaps between these."""
+    spans = [_runs(shape) for shape in face.shapes]
+    lengths = np.concatenate([np.zeros(0, np.int64), *(ends - firsts for firsts, ends in spans)])
+    runs = np.zeros((len(lengths), 3), np.int64)
+    runs[:, :2] = 3 * np.concatenate([np.zeros((0, 2), np.int64), *(np.column_stack(span) for span in spans)])
+    runs[1:, 2] = 3 * np.cumsum(lengths)[:-1]
+    deltas = [
+        shape[first:end].ravel()
+        for shape, span in zip(face.shapes, spans, strict=True)
+        for first, end in zip(*span, strict=True)
+    ]
     turns = np.zeros((len(face.eyes), len(face.shape_names), 3), np.float32)
     for number, eye in enumerate(face.eyes):
         for name, turn in eye.turns.items():
             turns[number, face.shape_names.index(name)] = turn
     return FaceRig(
         rest=np.array(face.vertices, np.float32),
-        starts=starts,
-        indices=np.concatenate([np.zeros(0, np.int32), *moved_vertices]),
-        deltas=np.concatenate([np.zeros((0, 3), np.float32), *deltas]).astype(np.float32),
+        starts=np.cumsum([0, *(len(firsts) for firsts, _ in spans)]),
+        runs=runs,
+        deltas=np.concatenate([np.zeros(0, np.float32), *deltas]).astype(np.float32),
         eye_spans=np.array([(eye.first, eye.first + eye.count) for eye in face.eyes], np.int64).reshape(-1, 2),
         eye_centres=np.array([eye.centre for eye in face.eyes], np.float32).reshape(-1, 3),
         eye_turns=turns,
@@ -104,6 +113,13 @@ def build_rig(face: Face) -> FaceRig:
         follow=head_share(face),
         clearance=build_clearance(face),
     )
+
+
+def _runs(shape: NDArray[np.floating]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First vertices and ends of the runs of vertices that a shape (V, 3) moves, with gaps of less than `GAP`."""
+    moved = np.flatnonzero((shape[:, 0] != 0) | (shape[:, 1] != 0) | (shape[:, 2] != 0))
+    breaks = np.flatnonzero(moved[1:] - moved[:-1] > GAP)
+    return np.concatenate([moved[:1], moved[breaks + 1]]), np.concatenate([moved[breaks], moved[-1:]]) + 1
 
 
 def head_share(face: Face) -> NDArray[np.float32]:
@@ -170,18 +186,20 @@ def _rotation(kind: str, *turn: float) -> NDArray[np.float64]:
 
 
 @kernel
-def _apply_shapes(rest, starts, indices, deltas, weights, vertices):  # type: ignore[no-untyped-def]
-    for v in range(len(rest)):
-        vertices[v, 0], vertices[v, 1], vertices[v, 2] = rest[v, 0], rest[v, 1], rest[v, 2]
+def _apply_shapes(rest, shapes, weights, vertices):  # type: ignore[no-untyped-def]
+    starts, runs, deltas = shapes
+    line = flat_view(vertices)
+    still = flat_view(rest)
+    for i in range(len(line)):
+        line[i] = still[i]
     for k in range(len(weights)):
         weight = weights[k]
         if weight == 0:
             continue
-        for i in range(starts[k], starts[k + 1]):
-            v = indices[i]
-            vertices[v, 0] += weight * deltas[i, 0]
-            vertices[v, 1] += weight * deltas[i, 1]
-            vertices[v, 2] += weight * deltas[i, 2]
+        for r in range(starts[k], starts[k + 1]):
+            first, count, own = np.uint64(runs[r, 0]), np.uint64(runs[r, 1] - runs[r, 0]), np.uint64(runs[r, 2])
+            for i in range(count):
+                line[first + i] += weight * deltas[own + i]
 
 
 @kernel

@@ -1,7 +1,6 @@
 """Surface of a face in the arrays that the kernels take: triangles, colours and materials."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -125,9 +124,11 @@ def triangles_by_vertex(
 def weld_groups(face: Face, rig: FaceRig, kind: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
     """(V,) group of each vertex with those at its place that move alike, and are of the same kind (V,)."""
     mixed = np.zeros((len(face.vertices), 3))
-    for number, (first, end) in enumerate(pairwise(rig.starts.tolist()), start=1):
-        weight = np.cos(number)  # arbitrary fixed weights that separate vertices with different motion
-        mixed[rig.indices[first:end]] += weight * rig.deltas[first:end]
+    line = mixed.reshape(-1)
+    # arbitrary fixed weights that separate vertices with different motion
+    weights = np.repeat(np.cos(np.arange(1, len(rig.starts))), rig.starts[1:] - rig.starts[:-1])
+    for weight, (first, end, own) in zip(weights.tolist(), rig.runs.tolist(), strict=True):
+        line[first:end] += weight * rig.deltas[own : own + end - first]
     alike = np.zeros(len(mixed)) if kind is None else kind
     key = np.column_stack([face.vertices, mixed, alike])
     # micrometres: vertices of a seam differ by rounding
