@@ -81,7 +81,7 @@ STREAMED_WEBM = MovieKind(
 
 # For servers of live streams: no picture waits for a later one, and a decoder can begin at each key picture.
 LIVE_H264: Mapping[str, str] = MappingProxyType({
-    "profile": "baseline", "preset": "veryfast", "tune": "zerolatency", "bf": "0",
+    "profile": "baseline", "preset": "superfast", "tune": "zerolatency", "bf": "0",
     "x264-params": "repeat-headers=1:cpu-independent=1",
 })  # fmt: skip
 
