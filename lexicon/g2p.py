@@ -16,6 +16,8 @@ from lexicon.ipa import IpaPhone, parse_ipa
 DEFAULT_LANGUAGE = "en-us"
 MAX_DATA_PATH = 150  # characters; espeak-ng cuts longer paths off (its buffer holds 160)
 _LOCK = threading.RLock()
+# No voice speaks a hyphen behind a mark; espeak-ng 1.52 may read beyond its text at one.
+_HYPHEN_BEHIND_MARK = re.compile(r"(?<=[^\w\s])-(?=[^\W\d])")
 _LANGUAGE_SWITCH = re.compile(r"\([a-z0-9-]+\)")  # espeak-ng marks foreign words: (en)...(fr); their phones are kept
 # The output of espeak-ng in tone languages is partly not IPA: tones as digits and as ɜ (a "3"), retroflexes with a dot.
 # The vowel of English words among them is long: ɜː.
@@ -117,7 +119,8 @@ def phonemize(lines: Sequence[str], language: str) -> tuple[tuple[str, ...], ...
         return ()
     with _LOCK:
         reader = _espeak_reader(language)
-        spoken = [reader.text_to_phonemes(line) if line.strip() else "" for line in lines]
+        texts = [_HYPHEN_BEHIND_MARK.sub(" ", line) for line in lines]
+        spoken = [reader.text_to_phonemes(text) if text.strip() else "" for text in texts]
     parts = ([part.strip("_") for part in _LANGUAGE_SWITCH.sub("", line).split()] for line in spoken)
     return tuple(tuple(part for part in line if part) for line in parts)
 

@@ -88,7 +88,7 @@ def day_words(place: Place, day: int) -> str:
     """Words of a day of a month."""
     locale = place.locale
     if place.match.groupdict().get("ending") and locale.setting("marked_day"):  # 25η Μαρτίου
-        return ordinal(locale, day, Grammar(locale.setting("day_gender")))
+        return ordinal(locale, day, Grammar(locale.setting("day_gender"), place.grammar("ordinal").case))
     if day == 1 and locale.setting("first_day"):
         return locale.setting("first_day")
     gender = locale.setting("day_gender")

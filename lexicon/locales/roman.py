@@ -86,6 +86,19 @@ def _by_word(place: Place, value: int, word: str) -> str:
     return ordinal(locale, value, Grammar(row.details.get("gender") or gender_of(locale, word.lstrip("+")), case))
 
 
+def read_letter_number(place: Place) -> str | None:
+    """Ordinal in the letters of a language and their sign: Γεώργιος Α΄, τον ΙΘ΄ αιώνα; None for other letters."""
+    locale, rows = place.locale, place.locale.rows("letter_value")
+    written = (place.match["letters"] or place.match["short"]).replace("ΣΤ", "Ϛ")  # the one number of two letters
+    if not rows.keys() >= set(written):
+        return None
+    value = sum(int(rows[letter].spoken) for letter in written)
+    if place.before in locale.rows("ruler"):
+        return _ruler(place, value)
+    grammar = place.grammar("ordinal")
+    return ordinal(locale, value, Grammar(grammar.gender or gender_of(locale, place.after), grammar.case))
+
+
 def _ruler(place: Place, value: int) -> str:
     """Number of a ruler: quatorze, segundo, der vierzehnte."""
     locale = place.locale

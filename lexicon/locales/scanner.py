@@ -22,6 +22,8 @@ WORD = rf"(?:[{_LATIN}]+|(?:(?![{_LATIN}]){LETTER}|[{_VOWEL_SIGNS}])+)"
 PLACE = re.compile(rf"(?P<number>[0-9\u00bc-\u00be\u2150-\u215e])|(?P<word>{WORD})|[^\w\s]|\S")
 _LEADING_LETTERS = re.compile(rf"{WORD}?")
 _INITIALISM = r"(?P<letters>[A-ZÄÖÜÀ-ÞĄ-ŽА-ЯЁ]{2,8})(?P<ending>s)?(?!{letter})"
+# Letters with the sign of numbers; an apostrophe may also be that of a word that lost its vowel (Σ' αγαπώ).
+_LETTER_NUMBER = r"(?:(?P<letters>[Α-Ω]{1,3})(?=[΄ʹ′´])|(?P<short>ΣΤ|[ΙΚ]?[Α-Η]|[ΙΚ]Θ|Ι)(?='))(?:[΄ʹ′´']|(?!))(?!\w)"
 _LABEL = r"[A-Za-z0-9][A-Za-z0-9-]{0,62}"
 _TLD = (
     r"(?:com|org|net|edu|gov|io|ai|app|dev|info|eu|de|fr|es|it|pt|br|nl|be|pl|ru|tr|gr|at|ch|uk|us|mx|cn|jp|kr|in|vn)"
@@ -221,6 +223,8 @@ def scanner(locale: Locale) -> Scanner:
     if locale.setting("roman_stop"):  # XIV. is an ordinal
         stop = rf"(?P<roman>[IVXLCDM]{{1,15}})\.(?=,| {LETTER})"
         numerals = [Form(stop, roman.read_roman_with_stop), *numerals]
+    if locale.rows("letter_value"):
+        numerals = [Form(_LETTER_NUMBER, roman.read_letter_number), *numerals]
     endings = locale.rows("ending")
     ending = Form(rf"(?P<stem>{LETTER}{{2,40}}?)(?P<ending>{_any_of(endings) or '(?!)'})", words.read_ending)
     return Scanner(numbers, _forms_by_word(locale), _forms_by_sign(locale), address, tuple(numerals), ending)

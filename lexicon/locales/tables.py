@@ -31,6 +31,7 @@ sign         sign that is spoken, by its words
 fraction     words of a fraction
 word         word of another language, as the language says it (those of `loan_words.tsv`, too)
 letter       name of a letter
+letter_value number of a letter that is a digit (Greek ΙΘ΄)
 initialism   capitals that are read letter by letter (``letters``), or their words
 form         written form with a pattern and a template of its own (`lexicon.locales.templates`)
 kana         Chinese characters of numbers in kana, for Japanese without its reader

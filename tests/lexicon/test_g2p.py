@@ -82,6 +82,11 @@ def test_empty_lines_keep_their_place() -> None:
     assert (len(first), empty, len(last)) == (1, (), 1)
 
 
+@pytest.mark.parametrize("mark", [",", ".", "("])
+def test_a_hyphen_behind_a_mark_is_not_spoken(mark: str) -> None:
+    assert phonemize([f"{mark}-Haus"], "de") == phonemize(["Haus"], "de")
+
+
 def test_there_are_many_languages() -> None:
     assert len(languages()) > 120
     assert languages()["de"] == "German"
