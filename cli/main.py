@@ -81,6 +81,7 @@ app.command(render)
 app.command("cli.batch:batch")
 app.command("cli.jobs:worker")
 app.command("cli.jobs:jobs")
+app.command("cli.live:live")
 app.command("cli.serve:serve")
 app.command("cli.serve:keys")
 app.command("cli.corpus:corpus")
@@ -291,9 +292,9 @@ def main() -> None:
     INTERRUPTION.install()
     makes_clip = bool(sys.argv[1:2]) and sys.argv[1] not in {*app}  # a text or an option, which `speak` gets
     return_large_blocks(FIRST_BYTES if makes_clip else LARGE_BYTES)
-    if makes_clip or sys.argv[1:2] in MAKE_CLIPS:
+    if makes_clip or sys.argv[1:2] in (*MAKE_CLIPS, ["live"]):
         use_one_thread_of_blas()
-    if makes_clip or sys.argv[1:2] == ["serve"]:  # both resume it
+    if makes_clip or sys.argv[1:2] in (["live"], ["serve"]):  # all resume it
         pause_collection()
     code = run(sys.argv[1:])
     if INTERRUPTION.number:
