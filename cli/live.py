@@ -67,7 +67,7 @@ def live(  # noqa: PLR0913 - one parameter a flag
     **options: Any,
 ) -> None:
     """Send a face that speaks live to other programs (docs/live.md)."""
-    from tts2face.targets.broadcast import Broadcast, LivePlan
+    from tts2face.targets.broadcast import Broadcast, Listener, LivePlan
 
     addresses = parse_targets(to or ())
     if not addresses:
@@ -85,7 +85,7 @@ def live(  # noqa: PLR0913 - one parameter a flag
         check_photo(photo, {}, {})
         face = face_of_photo(photo, consent, quiet=quiet)
     models = Models(talker, face or "", identity, palette, hair, hair_color, person)
-    broadcast = Broadcast(plan, targets, lambda state: _show(state.sentence, quiet), _warn)
+    broadcast = Broadcast(plan, targets, Listener(lambda state: _show(state.sentence, quiet), _warn))
     with compilation_messages(quiet):
         session = open_session(models, draws=any(target.draws for target in targets))
     resume_collection()

@@ -46,7 +46,7 @@ def add(  # noqa: PLR0913 - one parameter a flag
     /,
     *,
     file: Annotated[Path, Parameter(help="File of keys (TOML); created if needed.")],
-    scope: Annotated[list[str] | None, Parameter(help="speak, build, admin; several possible.")] = None,
+    scope: Annotated[list[str] | None, Parameter(help="speak, live, build, admin; several possible.")] = None,
     requests_per_minute: Annotated[int | None, whole_number("Requests a minute.")] = None,
     concurrent: Annotated[int | None, whole_number("Requests at the same time.")] = None,
     resources: Annotated[int | None, whole_number("Uploads that it may have.")] = None,

@@ -18,7 +18,7 @@ from tests.targets.test_live_targets import MadeTarget
 from tts2face.picture.options import Picture
 from tts2face.targets import broadcast as broadcast_module
 from tts2face.targets import live_targets
-from tts2face.targets.broadcast import Broadcast, LivePlan
+from tts2face.targets.broadcast import Broadcast, Listener, LivePlan
 from tts2face.targets.feeds import AHEAD_S, growing_feed, microphone_feed, recording_feed, text_feed
 from tts2face.targets.table import parse_target
 
@@ -105,7 +105,7 @@ def made(*targets: MadeTarget, stays: bool = False) -> tuple[Broadcast, MadeSess
     addresses = tuple(parse_target(f"vmc:a{n}") for n in range(len(targets)))
     plan = LivePlan(addresses, Picture(), {"style": "happy"}, FPS, stays=stays)
     states, errors = States(), list[Tts2faceError]()
-    return Broadcast(plan, targets, states, errors.append), MadeSession(), states, errors
+    return Broadcast(plan, targets, Listener(states, errors.append)), MadeSession(), states, errors
 
 
 def test_it_ends_after_what_it_says() -> None:

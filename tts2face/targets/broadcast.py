@@ -66,6 +66,15 @@ class LivePlan:
         return tuple(make_target(address, self.format) for address in self.addresses)
 
 
+@dataclass(frozen=True, slots=True)
+class Listener:
+    """Called with each state of a target, what cannot be said, and an utterance whose last frame was sent."""
+
+    on_state: Callable[[TargetState], object]
+    on_error: Callable[[Tts2faceError], object]
+    on_end: Callable[[int], object] = int
+
+
 class Broadcast:
     """One live face and its targets, until it ends by itself or by `end`.
 
@@ -73,27 +82,24 @@ class Broadcast:
     ----------
     targets
         Of `LivePlan.make_targets`.
-    on_state, on_error
-        Called with each state of a target, and with what could not be said.
+    listener
+        Called from the threads of the broadcast.
 
     Attributes
     ----------
-    n_frames, n_late
-        Frames that were sent, and how many of them without a picture of their own.
+    n_frames, n_spoken, n_late
+        Frames that were sent, how many of them in speech, and how many without a picture of their own.
     """
 
-    def __init__(
-        self, plan: LivePlan, targets: Sequence[Target], on_state: Callable[[TargetState], object],
-        on_error: Callable[[Tts2faceError], object],
-    ) -> None:  # fmt: skip
+    def __init__(self, plan: LivePlan, targets: Sequence[Target], listener: Listener) -> None:
         self._plan, self._targets = plan, tuple(targets)
-        self._on_state, self._on_error = on_state, on_error
+        self._listener = listener
         self._changed, self._has_ended = threading.Condition(), threading.Event()
         self._reached: dict[str, bool] = {}  # by target, whether it is there; none while it is tried for the first time
         self._last: int | None = None  # utterance, when all has been given
         self._n_ended = 0  # the newest utterance that has ended
         self._error: Tts2faceError | None = None
-        self.n_frames = self.n_late = 0
+        self.n_frames = self.n_spoken = self.n_late = 0
 
     def end(self) -> None:
         """End soon; from any thread."""
@@ -148,11 +154,14 @@ class Broadcast:
                     live.send(maker.make(frame))
                     self.n_frames += 1
                     n_silent = 0 if frame.utterance else n_silent + 1
-                    self._n_ended = frame.utterance if frame.ends else self._n_ended
+                    self.n_spoken += bool(frame.utterance)
+                    if frame.ends:
+                        self._n_ended = frame.utterance
+                        self._listener.on_end(frame.utterance)
                     if self._has_ended.is_set() or self._is_over(n_silent / self._plan.fps):
                         return
             except Tts2faceError as error:  # of a text; the clock goes on behind it
-                self._on_error(error)
+                self._listener.on_error(error)
 
     def _is_over(self, silent_s: float) -> bool:
         """Whether all has been said, some silence ago."""
@@ -190,4 +199,4 @@ class Broadcast:
             if state.state in {CONNECTED, LOST}:
                 self._reached[state.target] = state.state == CONNECTED
             self._changed.notify_all()
-        self._on_state(state)
+        self._listener.on_state(state)

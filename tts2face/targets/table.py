@@ -1,15 +1,19 @@
 """Kinds of targets: what each is named, shows and takes."""
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 from urllib.parse import urlunsplit
 
 from lexicon.errors import InputError
 from tts2face.targets.address import Address, parse_options, split_place
-from tts2face.targets.target import Target
-from tts2face.targets.tick import LiveFormat
+
+if TYPE_CHECKING:  # `--help` and settings need no numeric library
+    from tts2face.targets.target import Target
+    from tts2face.targets.tick import LiveFormat
 
 KBPS_LIMITS = (50, 100_000)  # thousands of bits in a second
 # options of several kinds
@@ -17,6 +21,7 @@ _MOVIE = {"kbps": True}
 _TOKEN = {"token": True}
 _KEYED = _MOVIE | {"key": True}
 _ENCRYPTED = "the same, encrypted"
+_NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,39}")
 Parse = Callable[["TargetKind", str], Address]
 
 
@@ -46,7 +51,7 @@ class TargetKind:
     port: int = 0
     options: Mapping[str, bool] = field(default_factory=dict)
 
-    def load(self) -> type[Target]:
+    def load(self) -> "type[Target]":
         """The class of the kind."""
         module, _, name = self.target.partition(":")
         found: type[Target] = getattr(import_module(f"tts2face.targets.{module}"), name)
@@ -130,7 +135,28 @@ def parse_targets(texts: Sequence[str]) -> tuple[Address, ...]:
     return found
 
 
-def make_target(address: Address, format: LiveFormat) -> Target:
+def named_targets(written: Sequence[str]) -> Mapping[str, str]:
+    """Targets by the names that an operator gives them, of pairs ``NAME=TARGET``.
+
+    Raises
+    ------
+    InputError
+        A pair has another form, a name stands there twice, or a target is wrong, or a window.
+    """
+    found: dict[str, str] = {}
+    for pair in written:
+        name, _, target = pair.partition("=")
+        if not _NAME.fullmatch(name) or not target or name in found:
+            raise InputError(
+                f"live targets are written as stage=rtmp://HOST/APP/KEY, each name once, not {name[:40]!r}"
+            )
+        if not parse_target(target).host:
+            raise InputError(f"the live target {name} must be a place that a server reaches, not a window")
+        found[name] = target
+    return MappingProxyType(found)
+
+
+def make_target(address: Address, format: "LiveFormat") -> "Target":
     """The target of an address.
 
     Raises

@@ -20,7 +20,7 @@ OPTIONS = {one.name for record in RECORDS for one in option_fields(record)}
 DOORS: list[tuple[type[BaseModel], Mapping[str, str], set[str]]] = [
     (ClipRequest, NOT_IN_CLIPS, {"format"}),
     (SubtitlesRequest, NOT_IN_SUBTITLES, {*BATCH_FIELDS, "cast"}),
-    (TextOptions, NOT_IN_LIVE_TEXT, {"type", "input", "with_idle"}),
+    (TextOptions, NOT_IN_LIVE_TEXT, {"type", "input", "with_idle", "targets"}),
 ]  # fmt: skip
 # Fields of protocols of others, and the options that they are.
 SAME: list[tuple[type[BaseModel], Mapping[str, str]]] = [

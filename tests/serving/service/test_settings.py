@@ -122,7 +122,7 @@ def test_wrong_keys_are_refused(tmp_path: Path) -> None:
     add_key(path, "a", ["speak"])
     with pytest.raises(InputError, match="has a key named a already"):
         add_key(path, "a", ["speak"])
-    with pytest.raises(InputError, match="no scope 'fly'; the scopes are speak, build, admin"):
+    with pytest.raises(InputError, match="no scope 'fly'; the scopes are speak, live, build, admin"):
         add_key(path, "b", ["fly"])
     with pytest.raises(InputError, match="no file of keys"):
         read_keys(tmp_path / "none.toml")

@@ -15,7 +15,8 @@ from lexicon.values.records import checked
 from lexicon.values.toml_text import parse_toml
 from tts2face.storage.files import write_atomically
 
-SCOPES = ("speak", "build", "admin")  # synthesis; uploads and talkers; everybody's jobs and metrics
+# synthesis; live targets of the operator; uploads and talkers; everybody's jobs and metrics
+SCOPES = ("speak", "live", "build", "admin")
 KEY_PREFIX = "t2f_"
 # 256 random bits: a plain hash of them cannot be guessed, and needs no salt
 N_KEY_BYTES = 32

@@ -216,7 +216,7 @@ class Pool:
                 place = await self._take(cost, key, work.affinity)
             is_begun = False
             call = work_call(work, priority, key)
-            given = None if inputs is None else _items(inputs)
+            given = None if inputs is None else each_input(inputs)
             messages = place.process.stream(call, given, lambda is_paused, of=place: self._pause(of, is_paused))
             try:
                 with stage("synthesis"):
@@ -338,6 +338,7 @@ def has_less_than_share(processes: Sequence[Places], cost: float, key: str, wait
     return holders.count(key) < max(1, len(processes) * PLACES[cost] // n_keys)
 
 
-async def _items(inputs: InputQueue) -> AsyncIterator[InputItem]:
+async def each_input(inputs: InputQueue) -> AsyncIterator[InputItem]:
+    """Inputs of a stream, without an end."""
     while True:
         yield await inputs.get()

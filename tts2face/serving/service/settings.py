@@ -17,6 +17,7 @@ from lexicon.values.records import checked
 from lexicon.values.toml_text import parse_toml
 from tts2face.sound.voice_urls import parse_named_urls
 from tts2face.storage.user_folders import user_data
+from tts2face.targets.table import named_targets, parse_target
 
 PREFIX = "TTS2FACE_SERVE_"  # of environment variables: TTS2FACE_SERVE_PORT
 SECRET_PREFIX = "whsec_"  # of secrets of webhooks in base64 (Standard Webhooks)
@@ -63,6 +64,10 @@ class ServiceSettings:
     voices: tuple[str, ...] = setting(
         (),
         "Voices of other servers, which get the texts, by names for clients: kokoro=http://127.0.0.1:8000/v1#af_heart.",
+    )
+    live_targets: tuple[str, ...] = setting(
+        (),
+        "Targets of live streams, by names for clients with a key of scope live: stage=rtmp://HOST/APP#key=FILE.",
     )
     data: Path | None = setting(None, "Folder of jobs, results and uploads; by default one of the user's.")
     database: str = setting("", "SQLite file or postgresql://...; empty: service.sqlite in the data folder.")
@@ -156,6 +161,7 @@ class ServiceSettings:
             if not _PLACE.fullmatch(host):
                 raise InputError(f"webhook_hosts must be such as example.org or a.example:8080, not {host[:80]!r}")
         parse_named_urls(" ".join(self.voices))
+        named_targets(self.live_targets)
         for origin in self.origins:
             if not _ORIGIN.fullmatch(origin):
                 raise InputError(
@@ -192,6 +198,9 @@ class ServiceSettings:
             if option.name == "database":
                 # a database's address holds its password
                 value = _PASSWORD.sub(r"\1@", value)
+            if option.name == "live_targets":
+                # an address of a target may hold a stream key
+                value = tuple(f"{name}={parse_target(place).shown}" for name, place in named_targets(value).items())
             line = f"{option.name} = {_toml(value)}" if value is not None else f'# {option.name} = ""'
             lines.append(f"# {option.metadata['help']}\n{line}\n")
         return "".join(lines)

@@ -20,6 +20,7 @@ from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.messages import DefectError
 from tts2face.serving.service.metrics import Metrics
 from tts2face.serving.service.pool import Pool, PoolSettings
+from tts2face.serving.service.presentations import Presentations
 from tts2face.serving.service.readiness import Readiness
 from tts2face.serving.service.result_cache import ResultCache
 from tts2face.serving.service.results import Results, warm_steps
@@ -53,6 +54,7 @@ class ServiceState:
         self.jobs.on_defect = self.note_defect
         self.permissions = Permissions(self.keys, self.limits)
         self.results = Results(settings, self.permissions, self.pool, self.metrics, self.cache)
+        self.presentations = Presentations(settings.live_targets, self.permissions)
         self.tracing = tracing_from_environment(os.environ)
         self.is_draining = False
         self.exchanges: set[Exchange] = set()  # requests that are being answered

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError, Tts2faceError
 from lexicon.gesture_marks import parse_gesture
 from lexicon.gesture_names import GESTURES
+from lexicon.marked_text import GestureMark
 from tts2face.picture.frame_renderer import FrameRenderer
 from tts2face.session.live.blocks import Item
 from tts2face.session.live.frames import Frame
@@ -158,14 +159,14 @@ class FaceStream:
         with self._lock:
             self._post(0, lambda: self._face.hear_at(rate, heard))
 
-    def gesture(self, written: str) -> None:
+    def gesture(self, written: str | GestureMark) -> None:
         """Make a gesture, or look somewhere, with the next word that is not made yet, in silence at once.
 
         `written` is as between the brackets of a mark of a text: ``nod``, ``wink left``, ``look left 20 2s``.
         """
-        mark = parse_gesture(written, 0)
+        mark = parse_gesture(written, 0) if isinstance(written, str) else written
         if mark is None:
-            raise InputError(f"there is no gesture {written[:40]!r}; choose {', '.join(GESTURES)}")
+            raise InputError(f"there is no gesture {str(written)[:40]!r}; choose {', '.join(GESTURES)}")
         with self._lock:
             self._post(0, lambda: self._face.gesture(mark))
 

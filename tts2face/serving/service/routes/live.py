@@ -20,7 +20,9 @@ from tts2face.serving.service.clip_options import (
     resolve_models,
 )
 from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.live_text import REFUSED_S, SAMPLE_BYTES, SAMPLE_RATES, LiveText, Pace, parse_message
+from tts2face.serving.service.messages import Work
 from tts2face.serving.service.pool import InputQueue
 from tts2face.serving.service.state import ServiceState
 
@@ -31,6 +33,10 @@ TEXT_TYPES = frozenset({"text", "gesture", "style", "listen", "flush", "cancel",
 AUDIO_TYPES = frozenset({"end"})  # of a stream of sound, besides the sound
 MAX_BLOCK_BYTES = 1 << 16  # of sound in one message
 MAX_BLOCKS = 16  # that wait for the task
+Targets = Annotated[
+    tuple[str, ...],
+    Field(description="Targets of the operator that show the face, by name; curves are not sent then.", max_length=8),
+]
 INVALID = 1007  # WebSocket close code: a message is not what it should be
 
 
@@ -56,6 +62,7 @@ class TextOptions(TextFields):
     type: Literal["start"]
     input: Literal["text"] = "text"
     with_idle: Annotated[bool, Field(description="Curves of a living face between utterances.")] = True
+    targets: Targets = ()
 
 
 class AudioOptions(StrictModel):
@@ -64,6 +71,7 @@ class AudioOptions(StrictModel):
     type: Literal["start"]
     input: Literal["audio"]
     rate: Annotated[int, Field(ge=SAMPLE_RATES[0], le=SAMPLE_RATES[1], description="Sample rate in Hz.")] = 16_000
+    targets: Targets = ()
     talker: str | None = None
     face: str | None = None
     identity: str | None = None
@@ -76,27 +84,20 @@ async def stream(connection: WebSocket) -> None:
     state: ServiceState = connection.app.state.service
     try:
         options = _read_options(await _first_message(connection, state.settings.body_s))
-        given: dict[str, Any] = options.model_dump(exclude_none=True, exclude_defaults=True, exclude={"type", "input"})
-        models = {name: given.pop(name) for name in MODEL_FIELDS if name in given}
-        key = connection.state.key
-        models = await resolve_models(state.library, key, models)
-        given = await resolve_dictionary(state.library, key, given)
-        check_voice(given.get("voice"))
+        work = await _work(state, connection.state.key, options)
+        if options.targets:
+            state.presentations.check(connection.state.key, options.targets)
     except (ValidationError, RefusedError) as wrong:
         await _refuse(connection, _reason(wrong))
         return
     except (WebSocketDisconnect, KeyError):
         return
-    receiver: LiveText | _Sound
-    if isinstance(options, AudioOptions):
-        receiver = _Sound(options.rate)
+    key, receiver = connection.state.key, _receiver(state, connection.state.key, options)
+    if options.targets:
+        messages = state.presentations.messages(work, key, receiver.inputs, options.targets)
     else:
-        limits = state.settings.live_characters, state.settings.live_characters_per_minute
-        language, markup = str(given.get("language", "en-us")), str(given.get("markup", "auto"))
-        receiver = LiveText(language, limits, lambda: state.permissions.count(key), markup)
-    kind = "listen" if isinstance(receiver, _Sound) else "live"
-    work = state.results.work(kind=kind, models=models, request=given)
-    sending = asyncio.create_task(_send(connection, state.results.messages(work, key, receiver.inputs), receiver))
+        messages = state.results.messages(work, key, receiver.inputs)
+    sending = asyncio.create_task(_send(connection, messages, receiver))
     receiving = asyncio.create_task(_receive(connection, receiver))
     try:
         await asyncio.wait({sending, receiving}, return_when=asyncio.FIRST_COMPLETED)
@@ -109,6 +110,28 @@ async def stream(connection: WebSocket) -> None:
         await asyncio.gather(sending, receiving, return_exceptions=True)
         with suppress(RuntimeError):
             await connection.close()
+
+
+async def _work(state: ServiceState, key: ApiKey, options: TextOptions | AudioOptions) -> Work:
+    """The work of a stream, with the files of its key in place of names."""
+    given: dict[str, Any] = options.model_dump(
+        exclude_none=True, exclude_defaults=True, exclude={"type", "input", "targets"}
+    )
+    models = {name: given.pop(name) for name in MODEL_FIELDS if name in given}
+    models = await resolve_models(state.library, key, models)
+    given = await resolve_dictionary(state.library, key, given)
+    check_voice(given.get("voice"))
+    kind = "listen" if isinstance(options, AudioOptions) else "live"
+    return state.results.work(kind=kind, models=models, request=given)
+
+
+def _receiver(state: ServiceState, key: ApiKey, options: TextOptions | AudioOptions) -> "LiveText | _Sound":
+    """Reader of the client's messages."""
+    if isinstance(options, AudioOptions):
+        return _Sound(options.rate)
+    limits = state.settings.live_characters, state.settings.live_characters_per_minute
+    language, markup = getattr(options, "language", "en-us"), getattr(options, "markup", "auto")
+    return LiveText(language, limits, lambda: state.permissions.count(key), markup)
 
 
 async def _first_message(connection: WebSocket, seconds: float) -> str:
