@@ -1,6 +1,7 @@
 """Texts as people and language models write them, read alike at every door, and silence of those without words."""
 
 from collections import deque
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,18 +12,31 @@ from lexicon.growing_text import GrowingText
 from lexicon.marked_text import GestureMark
 from tests.lexicon.marked_rows import rows
 from tests.serving.service.in_process import TableProcess, service_client
-from tests.world import World
+from tests.world import VOICE, World
+from tts2face.interchange.exports.writer import ExportWriter, plan_exports
 from tts2face.interchange.subtitles.options import SubtitleOptions
 from tts2face.interchange.subtitles.reader import read_subtitles
 from tts2face.processes.message import MORE, Message
 from tts2face.request import Request
+from tts2face.serving.batch.options import BatchOptions
+from tts2face.serving.batch.plan import plan_batch
+from tts2face.serving.batch.recorded_segment import excerpt_of
+from tts2face.serving.batch.render import SegmentRenderer, fit_segment
+from tts2face.serving.batch.segment import TRACK
 from tts2face.serving.service.live import LiveTask
 from tts2face.serving.service.messages import Event, Work
 from tts2face.serving.service.settings import ServiceSettings
+from tts2face.session.named_models import Models
 from tts2face.session.prepared import prepare
 from tts2face.types import concatenate_clips
 
 TEXTS = [row["text"] for row in rows()][::4]  # twenty of all kinds
+
+# twenty texts of a line, whose brackets a subtitle file does not have as annotations, and its tags not as its own
+CUES = [
+    row["text"] for row in rows()
+    if not any(sign in row["text"] for sign in ("\n", "<", "&")) and row["kind"] != "literal"
+][:40:2]  # fmt: skip
 
 
 def said(pieces: list) -> list[str]:
@@ -52,6 +66,30 @@ def test_the_command_writes_what_python_does(tones: World, tmp_path: Path) -> No
     flags = ["--export", str(tmp_path / "command.track.json"), "--fps", "5", *tones.flags]
     assert run([text, "--markup", "llm", *flags]) == 0
     assert (tmp_path / "python.track.json").read_bytes() == (tmp_path / "command.track.json").read_bytes()
+
+
+def test_a_batch_renders_what_python_does(tones: World, tmp_path: Path) -> None:
+    content = "".join(
+        f"{number}\n00:{number:02}:00,000 --> 00:{number:02}:50,000\n{text}\n\n" for number, text in enumerate(CUES, 1)
+    )
+    (tmp_path / "a.srt").write_text(content, encoding="utf-8")
+    models = Models(str(tones.talker_file), str(tones.face_file), palette=str(tones.palette_file))
+    request = Request(fps=5, markup="llm", voice=VOICE)
+    options = BatchOptions(format="none", exports=("track.json",))
+    plan = plan_batch([tmp_path / "a.srt"], options, request=request, models=models)
+    session, renderer = tones.session(), SegmentRenderer()
+    segments = [replace(part, medium=TRACK) for output in plan.outputs for part in output.segments]
+    assert len(segments) == len(CUES)
+    for text, segment in zip(CUES, segments, strict=True):
+        result = renderer.render(segment, tmp_path / "segment")
+        own = replace(segment, request={**segment.request, "text": text})
+        with excerpt_of(own, Request(**own.request)) as request:
+            prepared, _ = fit_segment(session, request, own)
+        clips = session.stream_to_length(prepared, result.n_frames)
+        with ExportWriter(plan_exports([tmp_path / "python"], format=TRACK)) as writer:
+            for clip in clips:
+                writer.add(clip)
+        assert (tmp_path / "segment").read_bytes() == (tmp_path / "python").read_bytes(), text
 
 
 def test_the_service_passes_a_text_on_as_it_is(tmp_path: Path) -> None:
