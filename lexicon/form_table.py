@@ -76,13 +76,14 @@ def _abbreviation_pattern() -> str:
     return rf"(?P<abbr>(?:{'|'.join(map(re.escape, written))})(?=\.)|(?:{titles})(?=\. ?[A-Z])|{dotless})\.?"
 
 
-# In the order in which they are tried at each position, by its sign (a: a letter, 0: a digit, .: another); every repeat
-# over letters is bounded or cannot be retried from within itself, so that the scan is linear.
+# In the order in which they are tried at each position, by its sign (a: a letter, 0: a digit, .: another). Forms with #
+# are only in texts with a digit, those with / in texts with a sign of addresses, so that plain sentences do not compile
+# them. Every repeat over letters is bounded or cannot be retried from within itself, so that the scan is linear.
 def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
     """Name of each written form, signs with which it begins, pattern, and reader."""
     unit = _unit_pattern()
     return (
-        ("by", "a", rf"x(?= ?[0-9]{{1,4}}(?:\.[0-9]{{1,2}})? ?['{INCH}])", formulas.read_by),
+        ("by", "a#", rf"x(?= ?[0-9]{{1,4}}(?:\.[0-9]{{1,2}})? ?['{INCH}])", formulas.read_by),
         (
             "quick",
             "a",
@@ -93,10 +94,10 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         ("space", ".", r" +", forms.read_nothing),
         ("mark", ".", r"[.,;:!?—…](?= |$)", forms.read_punctuation),
         ("relation", ".", r"!=|<=|>=|==+|=>|&&", formulas.read_relation),
-        ("scripture", "a0", _scripture_pattern(), contexts.read_scripture),
+        ("scripture", "a0#", _scripture_pattern(), contexts.read_scripture),
         (
             "email",
-            "a0.",
+            "a0./",
             rf"[\w+⎵-](?:[\w.+⎵-]{{0,62}}[\w+-])?@{_LABEL}(?:\.{_LABEL}){{1,5}}(?!\w)",
             codes.read_address,
         ),
@@ -105,19 +106,19 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         ("color", ".", codes.COLOR, codes.read_color),
         ("file", "a0", rf"{_LABEL}\.{codes.FILE_ENDING}(?!\w|\.\w)", codes.read_path),
         ("tag", ".", r"[#@](?=[0-9_]{0,60}[^\W\d_])\w{1,140}", codes.read_hashtag),
-        ("slashed", "a", r"and/or\b|w/o\b|w/(?= )|[nN]/[aA]\b|b/c\b|c/o\b", forms.read_slashed),
-        ("rate", "a", rf"{_START}{_rate_pattern()}", forms.read_rate),
-        ("parting", ".", r"(?<=[A-Z][0-9])/(?=[A-Z][0-9])", forms.read_nothing),
+        ("slashed", "a/", r"and/or\b|w/o\b|w/(?= )|[nN]/[aA]\b|b/c\b|c/o\b", forms.read_slashed),
+        ("rate", "a/", rf"{_START}{_rate_pattern()}", forms.read_rate),
+        ("parting", "./", r"(?<=[A-Z][0-9])/(?=[A-Z][0-9])", forms.read_nothing),
         ("season", "0", r"(?P<year>(?:19|20)[0-9]{2})/(?P<next>[0-9]{2})(?![\w/])", dates.read_season),
         (
             "either",
-            "a",
+            "a/",
             r"(?<![/\w])(?!d[A-Za-z]/d)(?P<either>[^\W\d_]{2,30}|[A-Z])/(?P<other>[^\W\d_]{2,30}|[A-Z])(?P<third>/[^\W\d_]{2,30}|'s)?(?![\w/.-]\w|\w)",
             forms.read_either,
         ),
         (
             "path",
-            "a.",
+            "a./",
             rf"(?<![\w/.])(?:[∿.]|\.\.)/{_PART}(?:/{_PART}){{0,12}}|(?<![\w/.])(?:/{_PART}){{2,12}}"
             rf"|(?<![\w/])[A-Z]:∖{_PART}(?:∖{_PART}){{0,12}}"
             r"|(?<![\w/])[A-Za-z][\w-]{0,40}(?:/[\w-]{1,40}){1,8}\.[a-z]{1,4}(?![\w.]\w)",
@@ -125,20 +126,20 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         ),
         (
             "hash",
-            "a0",
+            "a0#",
             r"(?<!\w)(?=[0-9a-f]{6,64}(?!\w))(?:(?:[0-9]+[a-f]+){2,}[0-9]*|(?:[a-f]+[0-9]+){2,}[a-f]*)"
             r"|(?<!\w)0x[0-9A-Fa-f]{1,16}(?!\w)",
             codes.read_hash,
         ),
         (
             "keys",
-            "a.",
+            "a./",
             rf"(?<!\w){codes.KEYS}(?: ?\+ ?(?:[A-Za-z]{{1,9}}[0-9]{{0,2}}|[0-9])){{1,3}}(?!\w)",
             codes.read_keys,
         ),
         (
             "zip",
-            "a",
+            "a#",
             rf"(?<=[a-z.,] )(?P<state>{_STATE}) (?P<zip>[0-9]{{5}}(?:-[0-9]{{4}})?)(?![\w-])",
             contexts.read_zip_code,
         ),
@@ -152,12 +153,12 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         ("iso", "0", r"(?P<isoy>[0-9]{4})-(?P<isom>[0-9]{2})-(?P<isod>[0-9]{2})(?![\w-])", dates.read_iso_date),
         (
             "monthday",
-            "a",
+            "a#",
             rf"(?P<mf>{_MONTH}) (?P<mfd>[0-9]{{1,2}})(?:st|nd|rd|th)?(?:[–-](?P<mfto>[0-9]{{1,2}})(?![0-9]))?"
             r"(?![\w:/%-]|[.,][0-9])(?:,? (?P<mfy>[12][0-9]{3})(?![\w-]|[.,:][0-9]))?",
             dates.read_month_first,
         ),
-        ("monthyear", "a", rf"(?P<my>{_MONTH}),? (?P<myy>[12][0-9]{{3}})(?![\w-]|[.,:][0-9])", dates.read_month_year),
+        ("monthyear", "a#", rf"(?P<my>{_MONTH}),? (?P<myy>[12][0-9]{{3}})(?![\w-]|[.,:][0-9])", dates.read_month_year),
         (
             "daymonth",
             "0",
@@ -174,7 +175,7 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         ),
         (
             "scientific",
-            "0.",
+            "0.#",
             r"(?P<mantissa>(?<![\w.])[+-]?[0-9]{1,9}(?:\.[0-9]{1,9})?)[eE](?P<exponent>[+-]?[0-9]{1,3})(?![\w.])"
             rf"(?: ?(?P<sunit>{unit}))?",
             forms.read_scientific,
@@ -211,21 +212,21 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         ("ratio", "0", r"(?P<ra>[0-9]{1,3}):(?P<rb>[0-9]{1,3})(?![\w:])", dates.read_proportion),
         (
             "money",
-            "a.",
+            "a.#",
             rf"(?P<moneyminus>(?<![\w.])-)?(?P<sign>{_SIGN}) ?(?P<moneya>-?{_AMOUNT})"
             rf"(?:[–-](?:{_SIGN})?(?P<moneyto>{_AMOUNT})(?![\w-]))?(?: ?(?P<mag>{_MAGNITUDE}))?",
             forms.read_money,
         ),
         (
             "moneyafter",
-            "0.",
+            "0.#",
             rf"(?P<moneyb>{_SIGNED})(?: ?(?P<mag2>thousand|million|billion|trillion|bn))?"
             rf" ?(?:(?P<sign2>[$£€¥₹₩₽₺₿¢])|(?P<sign3>{_CODE})\b)",
             forms.read_money_after,
         ),
         (
             "telephone",
-            "0.",
+            "0.#",
             r"(?:(?:\+[0-9]{1,3}|1)[ .-]?)?(?:\([0-9]{2,4}\) ?|[0-9]{3,4}[ .-])[0-9]{3}[ .-][0-9]{4}(?![\w-])"
             r"|\+[0-9]{1,3}(?:[ .-][0-9]{1,8}){2,6}(?![\w-])|(?<![\w-])[0-9]{3}-[0-9]{4}(?![\w-])|\+[0-9]{8,15}(?!\w)"
             r"|(?<![\w.,:/-])0[0-9]{2,4}(?:[ -][0-9]{3,8}){1,3}(?![\w-])",
@@ -240,14 +241,14 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         ),
         (
             "inches",
-            "0.",
+            "0.#",
             rf"(?P<inchamount>{_AMOUNT})[ -]in"
             r"(?:\.(?=[,;]| [a-z])|(?= ?(?:long|wide|tall|high|deep|thick|across|by(?= [0-9])|x)\b))",
             forms.read_inches,
         ),
         (
             "inchmark",
-            "0.",
+            "0.#",
             rf"(?:(?:(?P<iwhole>[0-9]{{1,4}})[ -])?(?P<itop>[0-9]{{1,2}})/(?P<ibottom>[0-9]{{1,3}})"
             rf"|(?P<inches2>{_AMOUNT})) ?{INCH}",
             formulas.read_inch_mark,
@@ -271,7 +272,7 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
             rf"(?P<feet>[0-9]{{1,3}})'(?: ?(?P<inches>[0-9]{{1,2}}){INCH}?)?(?![\w'])",
             formulas.read_feet,
         ),
-        ("decade", "0.", r"'?(?P<decade>[1-9]0|[12][0-9]{2}0)'?s\b", dates.read_decade),
+        ("decade", "0.#", r"'?(?P<decade>[1-9]0|[12][0-9]{2}0)'?s\b", dates.read_decade),
         ("ordinal", "0", r"(?P<ord>[0-9]{1,3}(?:,[0-9]{3}){1,5}|[0-9]{1,15})(?:st|nd|rd|th)\b", forms.read_ordinal),
         ("owner", "0", r"(?P<owner>[0-9]{1,6})'s\b", forms.read_owner),
         (
@@ -282,7 +283,7 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         ),
         (
             "fraction",
-            "0.",
+            "0.#",
             r"(?P<fractionminus>(?<![\w.)])-(?=[0-9]))?"
             r"(?:(?P<whole>[0-9]{1,6})[ -])?(?P<frac>(?P<top>[0-9]{1,3})/(?P<bottom>[0-9]{1,3}))(?![\w/])"
             rf"(?: ?(?P<funit>{unit}|in(?= (?:thick|wide|long|deep|high)\b)))?(?:\.(?= [a-z]))?",
@@ -290,36 +291,36 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         ),
         (
             "per",
-            ".",
+            "./",
             rf"(?:(?<=[0-9$£€])|(?<=llion))/(?:(?P<per>{unit})|(?P<perword>{_PER})\b)",
             forms.read_per,
         ),
         (
             "over",
-            ".",
+            "./",
             r"(?:(?<=[\s(+×=-][b-hj-z])|(?<=\bd[A-Za-z])(?=/d[a-z]\b)|(?<=^[b-hj-z])|(?<=π))/(?=[0-9]|d?[b-hj-z]\b|delta\b|π)"
             r"|(?<=[0-9])/(?=[kmnxyz]\b|π)",
             formulas.read_over,
         ),
         (
             "designation",
-            "a0",
+            "a0#",
             rf"{_START}(?P<letters>[A-Z]{{1,2}})[0-9]{{3}}(?:-[0-9]{{2,4}})?(?![\w-])|7[0-9]7-[0-9]{{2,3}}(?![\w-])",
             contexts.read_designation,
         ),
-        ("postcode", "a", rf"{_START}[A-Z]{{1,2}}[0-9][0-9A-Z]? [0-9][A-Z]{{2}}(?!\w)", codes.read_hash),
+        ("postcode", "a#", rf"{_START}[A-Z]{{1,2}}[0-9][0-9A-Z]? [0-9][A-Z]{{2}}(?!\w)", codes.read_hash),
         (
             "range",
-            "0.",
+            "0.#",
             rf"(?P<from>{_AMOUNT})[–-](?P<sign4>[$£€])?(?P<to>{_AMOUNT})(?![\w-])(?: ?(?P<runit>{unit}))?",
             forms.read_range,
         ),
-        ("measure", "0.", rf"(?P<amount>{_SIGNED})[ -]?(?P<unit>{unit})(?:\.(?= [a-z]))?", forms.read_measure),
-        ("power", ".", r"\^(?P<power>-?[0-9]{1,3})(?![0-9])", forms.read_power),
-        ("kilo", "0.", rf"(?P<kilo>{_AMOUNT})k\b", forms.read_thousands),
-        ("number", "0.", _SIGNED, forms.read_plain_number),
+        ("measure", "0.#", rf"(?P<amount>{_SIGNED})[ -]?(?P<unit>{unit})(?:\.(?= [a-z]))?", forms.read_measure),
+        ("power", ".#", r"\^(?P<power>-?[0-9]{1,3})(?![0-9])", forms.read_power),
+        ("kilo", "0.#", rf"(?P<kilo>{_AMOUNT})k\b", forms.read_thousands),
+        ("number", "0.#", _SIGNED, forms.read_plain_number),
         ("sharp", "a", rf"{_START}(?P<note>[A-G])#(?![\w#])", forms.read_sharp),
-        ("sheet", "a", rf"{_START}A(?P<sheet>[0-9]{{1,4}})(?![\w.-])", forms.read_letter_a),
+        ("sheet", "a#", rf"{_START}A(?P<sheet>[0-9]{{1,4}})(?![\w.-])", forms.read_letter_a),
         ("abbreviation", "a", rf"{_START}{_abbreviation_pattern()}{_STOP}", forms.read_abbreviation),
         (
             "dotted",

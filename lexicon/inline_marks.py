@@ -19,7 +19,7 @@ from lexicon.emphasis import SPACED
 from lexicon.function_words import is_function_word
 from lexicon.gesture_marks import FIRST_WORDS, is_gesture
 from lexicon.informal_words import tag_words
-from lexicon.mark_table import MarkTable, TextMark
+from lexicon.mark_table import PLAIN, MarkTable, TextMark
 from lexicon.markdown import PARAGRAPH_END, SENTENCE_END, Block, split_blocks
 
 MAX_TAIL = 40  # characters of what is spoken before a mark, and of what follows it
@@ -208,7 +208,8 @@ class _Scanner:
 
     def __init__(self, text: str, rules: Rules, left_out: frozenset[str] = frozenset()) -> None:
         self._text, self._rules = text, rules
-        self._pattern = _pattern(tuple(rules.table.marks["emoticon"]), left_out)
+        self._left_out = left_out
+        self._has_marks = not PLAIN.fullmatch(text) or any(face in text for face in rules.table.plain_faces)
         self.tail = "\n"  # of what is spoken
         self._readers: Mapping[str, Callable[[re.Match[str]], Part | None]] = {
             "escape": lambda match: Text(*match.span(), match[0][1]),
@@ -233,7 +234,7 @@ class _Scanner:
         """Parts of the words from `start` to `end`."""
         at = place = start
         before = self.tail
-        while (match := self._pattern.search(self._text, place, end)) is not None:
+        while self._has_marks and (match := self._pattern.search(self._text, place, end)) is not None:
             self.tail = (before + self._text[max(at, match.start() - MAX_TAIL) : match.start()])[-MAX_TAIL:]
             part = self._readers[str(match.lastgroup)](match)
             if part is None:  # its first character is text, and behind it may be a mark
@@ -254,6 +255,11 @@ class _Scanner:
             self.tail = before
             self.speak(self._text[max(at, end - MAX_TAIL) : end])
             yield Text(at, end, self._text[at:end])
+
+    @property
+    def _pattern(self) -> "re.Pattern[str]":
+        """All kinds of marks; it is not compiled for a text without signs of them, which takes 6 ms."""
+        return _pattern(tuple(self._rules.table.marks["emoticon"]), self._left_out)
 
     def speak(self, said: str) -> None:
         """Follow what is spoken."""

@@ -4,6 +4,7 @@ r"""Signs of English texts that are spoken where their neighbours say so: 27", |
 are spoken become stand-ins, which it keeps; `written_signs` gives a written form its own signs back.
 """
 
+import functools
 import re
 from collections.abc import Callable
 from types import MappingProxyType
@@ -103,43 +104,51 @@ def _with_inches(text: str) -> str:
     return "".join([*pieces, text[at:]])
 
 
-# Patterns in the order in which they are tried, each linear: all repeats over signs are bounded.
-_STEPS: tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...] = (
-    # 3 * 4, 2*x; 4* hotels and s*x are none
-    (
-        re.compile(
-            r"(?<=[0-9)])(\s?)\*\1(?=[0-9(]|[a-z]\b)|(?<=\b[a-z])(\s?)\*\2(?=[0-9(])|(?<=\b[a-z])\s\*\s(?=[a-z]\b)"
+@functools.cache
+def _steps() -> tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...]:
+    """Patterns in the order in which they are tried, each linear: all repeats over signs are bounded.
+
+    They are compiled at their first use, which takes 4 ms.
+    """
+    return (
+        # 3 * 4, 2*x; 4* hotels and s*x are none
+        (
+            re.compile(
+                r"(?<=[0-9)])(\s?)\*\1(?=[0-9(]|[a-z]\b)|(?<=\b[a-z])(\s?)\*\2(?=[0-9(])|(?<=\b[a-z])\s\*\s(?=[a-z]\b)"
+            ),
+            " × ",
         ),
-        " × ",
-    ),
-    (re.compile(r"(?<![\w|])\|(?=[\w-])([^|\n]{1,40})(?<=[\w)])\|(?![\w|])"), rf"{BAR}\1{BAR}"),
-    (re.compile(r"(?<=[0-9])!(?=\s*[=+×÷*/<>≤≥)-]|\s?[-−] ?[0-9])|(?<=\b[nkmr])!(?=\s*[=+×÷/])"), FACTORIAL),
-    (re.compile(r"\b([A-Z]:)\\"), rf"\1{BACKSLASH}"),
-    (re.compile(r"(?<=[\w.∖])\\(?=[\w.])"), BACKSLASH),
-    (re.compile(r"(?<![-<])-{1,3}>"), ARROW),
-    # a 5* hotel; behind another number a star is the sign of a footnote
-    (re.compile(rf"(?<![\w.,$£€])([1-7])\*(?=[ -]{_STARRED})|(?<=[Rr]ated )([1-7])\*"), rf"\1\2{STAR}"),
-    (re.compile(r"[★⭐]"), STAR),
-    (re.compile(r"(?<![\w~])~(?=/\w)"), HOME),
-    (re.compile(r"(?<=[A-Za-z0-9])_(?=[\w.+-]{0,62}@\w)"), UNDERSCORE),
-    (re.compile(r"(?<=[\w)])\)/(?=[\w(])"), OVER),
-    # Ca²⁺, Na⁺, Cl⁻
-    (re.compile(r"(?<=[A-Za-z0-9₀-₉])([²³]?)([⁺⁻])(?![⁰¹²³⁴-⁹])"), _charge),
-    (re.compile(r"\b((?:F|Cl|Br|I|OH|NO[₃3]))[-−](?= ions?\b)"), rf"\1{MINUS}"),
-    (re.compile(rf"\b({_DAY}){_DASH}(?={_DAY})|\b({_MONTH}){_DASH}(?={_MONTH})"), _range),
-    # 9am-5pm, 6-8pm, 10 %-15 %, $10-$15
-    (re.compile(rf"(?<=[0-9])( ?{_HALF}){_DASH}(?=[0-9]|noon\b|midnight\b)"), rf"\1 {RANGE} "),
-    (re.compile(rf"(?<=[0-9]){_DASH}(?=[0-9]{{1,2}}(?::[0-9]{{2}})? ?{_HALF})"), f" {RANGE} "),
-    (re.compile(rf"(?<=[0-9])( ?(?:%|°[CF]?)){_DASH}(?=[0-9])"), rf"\1 {RANGE} "),
-    (re.compile(r"(?<=[0-9])( ?)[-–](?=[$£€][0-9.]{1,9} ?[-–])"), rf"\1{RANGE}"),
-    (
-        re.compile(r"(?<![\w.])(?P<a>[0-9]{1,9}(?:[.,][0-9]{1,9})?)(?: (?P<sign>[-–−]) |−)(?=(?P<b>[0-9]{1,9}))"),
-        _between_numbers,
-    ),
-    # x - 1, n-1, 2 - x
-    (re.compile(r"(?<![\w'’.-])([kmnpqrtxyz]) [-–−] (?=[0-9(]|[a-z]\b)|(?<![\w'’.-])([kmnxyz])[-−](?=[0-9])"), _minus),
-    (re.compile(r"(?<=[0-9)])(?: [-−] (?=[kmnxyz]\b(?![-'’.]))|[-−](?=[knxyz]\b(?![-'’.])))"), f" {MINUS} "),
-)
+        (re.compile(r"(?<![\w|])\|(?=[\w-])([^|\n]{1,40})(?<=[\w)])\|(?![\w|])"), rf"{BAR}\1{BAR}"),
+        (re.compile(r"(?<=[0-9])!(?=\s*[=+×÷*/<>≤≥)-]|\s?[-−] ?[0-9])|(?<=\b[nkmr])!(?=\s*[=+×÷/])"), FACTORIAL),
+        (re.compile(r"\b([A-Z]:)\\"), rf"\1{BACKSLASH}"),
+        (re.compile(r"(?<=[\w.∖])\\(?=[\w.])"), BACKSLASH),
+        (re.compile(r"(?<![-<])-{1,3}>"), ARROW),
+        # a 5* hotel; behind another number a star is the sign of a footnote
+        (re.compile(rf"(?<![\w.,$£€])([1-7])\*(?=[ -]{_STARRED})|(?<=[Rr]ated )([1-7])\*"), rf"\1\2{STAR}"),
+        (re.compile(r"[★⭐]"), STAR),
+        (re.compile(r"(?<![\w~])~(?=/\w)"), HOME),
+        (re.compile(r"(?<=[A-Za-z0-9])_(?=[\w.+-]{0,62}@\w)"), UNDERSCORE),
+        (re.compile(r"(?<=[\w)])\)/(?=[\w(])"), OVER),
+        # Ca²⁺, Na⁺, Cl⁻
+        (re.compile(r"(?<=[A-Za-z0-9₀-₉])([²³]?)([⁺⁻])(?![⁰¹²³⁴-⁹])"), _charge),
+        (re.compile(r"\b((?:F|Cl|Br|I|OH|NO[₃3]))[-−](?= ions?\b)"), rf"\1{MINUS}"),
+        (re.compile(rf"\b({_DAY}){_DASH}(?={_DAY})|\b({_MONTH}){_DASH}(?={_MONTH})"), _range),
+        # 9am-5pm, 6-8pm, 10 %-15 %, $10-$15
+        (re.compile(rf"(?<=[0-9])( ?{_HALF}){_DASH}(?=[0-9]|noon\b|midnight\b)"), rf"\1 {RANGE} "),
+        (re.compile(rf"(?<=[0-9]){_DASH}(?=[0-9]{{1,2}}(?::[0-9]{{2}})? ?{_HALF})"), f" {RANGE} "),
+        (re.compile(rf"(?<=[0-9])( ?(?:%|°[CF]?)){_DASH}(?=[0-9])"), rf"\1 {RANGE} "),
+        (re.compile(r"(?<=[0-9])( ?)[-–](?=[$£€][0-9.]{1,9} ?[-–])"), rf"\1{RANGE}"),
+        (
+            re.compile(r"(?<![\w.])(?P<a>[0-9]{1,9}(?:[.,][0-9]{1,9})?)(?: (?P<sign>[-–−]) |−)(?=(?P<b>[0-9]{1,9}))"),
+            _between_numbers,
+        ),
+        # x - 1, n-1, 2 - x
+        (
+            re.compile(r"(?<![\w'’.-])([kmnpqrtxyz]) [-–−] (?=[0-9(]|[a-z]\b)|(?<![\w'’.-])([kmnxyz])[-−](?=[0-9])"),
+            _minus,
+        ),
+        (re.compile(r"(?<=[0-9)])(?: [-−] (?=[kmnxyz]\b(?![-'’.]))|[-−](?=[knxyz]\b(?![-'’.])))"), f" {MINUS} "),
+    )
 
 
 def keep_signs(text: str) -> str:
@@ -147,7 +156,7 @@ def keep_signs(text: str) -> str:
     if not (_SIGNS.search(text) and _ANY.search(text)):
         return text
     text = _without_closing_quotes(text.replace("`", " "))
-    for pattern, replacement in _STEPS:
+    for pattern, replacement in _steps():
         text = pattern.sub(replacement, text)
     return _with_inches(text)
 

@@ -32,6 +32,7 @@ from lexicon.values.files import LARGEST_TEXT_BYTES, read_text
 COLUMNS = ("mark", "kind", "style", "gesture", "strength", "seconds", "word")
 KINDS = ("emoji", "emoticon", "tag", "action", "stage")
 MAX_MARK_CHARACTERS = 40
+PLAIN = re.compile(r"[A-Za-z0-9\s.,!?'\"$%/-]*")  # signs of ordinary sentences, of which no mark consists but emoticons
 _SAID = frozenset(("emoji", "emoticon"))  # kinds of marks that may stand for a word
 _WORD = r"[^\W\d_]+(?:['’-][^\W\d_]+)*"
 # How a mark of each kind is spelled; others are never found in a text.
@@ -60,11 +61,15 @@ class TextMark:
 
 @dataclass(frozen=True, slots=True)
 class MarkTable:
-    """Marks by kind and spelling; actions and stage directions by the verb's forms; styles of a user's own rows."""
+    """Marks by kind and spelling; actions and stage directions by the verb's forms; styles of a user's own rows.
+
+    `plain_faces` are the emoticons of letters and signs of ordinary sentences (XD, o/).
+    """
 
     marks: Mapping[str, Mapping[str, TextMark]]
     verbs: Mapping[str, tuple[TextMark, ...]] = field(default_factory=dict)
     own_styles: frozenset[str] = frozenset()
+    plain_faces: tuple[str, ...] = ()
 
     def emoji(self, written: str) -> TextMark | None:
         """The mark of an emoji, with or without its skin tones; of joined ones that of the first that is known."""
@@ -221,4 +226,5 @@ def _table(rows: Iterable[TextMark]) -> MarkTable:
     return MarkTable(
         MappingProxyType(marks),
         MappingProxyType({form: tuple(sorted(found, key=lambda row: -len(row.mark))) for form, found in verbs.items()}),
+        plain_faces=tuple(face for face in (*marks["emoticon"], *marks["emoji"]) if PLAIN.fullmatch(face)),
     )

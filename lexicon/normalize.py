@@ -25,19 +25,28 @@ from lexicon.written_forms import WrittenForm
 from lexicon.written_words import spaced_words
 
 _SINGLE_LETTER = re.compile(r"(?<![^\W\d_])[^\W\d_](?![^\W\d_])")
-# espeak-ng omits what follows the first 160 letters of a word; the longest in use have 85. From U+0900 on, scripts
-# without spaces between words begin.
-_LONG_WORD = re.compile(r"[^\W\d_\u0900-\U0010ffff]{100}(?=[^\W\d_\u0900-\U0010ffff])")
+MAX_LETTERS = 100  # of a word: espeak-ng omits what follows the first 160; the longest in use have 85
 # espeak-ng reads aujourd’hui in English, and 12 345 with a narrow space as two numbers
 _AS_ESPEAK_READS = str.maketrans({"’": "'", "ʼ": "'", "\u00a0": " ", "\u202f": " ", "\u2009": " "})
 _WORD = re.compile(r"\s*\S+\s*")
+_NEEDED_SIGNS = {"#": frozenset("0123456789"), "/": frozenset("/@+∖")}
 _LONG_NUMBER = re.compile(rf"[0-9]{{{MAX_CARDINAL_DIGITS + 1},}}")
 
 
 @functools.cache
-def _scanner(start: str) -> re.Pattern[str]:
-    """Pattern of the forms that begin with a letter (a), a digit (0) or another sign (.); few texts have all three."""
-    rows = (f"(?P<f_{name}>{pattern})" for name, starts, pattern, _ in form_table() if start in starts)
+def _scanner(start: str, lacking: str) -> re.Pattern[str]:
+    """Pattern of the forms that begin with a letter (a), a digit (0) or another sign (.); few texts have all three.
+
+    Parameters
+    ----------
+    lacking
+        Signs that the text lacks (#: digits, /: those of addresses), without which some forms cannot be.
+    """
+    rows = (
+        f"(?P<f_{name}>{pattern})"
+        for name, starts, pattern, _ in form_table()
+        if start in starts and not any(sign in starts for sign in lacking)
+    )
     return re.compile("|".join(rows))
 
 
@@ -50,11 +59,12 @@ def _readers() -> dict[str, forms.Reader]:
 def _find_forms(text: str) -> Iterator[tuple[re.Match[str], forms.Reader]]:
     """Written forms one after another, with their readers; every character belongs to one."""
     readers = _readers()
+    lacking = "".join(sign for sign, signs in _NEEDED_SIGNS.items() if signs.isdisjoint(text))
     at = 0
     while at < len(text):
         sign = text[at]
         start = "0" if sign in "0123456789" else "a" if sign.isalnum() else "."
-        match = _scanner(start).match(text, at)
+        match = _scanner(start, lacking).match(text, at)
         if match is None:  # the last form of each pattern is any character
             raise AssertionError(f"no form begins with {sign!r}")
         yield match, readers[match.lastgroup or ""]
@@ -131,7 +141,20 @@ def _readable_parts(form: WrittenForm, language: str) -> Iterator[WrittenForm]:
 def _readable(spoken: str, language: str) -> str:
     text = name_foreign_letters(spoken.translate(_AS_ESPEAK_READS), language)
     text = _LONG_NUMBER.sub(lambda number: " ".join(number.group()), text)
-    return _LONG_WORD.sub(r"\g<0> ", text)
+    return _with_parted_words(text)
+
+
+@functools.cache
+def _long_word() -> re.Pattern[str]:
+    """The first letters of a long word; from U+0900 on, scripts without spaces between words begin."""
+    return re.compile(rf"[^\W\d_\u0900-\U0010ffff]{{{MAX_LETTERS}}}(?=[^\W\d_\u0900-\U0010ffff])")
+
+
+def _with_parted_words(text: str) -> str:
+    """A text with spaces in words of more than `MAX_LETTERS` letters."""
+    if all(len(word) <= MAX_LETTERS for word in text.split()):
+        return text
+    return _long_word().sub(r"\g<0> ", text)
 
 
 def written_pieces(text: str, language: str) -> list[tuple[str, str]]:
@@ -151,6 +174,6 @@ def spoken_form(text: str, language: str) -> str:
     Arabic and Hebrew get vowels where a model of them is installed.
     """
     if language.startswith("en"):
-        return _LONG_WORD.sub(r"\g<0> ", normalize(text))
+        return _with_parted_words(normalize(text))
     text = "".join(form.spoken for form in spoken_forms(text, language))
     return signs_before_vowels(add_vowels(text, language))

@@ -30,9 +30,9 @@ from lexicon.say_as import reads_kind, say_as
 from lexicon.ssml_leniency import (
     LANGUAGE,
     RENAMED,
-    TOUCHING,
     TRANSPARENT,
     UNSPOKEN,
+    is_touching,
     known_attributes,
     nearest_style,
     with_plain_entities,
@@ -260,7 +260,7 @@ class _SsmlReader:
 
     def _add_text(self, text: str) -> None:
         """Add text, behind a space if it would be one word, or one sentence, with what stands before a tag."""
-        if self._is_apart and TOUCHING.match(f"{self._builder.last_character:1}{text[:2]}"):
+        if self._is_apart and is_touching(self._builder.last_character, text):
             self._builder.add_text(" ")
         self._builder.add_text(text)
         if text:

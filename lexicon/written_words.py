@@ -3,6 +3,7 @@
 Where espeak-ng is given another spelling than the written one (kana of Japanese), each word has both.
 """
 
+import functools
 import re
 import unicodedata
 from collections.abc import Iterator
@@ -21,7 +22,6 @@ _PIECE = re.compile(r"[^\s\w]*\d{1,3}(?: \d{3})+(?!\d)\S*|\S+")
 _MANDARIN = "cmn"
 _UNSPACED = frozenset({"cmn", "yue", "hak"})
 _CHARACTER = r"[\u3400-\u9fff\uf900-\ufaff\U00020000-\U0003ffff]"
-_CHARACTERS = re.compile(rf"{_CHARACTER}|(?:(?!{_CHARACTER}).)+")
 _SPOKEN_SIGNS = frozenset("%‰&@#§")  # punctuation of Unicode with a name that is spoken
 _MARK_OF_SIGN = {**MARK_OF_SIGN, **dict.fromkeys("()（）", ",")}
 _STRENGTH = " " + "".join(PAUSES_S)  # from none
@@ -98,10 +98,16 @@ def _japanese_words(text: str) -> Iterator[WrittenWord]:
         yield WrittenWord(written[first:last] or written, as_espeak_reads(phrase.kana), mark)
 
 
+@functools.cache
+def _characters() -> re.Pattern[str]:
+    """A Chinese character, or what stands between two; compiled at its first use, which takes 2 ms."""
+    return re.compile(rf"{_CHARACTER}|(?:(?!{_CHARACTER}).)+")
+
+
 def _pieces(text: str, language: str) -> Iterator[tuple[int, str]]:
     for piece in _PIECE.finditer(text):
         if is_unspaced(language):
-            yield from ((piece.start() + part.start(), part[0]) for part in _CHARACTERS.finditer(piece[0]))
+            yield from ((piece.start() + part.start(), part[0]) for part in _characters().finditer(piece[0]))
         else:
             yield piece.start(), piece[0]
 

@@ -1,12 +1,17 @@
 """Written English in words: a table of cases to read, and what other languages keep."""
 
+import csv
 from pathlib import Path
 
 import pytest
 
+import lexicon.normalize
 from lexicon.normalize import normalize, split_tokens
 
 TABLE = Path(__file__).with_name("normalization.tsv")
+CLASSES = csv.DictReader(
+    TABLE.with_name("written_classes.tsv").read_text(encoding="utf-8").splitlines(), delimiter="\t", quoting=3
+)
 CASES = [line.split("\t") for line in TABLE.read_text(encoding="utf-8").splitlines()[1:]]
 
 
@@ -14,6 +19,13 @@ def test_written_forms_are_normalised(subtests: pytest.Subtests) -> None:
     for written, spoken in CASES:
         with subtests.test(written):
             assert normalize(written.replace("\\n", "\n")) == spoken
+
+
+def test_forms_that_a_text_cannot_have_are_none_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    texts = [written for written, _ in CASES] + [row["text"] for row in CLASSES]
+    found = [[*split_tokens(text)] for text in texts]
+    monkeypatch.setattr(lexicon.normalize, "_NEEDED_SIGNS", {})
+    assert found == [[*split_tokens(text)] for text in texts]
 
 
 def test_the_table_is_large() -> None:
