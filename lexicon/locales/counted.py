@@ -1,10 +1,13 @@
 """Readers of numbers with what they count: measures, money, ranges, fractions, ordinals, telephone numbers."""
 
+import re
+
 from lexicon.locales.nouns import behind, case_of, construct, count, gender_of, is_plural, noun_form, one_before
 from lexicon.locales.numbers import Amount, Grammar, is_round_million, number, ordinal, whole, year
 from lexicon.locales.place import Place, read_amount
 from lexicon.locales.tables import Locale, Row
 
+_RESULT = re.compile(r"[0-9]{1,3}(?![0-9]|[.,:/-][0-9]| ?=)")
 _MAGNITUDE_DIGITS = "1000000"  # the noun behind a million is that behind its digits
 
 
@@ -82,9 +85,11 @@ def money(locale: Locale, amount: Amount, row: Row, case: str = "") -> str:
 
 def read_range(place: Place) -> str:
     """First number of a range, with the word for to: the second one is read for itself."""
-    first = place.match["amount"]
-    said = year_or_number(place.locale, first, Grammar(case=place.grammar("cardinal").case))
-    return f"{said} {place.locale.setting('to')}".rstrip() + " "
+    locale, first = place.locale, place.match["amount"]
+    said = year_or_number(locale, first, Grammar(case=place.grammar("cardinal").case))
+    second = _RESULT.match(place.text, place.match.end())
+    falls = second is not None and first.isdigit() and int(first) > int(second.group())  # 3-2 is a result
+    return f"{said} {locale.setting('against' if falls else 'to')}".rstrip() + " "
 
 
 def read_number(place: Place) -> str:

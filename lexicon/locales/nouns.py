@@ -132,8 +132,17 @@ def count(locale: Locale, amount: Amount, row: Row, case: str = "") -> str:
         return noun.format(said)
     if noun.startswith(_WHOLE):
         sign = locale.setting("minus") if amount.sign == "-" else ""
+        if case:
+            noun = _oblique(locale, noun)
         return f"{sign} {noun.removeprefix(_WHOLE)}".lstrip()
     return behind(locale, said, noun, links=is_round_million(amount))
+
+
+def _oblique(locale: Locale, noun: str) -> str:
+    """Arabic duals behind a preposition: إلى كيلومترين مربعين."""
+    ending, _, other = locale.setting("oblique_dual").partition("=")
+    words = noun.split(" ")
+    return " ".join(word.removesuffix(ending) + other if ending and word.endswith(ending) else word for word in words)
 
 
 def behind(locale: Locale, said: str, noun: str, *, links: bool) -> str:

@@ -151,7 +151,7 @@ _NUMBER_FORMS: tuple[tuple[str, Reader], ...] = (
         r"(?P<amount>[-+]?[0-9]{1,20}(?:[.,][0-9]{1,20})?)[eE](?P<exponent>[-+]?[0-9]{1,3})(?!\w)",
         digit_groups.read_scientific,
     ),
-    (r"(?P<amount>‹amount›)(?:[-–](?=[0-9])| – (?=[0-9]))(?!‹amount›[-–][0-9])", counted.read_range),
+    (r"(?P<amount>‹amount›)(?:[-–](?=[0-9])| – (?=[0-9]))(?!‹amount›(?:[-–][0-9]| ?=))", counted.read_range),
     (rf"(?P<integer>[0-9]{{1,4}}){_FRACTION} (?P<noun>‹letter›{{3,24}})", fractions.read_divided),
     (
         rf"(?:(?P<integer>[0-9]{{1,4}}){_FRACTION}|{_ALONE})(?: (?P<noun>‹unit›)(?!‹letter›))?‹tail›",

@@ -11,6 +11,7 @@ from lexicon.locales.tables import Row
 from lexicon.sentence_ends import ends_sentence
 
 _CONTEXT = 40
+_EQUATION = re.compile(r"[0-9.,]{1,20} ?=")
 _ARROWS = frozenset("-=<>")  # before < or >: -> 5
 _SILENT = frozenset("<>~·*")  # where they stand between no numbers
 
@@ -79,6 +80,8 @@ def read_word(place: Place) -> str | None:
 
 def read_dash(place: Place) -> str | None:
     """Word for to between what was read and a number (9h-18h); None elsewhere (COVID-19)."""
+    if _EQUATION.match(place.text, place.match.end()):  # 10-5=5
+        return None
     is_behind = place.said and not place.text[place.match.start() - 1 : place.match.start()].isspace()
     return f" {place.locale.setting('to')} " if is_behind else None
 
