@@ -14,11 +14,12 @@ _MAGNITUDE_DIGITS = "1000000"  # the noun behind a million is that behind its di
 def read_measure(place: Place) -> str | None:
     """Number with a unit, perhaps per another one (5 km/h), and with an ending of the language (kg'lık).
 
-    None where the unit is rather a word (3 in Berlin) or the end of a quotation.
+    None where the unit is rather a word (3 in Berlin), the end of a quotation or an unknown number (3x + 2).
     """
     locale, grammar = place.locale, place.grammar("cardinal")
     row = locale.rows("unit")[place.match["unit"]]
-    if ("last" in row.details and place.after) or ("quote" in row.details and place.is_quoted):
+    is_word = "last" in row.details and place.after
+    if is_word or ("quote" in row.details and place.is_quoted) or ("factor" in row.details and place.is_term):
         return None
     said = _magnified(place, row, grammar.case) if place.match["magnitude"] else ""
     said = said or count(locale, place.amount("amount"), row, grammar.case)

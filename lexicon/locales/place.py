@@ -56,6 +56,11 @@ class Place:
         found = re.search(rf"([^\W\d_]+) {series}\Z", self.text[max(start - _CONTEXT, 0) : start]) if series else None
         return found[1] if found else ""
 
+    @property
+    def is_term(self) -> bool:
+        """Whether a sign of mathematics follows."""
+        return self.text[self.match.end() : self.match.end() + 2].lstrip(" ")[:1] in set("+-=<>≤≥^²³)/")
+
     def grammar(self, kind: str) -> Grammar:
         """Gender and case that the word before requires of a kind of number."""
         word = (self._before_series or self.said or self.before).lower()

@@ -14,7 +14,8 @@ _CONTEXT = 40
 def read_roman(place: Place) -> str | None:
     """Roman number by the words around it, else the names of its letters; None for a word."""
     written, locale = place.match["roman"], place.locale
-    value = roman_value(written)
+    is_model = place.text[place.match.end() : place.match.end() + 1].isdigit()  # MX5
+    value = 0 if is_model else roman_value(written)
     if place.match["suffix"]:
         return _with_suffix(place, value)
     known = _in_context(place, value) if value else None

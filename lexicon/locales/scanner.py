@@ -21,7 +21,7 @@ _VOWEL_SIGNS = "\u064b-\u065f\u0670\u0900-\u0903\u093a-\u094f\u0955-\u0957\u0962
 WORD = rf"(?:[{_LATIN}]+|(?:(?![{_LATIN}]){LETTER}|[{_VOWEL_SIGNS}])+)"
 PLACE = re.compile(rf"(?P<number>[0-9\u00bc-\u00be\u2150-\u215e])|(?P<word>{WORD})|[^\w\s]|\S")
 _LEADING_LETTERS = re.compile(rf"{WORD}?")
-_INITIALISM = r"(?P<letters>[A-ZÄÖÜÀ-ÞĄ-ŽА-ЯЁ]{2,8})(?P<ending>s)?(?!{letter})"
+_INITIALISM = r"(?P<letters>[A-ZÄÖÜÀ-ÖØ-ÞĄ-ŽА-ЯЁ]{2,8})(?P<ending>s)?(?!{letter})"
 # Letters with the sign of numbers; an apostrophe may also be that of a word that lost its vowel (Σ' αγαπώ).
 _LETTER_NUMBER = r"(?:(?P<letters>[Α-Ω]{1,3})(?=[΄ʹ′´])|(?P<short>ΣΤ|[ΙΚ]?[Α-Η]|[ΙΚ]Θ|Ι)(?='))(?:[΄ʹ′´']|(?!))(?!\w)"
 _LABEL = r"[A-Za-z0-9][A-Za-z0-9-]{0,62}"
@@ -38,7 +38,7 @@ _ADDRESS = (
     rf"|{_LABEL}(?:\.{_LABEL}){{0,3}}\.{_TLD}(?![A-Za-z0-9_])(?!\.\w)(?:/[^\s,;!]{{0,400}}[^\s,;!.:?)])?"
     rf"|[\w-]{{1,64}}(?:\.[\w-]{{1,64}}){{0,3}}\.{_EXTENSION}(?!\w)|[A-Z]:(?:\\[\w.-]{{0,63}}[\w-]){{1,20}}"
 )
-_ROMAN = rf"(?P<roman>[IVXLCDM]{{1,15}})(?P<suffix>{{suffix}}\.?)?(?!{LETTER}|['’-]{LETTER}|[0-9])"
+_ROMAN = rf"(?P<roman>[IVXLCDM]{{1,15}})(?P<suffix>{{suffix}}\.?)?(?!{LETTER}|['’-]{LETTER})"
 _POWER = r"(?<=[\w)])(?:\^(?P<digits>-?[0-9]{1,4})(?!\w)|(?P<raised>⁻?[⁰¹²³⁴⁵⁶⁷⁸⁹]{1,4})(?![⁰¹²³⁴⁵⁶⁷⁸⁹⁻]))"
 _PART = re.compile("‹([a-z ]+)›")
 
@@ -288,7 +288,7 @@ def _forms_by_word(locale: Locale) -> dict[str, tuple[Form, ...]]:
     add((sign for sign in locale.rows("sign") if sign.isalpha()), "{}", words.read_sign)  # π
     add(
         (unit for unit in locale.rows("unit") if "alone" in locale.rows("unit")[unit].details),
-        rf"(?P<unit>{{}}){end}",
+        rf"(?P<unit>{{}})(?!{letter})",
         words.read_unit_alone,
     )
     return {first: tuple(forms) for first, forms in found.items()}

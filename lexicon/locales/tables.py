@@ -16,14 +16,14 @@ gender       endings of nouns, longest first, and whole nouns (with a caret) of 
              gender of plurals with this ending
 unit         unit or noun behind a number; ``{}`` is the number where it does not come first; details: ``alone`` (also
              without a number), ``last`` (only where no word follows, because it is itself a word), ``quote`` (not
-             where it closes a quotation), ``si=`` signs of its prefixes
+             where it closes a quotation), ``factor`` (not within a term: 3x + 2), ``si=`` signs of its prefixes
 prefix       SI prefix of units
 magnitude    thousand, million and so on behind a number
 currency     currency; details ``cents=`` have its hundredth part
 month        number of a month: its name in dates, and written forms in details
 weekday      name of a short one; without a full stop only in a span (Mo-Fr)
 abbreviation its words; details: ``number`` (before a number only), ``after`` (behind a number), ``name`` (before a
-             capital), ``end`` (may end a sentence), or forms: by case, and before the name of a king (``ruler``)
+             capital), ``roman`` (before a Roman number), ``end`` (may end a sentence), or forms: by case, and before the name of a king (``ruler``)
 ending       abbreviation at the end of a word (str.)
 roman        word before or behind a Roman number, and the kind of number that it is (``cardinal``, ``ordinal``)
 ruler        names whose Roman numbers are those of rulers
@@ -48,7 +48,9 @@ from types import MappingProxyType
 
 COLUMNS = 4
 _LIKE_NO_WORD = re.compile("[a-zа-я][A-ZА-ЯΩ]|[µμ]|.*/")  # kHz, кВт, mA, Mbit/s, but not mm, MB or Pa
-_NO_FORMS = frozenset({"alone", "last", "quote", "gender", "si"})  # details that are no forms of the noun in a case
+_NO_FORMS = frozenset(
+    {"alone", "last", "quote", "factor", "gender", "si"}
+)  # details that are no forms of the noun in a case
 _BEFORE_NOUN = re.compile(r"=|.*\{\} ?")  # a form that holds its number, or has it before the noun
 _NO_ROWS: Mapping[str, "Row"] = MappingProxyType({})
 

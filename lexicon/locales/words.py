@@ -13,6 +13,7 @@ from lexicon.sentence_ends import ends_sentence
 _CONTEXT = 40
 _EQUATION = re.compile(r"[0-9.,]{1,20} ?=")
 _ARROWS = frozenset("-=<>")  # before < or >: -> 5
+_ROMAN = re.compile(r"[IVX]{1,8}(?![\w.])")
 _SILENT = frozenset("<>~·*")  # where they stand between no numbers
 
 
@@ -39,14 +40,17 @@ def read_ending(place: Place) -> str:
 
 
 def _is_in_context(place: Place, details: Collection[str], following: str) -> bool:
+    """Whether an abbreviation stands where one of its details allows it; anywhere if it has none of them."""
     bare = following.lstrip(" ")
-    if "number" in details:
-        return bare[:1].isdigit() or bare[:1] in {"X", "V", "I"}
-    if "name" in details:
-        return bare[:1].isupper() or bare.startswith(f"{place.locale.setting('and')} ")
-    if "after" in details:
-        return place.text[max(place.match.start() - 2, 0) : place.match.start()].strip(" ")[-1:].isalnum()
-    return True
+    behind = place.text[max(place.match.start() - 2, 0) : place.match.start()].strip(" ")
+    allowed = {
+        "number": bare[:1].isdigit() or bare[:1] in {"X", "V", "I"},
+        "name": bare[:1].isupper() or bare.startswith(f"{place.locale.setting('and')} "),
+        "after": behind[-1:].isalnum(),
+        "roman": bool(_ROMAN.match(bare)),
+    }
+    contexts = allowed.keys() & details
+    return not contexts or any(allowed[context] for context in contexts)
 
 
 def _form_in_context(place: Place, row: Row) -> str:
@@ -65,6 +69,7 @@ def _starts_sentence(place: Place, following: str) -> bool:
     before = place.text[max(place.match.start() - 1, 0) : place.match.end() - 1]
     return (
         following[:1].isspace()
+        and not _ROMAN.match(following.lstrip())
         and ends_sentence(before, following.lstrip(), place.locale.language)
         and (following.lstrip()[:1].isupper())
     )
