@@ -17,9 +17,13 @@ def read_measure(place: Place) -> str | None:
     None where the unit is rather a word (3 in Berlin), the end of a quotation or an unknown number (3x + 2).
     """
     locale, grammar = place.locale, place.grammar("cardinal")
-    row = locale.rows("unit")[place.match["unit"]]
-    is_word = "last" in row.details and place.after
-    if is_word or ("quote" in row.details and place.is_quoted) or ("factor" in row.details and place.is_term):
+    written = place.match["unit"]
+    row = locale.rows("unit")[written]
+    if (
+        ("last" in row.details and place.after)
+        or ("quote" in row.details and place.closes_quotation(written))
+        or ("factor" in row.details and place.is_term)
+    ):
         return None
     said = _magnified(place, row, grammar.case) if place.match["magnitude"] else ""
     said = said or count(locale, place.amount("amount"), row, grammar.case)

@@ -156,7 +156,8 @@ def _is_after_time_word(place: Place) -> bool:
 
 def time_words(locale: Locale, hour: int, minute: int, case: str = "") -> str:
     """Words of a time of day by the template of the language."""
-    grammar = Grammar(locale.setting("hour_gender"), case)
+    agrees = hour == 1 or not locale.setting("only_one_agrees")  # l'una, but le ventuno
+    grammar = Grammar(locale.setting("hour_gender") if agrees else "", case)
     said = ordinal(locale, hour, grammar) if locale.setting("hour") == "ordinal" else cardinal(locale, hour, grammar)
     unit = locale.rows("unit").get("h", Row("", {}))
     hours = noun_form(locale, unit, Amount("", str(hour)), case)

@@ -41,11 +41,10 @@ class Place:
         """Whether nothing but marks follows."""
         return not self.text[self.match.end() : self.match.end() + _CONTEXT].strip(" \n\"'»”“)")
 
-    @property
-    def is_quoted(self) -> bool:
-        """Whether the last straight quotation mark before the form opens a quotation."""
+    def closes_quotation(self, written: str) -> bool:
+        """Whether a mark may end a quotation: the last one like it before the form opens one."""
         start = self.match.start()
-        mark = self.text.rfind('"', max(start - _QUOTATION, 0), start)
+        mark = self.text.rfind(written, max(start - _QUOTATION, 0), start)
         return mark >= 0 and (mark == 0 or not (self.text[mark - 1].isalnum() or self.text[mark - 1] in ".,!?…"))
 
     @property

@@ -66,7 +66,7 @@ def _in_context(place: Place, value: int) -> str | None:
     for word in (f"+{_word_after(place)}", (place.said or place.before).lower()):
         if word in locale.rows("roman"):
             return _by_word(place, value, word)
-    return _ruler(place, value) if place.before in locale.rows("ruler") else None
+    return _ruler(place, value)
 
 
 def _word_after(place: Place) -> str:
@@ -94,22 +94,28 @@ def read_letter_number(place: Place) -> str | None:
     if not rows.keys() >= set(written):
         return None
     value = sum(int(rows[letter].spoken) for letter in written)
-    if place.before in locale.rows("ruler"):
-        return _ruler(place, value)
+    ruler = _ruler(place, value)
+    if ruler:
+        return ruler
     grammar = place.grammar("ordinal")
     return ordinal(locale, value, Grammar(grammar.gender or gender_of(locale, place.after), grammar.case))
 
 
-def _ruler(place: Place, value: int) -> str:
-    """Number of a ruler: quatorze, segundo, der vierzehnte."""
-    locale = place.locale
-    details = locale.rows("ruler")[place.before].details
-    gender = details.get("gender", "m")
+def _ruler(place: Place, value: int) -> str | None:
+    """Number of a ruler (quatorze, segundo, der vierzehnte, Karls des fünften); None behind another word."""
+    locale, rulers = place.locale, place.locale.rows("ruler")
+    genitive = locale.setting("ruler_genitive")
+    row = rulers.get(place.before)
+    if row is None and genitive and place.before.removesuffix("s") in rulers:
+        return genitive.format(ordinal(locale, value, Grammar("", "dative")))
+    if row is None:
+        return None
+    gender = row.details.get("gender", "m")
     if value > int(locale.setting("ruler_ordinals", "99")):
         return cardinal(locale, value)
     if value == 1 and locale.setting("ruler_first"):
         return locale.setting("ruler_first")
-    case = "weak" if locale.setting(f"ruler_{gender}") else details.get("case", "")
+    case = "weak" if locale.setting(f"ruler_{gender}") else row.details.get("case", "")
     return locale.setting(f"ruler_{gender}", "{}").format(ordinal(locale, value, Grammar(gender, case)))
 
 

@@ -23,7 +23,8 @@ currency     currency; details ``cents=`` have its hundredth part
 month        number of a month: its name in dates, and written forms in details
 weekday      name of a short one; without a full stop only in a span (Mo-Fr)
 abbreviation its words; details: ``number`` (before a number only), ``after`` (behind a number), ``name`` (before a
-             capital), ``roman`` (before a Roman number), ``end`` (may end a sentence), or forms: by case, and before the name of a king (``ruler``)
+             capital), ``roman`` (before a Roman number), ``end`` (may end a sentence), or forms: by case, and before
+             the name of a king (``ruler``)
 ending       abbreviation at the end of a word (str.)
 roman        word before or behind a Roman number, and the kind of number that it is (``cardinal``, ``ordinal``)
 ruler        names whose Roman numbers are those of rulers
