@@ -10,7 +10,8 @@ from cyclopts import App
 from cli.main import app
 
 PLACE = "<!-- options -->"
-PROGRAM = re.compile(r"<!-- (examples/\w+\.py) -->")
+PROGRAM = re.compile(r"<!-- (examples/\w+\.(py|html)) -->")
+LANGUAGES = {"py": "python", "html": "html"}
 DECISIONS = Path(__file__).with_name("decisions") / "index.md"
 
 
@@ -42,7 +43,7 @@ def on_page_markdown(markdown: str, **_: object) -> str:
 
 def _program(place: re.Match[str]) -> str:
     content = (Path(__file__).parent / place[1]).read_text(encoding="utf-8")
-    return f"```python\n{content}```"
+    return f"```{LANGUAGES[place[2]]}\n{content}```"
 
 
 def walk_commands(command: App, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], App]]:

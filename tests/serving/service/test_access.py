@@ -80,6 +80,19 @@ def open_socket(client: TestClient, path: str, secret: str) -> WebSocketTestSess
     return client.websocket_connect(f"ws://localhost{path}?key={secret}")
 
 
+@pytest.mark.parametrize("path", SOCKETS)
+def test_a_browser_sends_its_key_with_a_socket_as_a_subprotocol(client: TestClient, keys: Keys, path: str) -> None:
+    def connect(secret: str) -> WebSocketTestSession:
+        return client.websocket_connect(f"ws://localhost{path}", subprotocols=["tts2face", f"tts2face.key.{secret}"])
+
+    with connect(keys.secrets["ann"]) as socket:
+        assert socket.accepted_subprotocol == "tts2face"
+    with pytest.raises(WebSocketDenialResponse), connect("x"):
+        pass
+    with open_socket(client, path, keys.secrets["ann"]) as socket:
+        assert socket.accepted_subprotocol is None
+
+
 WAYS: dict[str, Callable[[Keys], object]] = {
     LAST: lambda keys: [remove_key(keys.path, name) for name in keys.secrets],
     "an empty file": lambda keys: keys.path.write_text(""),

@@ -259,3 +259,46 @@ def test_half_a_character_waits_in_a_message_of_text_alone() -> None:
     assert [growing.add("Hi \ud83c"), growing.add("\udf89! You"), growing.add(" \ud83c x\udf89."), growing.flush()] == [
         [], ["Hi 🎉!"], [], ["You x."]
     ]  # fmt: skip
+
+
+def test_a_flush_with_an_id_is_answered_when_its_text_has_been_spoken() -> None:
+    text = live()
+    follow(text, [*say("One. Two. Three"), {"type": "flush", "id": "a"}, *say("Four"), {"type": "flush", "id": "b"}])
+    assert text.answers() == []
+    text.is_note({"type": "said", "n": 2})
+    assert text.answers() == []
+    text.is_note({"type": "said", "n": 1})
+    assert text.answers() == [{"type": "flushed", "id": "a"}]
+    text.is_note({"type": "said", "n": 1})
+    assert text.answers() == [{"type": "flushed", "id": "b"}]
+    assert text.answers() == []
+
+
+def test_a_flush_of_nothing_is_answered_at_once_and_cancel_forgets_flushes() -> None:
+    text = live()
+    follow(text, [{"type": "flush", "id": "a"}, {"type": "flush"}])
+    assert text.answers() == [{"type": "flushed", "id": "a"}]
+    follow(text, [*say("One. Two. Three. Four"), {"type": "flush", "id": "b"}, {"type": "cancel"}])
+    text.is_note({"type": "cancelled"})
+    text.is_note({"type": "said", "n": N_GIVEN})
+    assert text.answers() == []
+    follow(text, [*say("Five"), {"type": "flush", "id": "c"}])
+    assert text.answers() == []
+    text.is_note({"type": "said", "n": 1})
+    assert text.answers() == [{"type": "flushed", "id": "c"}]
+
+
+def test_a_flush_whose_sentence_is_refused_is_answered() -> None:
+    def count() -> None:
+        raise RefusedError(429, "rate_limited", "the key has used its requests")
+
+    text = live(count=count)
+    with pytest.raises(RefusedError, match="used its requests"):
+        follow(text, [*say("One"), {"type": "flush", "id": "a"}])
+    assert text.answers() == [{"type": "flushed", "id": "a"}]
+
+
+@pytest.mark.parametrize("name", [7, "x" * 65])
+def test_ids_of_flushes_are_short_texts(name: Any) -> None:
+    with pytest.raises(RefusedError, match="id must be a text of up to 64 characters"):
+        follow(live(), [{"type": "flush", "id": name}])

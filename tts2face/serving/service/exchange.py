@@ -16,7 +16,7 @@ from starlette.requests import ClientDisconnect
 
 from tts2face.serving.service.errors import RefusedError, error_body
 from tts2face.serving.service.logs import REQUEST_ID
-from tts2face.serving.service.page_addresses import is_page, page_headers
+from tts2face.serving.service.page_addresses import is_page, page_headers, subprotocol_of
 
 if TYPE_CHECKING:
     from tts2face.serving.service.keys import ApiKey
@@ -133,6 +133,7 @@ class Exchange:
                 raise ClientDisconnect  # who wants nothing more
         elif message["type"] == "websocket.accept":
             self.status = 101
+            message["subprotocol"] = message.get("subprotocol") or subprotocol_of(self.scope)
         elif message["type"] == "websocket.close":
             self._is_closed = True
         elif message["type"] == "http.response.body":

@@ -13,14 +13,18 @@ from tts2face.serving.service.exchange import CLIENT, PROBES, Exchange, Incoming
 from tts2face.serving.service.keys import NOBODY, ApiKey
 from tts2face.serving.service.origins import answer_headers, check_origin, preflight_headers
 from tts2face.serving.service.page_addresses import (
+    BROWSER,
+    BROWSER_FILES,
     LOGIN_PATH,
     RECORDINGS,
     REFERENCE,
+    REFERENCE_FILES,
     STYLES,
     TAKES,
     cookie_key,
     is_page,
     is_static,
+    subprotocol_key,
 )
 from tts2face.storage.files import is_disk_full
 
@@ -32,7 +36,7 @@ App = Callable[[Scope, Receive, Send], Awaitable[None]]
 RETRY_S = 30  # for clients, while a disk is full
 OPEN_PATHS = frozenset({
     *(PROBES - {"/metrics"}), "/openapi.json", REFERENCE,
-    *(f"{REFERENCE}/{name}" for name in ("swagger-ui-bundle.js", "swagger-ui.css", "start.js")),
+    *(f"{REFERENCE}/{name}" for name in REFERENCE_FILES), *(f"{BROWSER}/{name}" for name in BROWSER_FILES),
 })  # fmt: skip
 UNCOUNTED_PATHS = frozenset({*OPEN_PATHS, *PROBES, "/v1/hello"})
 VIDEO_PATH = "/v1/talkers/build"
@@ -146,7 +150,10 @@ class Guard:
         given = BEARER.sub("", request.headers.get(b"authorization", b"").decode("latin-1").strip())
         given = given or request.headers.get(b"x-api-key", b"").decode("latin-1")
         if not given and request.scope["type"] == "websocket":  # a browser cannot send headers with it
-            given = parse_qs(request.scope["query_string"].decode("latin-1")).get("key", [""])[0]
+            given = (
+                subprotocol_key(request.scope)
+                or parse_qs(request.scope["query_string"].decode("latin-1")).get("key", [""])[0]
+            )
         # pages of the studio have logged in by a cookie
         if not given and is_page(path):
             given = cookie_key(request.headers)

@@ -4,7 +4,7 @@ import asyncio
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, make_dataclass, replace
+from dataclasses import asdict, dataclass, make_dataclass, replace
 from typing import Any
 
 from lexicon.errors import DataError, InputError
@@ -31,6 +31,8 @@ REFUSED_S = 0.1  # for which a client that sends what is refused is not read fro
 
 MAX_AHEAD_S = 5.0  # by which a client's sound is read ahead of real time
 SAMPLE_BYTES, SAMPLE_RATES = 2, (8_000, 192_000)  # of sound, and its rates in Hz
+
+MAX_ID_CHARACTERS = 64  # of a flush
 
 _Given: Any = make_dataclass(
     "_Given", [(name, float | None, None) for name in ("size", "seconds", "down_deg", "left_deg")]
@@ -70,6 +72,14 @@ class Pace:
             await asyncio.sleep(ahead - MAX_AHEAD_S)
 
 
+@dataclass(slots=True)
+class _Flush:
+    """A flush that is answered, and the number of sentences before it that are not spoken yet."""
+
+    id: str
+    n_unsaid: int
+
+
 class LiveText:
     """The text of one stream.
 
@@ -97,6 +107,8 @@ class LiveText:
         self._n_characters, self._minute = 0, Bucket()
         self._sentences: deque[str] = deque()
         self._n_given, self._n_cancels = 0, 0
+        self._n_unsaid = 0  # sentences that have been queued, and neither been spoken nor been forgotten
+        self._flushes: list[_Flush] = []
         self._is_ended = False
         self._heard, self._block = (
             bytearray(),
@@ -128,15 +140,36 @@ class LiveText:
             case "style":
                 self._style(content.get("style"))
             case "flush":
-                self._queue(self._growing.flush())
+                self._flush(content.get("id"))
             case "end":
                 self._is_ended = True
                 self._queue(self._growing.flush())
             case _:
+                self._n_unsaid -= len(self._sentences)
                 self._sentences.clear()
+                self._flushes.clear()
                 self._growing.clear()
                 self._n_cancels += 1
                 self.inputs.put_nowait(({"type": "cancel", "arrived": time.monotonic()}, b""))
+
+    def _flush(self, name: Any) -> None:
+        """Speak what has come; a flush with an id is answered when that has been done."""
+        if name is not None and not (isinstance(name, str) and len(name) <= MAX_ID_CHARACTERS):
+            shown = format_value(name)
+            raise RefusedError(
+                400, "invalid_request", f"id must be a text of up to {MAX_ID_CHARACTERS} characters, not {shown}"
+            )
+        try:
+            self._queue(self._growing.flush())
+        finally:  # what is refused is not waited for
+            if name is not None:
+                self._flushes.append(_Flush(name, self._n_unsaid))
+
+    def answers(self) -> list[dict[str, str]]:
+        """Events for the client since the last call: ``flushed``, of each flush whose text has been spoken."""
+        done = [flush for flush in self._flushes if flush.n_unsaid <= 0]
+        self._flushes = self._flushes[len(done) :]
+        return [{"type": "flushed", "id": flush.id} for flush in done]
 
     def _listen(self, rate: Any) -> None:
         low, high = SAMPLE_RATES
@@ -195,6 +228,9 @@ class LiveText:
         """Follow an event of the task; whether it is for this object alone."""
         if event["type"] == "said":
             self._n_given -= event["n"]
+            self._n_unsaid -= event["n"]
+            for flush in self._flushes:
+                flush.n_unsaid -= event["n"]
         elif event["type"] == "cancelled":
             self._n_cancels -= 1
         self._give()
@@ -237,6 +273,7 @@ class LiveText:
                 message = f"{sentence[:40]!r} and what follows it in the message is not spoken: {refused.message}"
                 raise RefusedError(refused.status, refused.code, message) from refused
             self._sentences.append(sentence)
+            self._n_unsaid += 1
 
     def _give(self) -> None:
         """Give sentences to the task, and its end after the last one."""

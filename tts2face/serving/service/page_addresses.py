@@ -1,10 +1,16 @@
-"""The studio's pages in a browser: their addresses, headers that keep them within this service, and a cookie as key."""
+"""The studio's pages in a browser: their addresses, headers that keep them within this service, and their keys."""
 
 from collections.abc import Mapping
 from http.cookies import CookieError, SimpleCookie
+from typing import Any
 
 PAGES = "/studio"
-REFERENCE = "/docs"
+REFERENCE, BROWSER = "/docs", "/browser"
+REFERENCE_FILES = ("swagger-ui-bundle.js", "swagger-ui.css", "start.js")
+BROWSER_FILES = (  # of the element <tts2face-head>, which pages of other origins import
+    "tts2face-head.js", "live_head.js", "live_stream.js", "pushed_sound.js", "sound_clock.js", "curves.js",
+    "samples.js", "capture.js", "puppet.js",
+)  # fmt: skip
 RECORDINGS = f"{PAGES}/api/recordings"
 STYLES = f"{PAGES}/api/styles"
 TAKES = f"{PAGES}/api/takes"
@@ -28,6 +34,7 @@ STATIC_PATHS = (f"{PAGES}/_nicegui/", f"{PAGES}/_nicegui_ws/")  # libraries of a
 COOKIE = "tts2face_key"
 COOKIE_S = 30 * 86_400
 UPLOADS = f"{PAGES}/_nicegui/client/"
+SUBPROTOCOL = "tts2face"  # which a page offers with a WebSocket, beside the one that holds its key
 
 
 def is_static(path: str) -> bool:
@@ -56,6 +63,18 @@ def cookie_key(headers: Mapping[bytes, bytes]) -> str:
     except CookieError:
         return ""
     return cookies[COOKIE].value if COOKIE in cookies else ""
+
+
+def subprotocol_key(scope: Mapping[str, Any]) -> str:
+    """Key that a page sends with a WebSocket as a subprotocol, out of its address; empty if there is none."""
+    before = f"{SUBPROTOCOL}.key."
+    offered = (str(name) for name in scope.get("subprotocols", ()) if name.startswith(before))
+    return next(offered, "").removeprefix(before)
+
+
+def subprotocol_of(scope: Mapping[str, Any]) -> str | None:
+    """Subprotocol of a WebSocket: browsers close one of whose subprotocols none is chosen (RFC 6455, 4.1)."""
+    return SUBPROTOCOL if SUBPROTOCOL in scope.get("subprotocols", ()) else None
 
 
 def set_cookie(key: str, *, is_secure: bool) -> str:

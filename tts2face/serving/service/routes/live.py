@@ -156,15 +156,22 @@ async def _receive(connection: WebSocket, receiver: "LiveText | _Sound") -> bool
         try:
             content, samples = _read_message(await connection.receive(), is_sound=isinstance(receiver, _Sound))
             await receiver.receive(content, samples)
+            await _answer(connection, receiver)
         except WebSocketDisconnect:
             return False
         except RefusedError as wrong:
             await connection.send_json({"type": "error", "message": wrong.message})
+            await _answer(connection, receiver)
             # who sends what is refused is slowed down
             await asyncio.sleep(REFUSED_S)
             continue
         if content["type"] == "end":
             return True
+
+
+async def _answer(connection: WebSocket, receiver: "LiveText | _Sound") -> None:
+    for event in receiver.answers():
+        await connection.send_json(event)
 
 
 class _Sound:
@@ -180,6 +187,9 @@ class _Sound:
 
     def is_note(self, _: Mapping[str, Any]) -> bool:
         return False
+
+    def answers(self) -> list[dict[str, str]]:
+        return []
 
 
 def _read_message(message: Any, *, is_sound: bool) -> tuple[dict[str, Any], bytes]:
@@ -216,6 +226,8 @@ async def _send(connection: WebSocket, results: AsyncIterator[Message], receiver
                     await connection.send_bytes(message.payload)
                 elif not receiver.is_note(event):
                     await connection.send_json(event)
+                else:
+                    await _answer(connection, receiver)
         await connection.send_json({"type": "done"})
     except RefusedError as refused:
         await connection.send_json({"type": "error", "message": refused.message})
