@@ -132,8 +132,7 @@ class Exchange:
                 await self._send({"type": "http.response.body"})
                 raise ClientDisconnect  # who wants nothing more
         elif message["type"] == "websocket.accept":
-            self.status = 101
-            message["subprotocol"] = message.get("subprotocol") or subprotocol_of(self.scope)
+            self.status, message["subprotocol"] = 101, message.get("subprotocol") or subprotocol_of(self.scope)
         elif message["type"] == "websocket.close":
             self._is_closed = True
         elif message["type"] == "http.response.body":

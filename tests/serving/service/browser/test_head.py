@@ -121,8 +121,7 @@ def test_the_page_of_the_guide_speaks(window: tuple[Browser, RunningService, str
     opened, service, key = window
     page = (DOCS / "examples/talking_head.html").read_text(encoding="utf-8")
     assert page.count("http://localhost:8880") == 2
-    page = page.replace("http://localhost:8880", service.url).replace("</form>", '</form><script type="module">'
-        f"document.querySelector('tts2face-head').key = '{key}';</script>")  # fmt: skip
+    page = page.replace("http://localhost:8880", service.url).replace('face="ada"', f'face="ada" key="{key}"')
     (character / "index.html").write_text(page.replace("24rem", "8rem"), encoding="utf-8")
     opened.errors()
     opened.open(opened.address)
