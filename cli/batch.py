@@ -3,13 +3,26 @@
 import json
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
 from cli.batch_plan import place_of, print_plan
-from cli.flags import Face, Hair, HairColor, Person, add_option_flags, options_from_flags, switch, whole_number
+from cli.flags import (
+    Face,
+    Hair,
+    HairColor,
+    Person,
+    Sign,
+    TimeStamp,
+    add_option_flags,
+    open_signer,
+    options_from_flags,
+    switch,
+    whole_number,
+)
 from cli.process import WhatRemains, write_message
 from cli.progress import progress_bar
 from lexicon.errors import DataError, InputError
@@ -22,6 +35,7 @@ if TYPE_CHECKING:
     from tts2face.serving.batch.output import Plan
     from tts2face.serving.batch.run import BatchResult
     from tts2face.serving.batch.store import Store
+    from tts2face.storage.signing import Signer
 
 NOT_IN_BATCH = frozenset(
     {"text", "exports", "audio", "audio_map", "idle", "listen", "partner", "timeline", "expression"}
@@ -83,6 +97,8 @@ def batch(  # noqa: PLR0913 - one parameter a flag
         ),
     ] = None,
     priority: Annotated[int, whole_number("With --database: jobs with smaller numbers are taken first; from 1.")] = 10,
+    sign: Sign = None,
+    time_stamp: TimeStamp = None,
     dry_run: Annotated[
         bool, switch("Print speakers, rates, cuts, expected time and disk space; render nothing.")
     ] = False,
@@ -121,11 +137,12 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     from tts2face.serving.batch.store import open_store
 
     # absolute: workers of a database may run in other folders
+    signer = open_signer(sign, time_stamp, quiet=quiet)
     place = store if store is not None else str((out / SEGMENT_FOLDER).resolve())
     opened = open_store(place)
     engine = _open_engine(database, place, jobs, priority)
     try:
-        result = _run(plan, out, (opened, engine), is_json=progress == "json", quiet=quiet)
+        result = _run((plan, out, signer), (opened, engine), is_json=progress == "json", quiet=quiet)
     except KeyboardInterrupt as interrupt:
         interrupt.add_note(WhatRemains(f"what is finished is in {out}; the same command continues"))
         raise
@@ -164,14 +181,17 @@ def _open_engine(database: str | None, place: str, jobs: int, priority: int) -> 
     return DatabaseEngine(database, place, jobs, priority, write_message)
 
 
-def _run(plan: "Plan", out: Path, parts: "tuple[Store, Engine]", *, is_json: bool, quiet: bool) -> "BatchResult":
+def _run(
+    work: "tuple[Plan, Path, Signer | None]", parts: "tuple[Store, Engine]", *, is_json: bool, quiet: bool
+) -> "BatchResult":
     from tts2face.serving.batch.run import run_batch
 
-    store, engine = parts
-    if is_json:
-        return run_batch(plan, out, store=store, engine=engine, on_progress=_write_progress, on_output=_write_output)
-    with progress_bar("segments", quiet) as on_progress:
-        return run_batch(plan, out, store=store, engine=engine, on_progress=on_progress)
+    (plan, out, signer), (store, engine) = work, parts
+    with nullcontext(_write_progress) if is_json else progress_bar("segments", quiet) as on_progress:
+        return run_batch(
+            plan, out, store=store, engine=engine, on_progress=on_progress,
+            on_output=_write_output if is_json else None, signer=signer,
+        )  # fmt: skip
 
 
 def _write_progress(done: int, of: int) -> None:

@@ -88,7 +88,7 @@ def import_character(  # noqa: PLR0913 - one parameter a flag
     _write_preview(preview, imported.face)
     if sheet is not None:
         with progress_bar("drawing", quiet) as on_progress:
-            write_atomically(sheet, png_bytes(draw_import_sheet(imported, on_progress)))
+            write_atomically(sheet, png_bytes(draw_import_sheet(imported, on_progress), imported.face.mark))
     if write_landmarks is not None:
         write_atomically(write_landmarks, landmark_table(imported.report.landmarks).encode())
     if write_mapping is not None:
@@ -240,7 +240,7 @@ def show(
     loaded = load_face(name)
     with progress_bar("drawing", quiet) as on_progress:
         drawn = draw_preview(loaded) if landmarks else draw_contact_sheet(loaded, on_progress)
-    write_atomically(out, png_bytes(drawn))
+    write_atomically(out, png_bytes(drawn, loaded.mark))
     if not quiet:
         write_message(f"wrote {out}: {len(loaded.shape_names)} shapes")
 
@@ -271,7 +271,7 @@ def still(
     if shown is None:
         raise InputError("a talker's own face has no picture at rest; choose one of `tts2face faces`, or a .face file")
     drawn = draw(shown, picture=options)
-    write_atomically(out, png_bytes(drawn, shown.synthetic_notice))
+    write_atomically(out, png_bytes(drawn, shown.mark))
     if not quiet:
         write_message(f"wrote {out}: {drawn.shape[1]} x {drawn.shape[0]} pixels")
 
@@ -302,4 +302,4 @@ def _write_preview(preview: Path | None, made: "Face") -> None:
     from tts2face.storage.files import write_atomically
 
     if preview is not None:
-        write_atomically(preview, png_bytes(draw_preview(made)))
+        write_atomically(preview, png_bytes(draw_preview(made), made.mark))

@@ -2,6 +2,7 @@
 
 import difflib
 import inspect
+import os
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, Field
@@ -10,11 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from cyclopts import App, Group, Parameter
 
+from cli.process import write_message
 from lexicon.errors import InputError
 from tts2face.request import option_fields
+from tts2face.storage.signing import PASSWORD, Credentials
 
 if TYPE_CHECKING:
     from cyclopts import Token
+
+    from tts2face.storage.signing import Signer
 
 Number = TypeVar("Number", int, float)
 END_OF_OPTIONS = "--"  # everything after it is text or a path
@@ -48,6 +53,16 @@ Exports = Annotated[
         "several times if wanted.",
         negative="",
     ),
+]
+Sign = Annotated[
+    tuple[Path, Path] | None,
+    Parameter(
+        help="Sign the files (C2PA, extra [c2pa]) with this certificate and its key, both PEM; the password of an "
+        f"encrypted key stands in {PASSWORD}."
+    ),
+]
+TimeStamp = Annotated[
+    str | None, Parameter(help="With --sign: address of a time-stamp authority, which confirms the time of signing.")
 ]
 _SHORT_OPTION = re.compile(r"-[A-Za-z]")
 Cache = Annotated[Path | None, Parameter(help="Folder for intermediate results; by default the user's cache folder.")]
@@ -158,6 +173,18 @@ def check_options(app: App, arguments: Sequence[str]) -> None:
             raise InputError(
                 f"there is no option {name[:40]}; {hint}Put text that begins with a hyphen after {END_OF_OPTIONS}"
             )
+
+
+def open_signer(sign: tuple[Path, Path] | None, time_stamp: str | None, *, quiet: bool) -> "Signer | None":
+    """Who signs the files of a command, after a note on what happens when the certificate ends; None for nobody."""
+    if sign is None:
+        if time_stamp is not None:
+            raise InputError("--time-stamp belongs to a signature; add --sign CERTIFICATE KEY, or remove it")
+        return None
+    signer = Credentials(*sign, os.environ.get(PASSWORD, ""), time_stamp or "").open()
+    if signer.note and not quiet:
+        write_message(f"tts2face: note: {signer.note}")
+    return signer
 
 
 def join_values(app: App, arguments: Sequence[str]) -> list[str]:

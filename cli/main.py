@@ -15,9 +15,12 @@ from cli.flags import (
     HairColor,
     Out,
     Person,
+    Sign,
+    TimeStamp,
     add_option_flags,
     check_options,
     join_values,
+    open_signer,
     options_from_flags,
     switch,
 )
@@ -87,6 +90,7 @@ app.command("cli.serve:keys")
 app.command("cli.corpus:corpus")
 app.command("cli.report:report")
 app.command("cli.face:face")
+app.command("cli.inspect:inspect")
 app.command("cli.voices:voices")
 for list_command in LISTS:
     app.command(list_command)
@@ -166,6 +170,8 @@ def speak(  # noqa: PLR0913 - one parameter a flag
         Path | None, Parameter(help="Write the recorded phones used for each phone (.json or .txt).")
     ] = None,
     view: Annotated[bool, switch("Show the head in a window (extra [view]).")] = False,
+    sign: Sign = None,
+    time_stamp: TimeStamp = None,
     quiet: Annotated[bool, switch("Print no progress bar and no summary.")] = False,
     noise: Annotated[bool, switch("Short for --gestures noise.")] = False,
     no_gestures: Annotated[bool, switch("Short for --gestures none.")] = False,
@@ -205,6 +211,7 @@ def speak(  # noqa: PLR0913 - one parameter a flag
         quiet,
         file,
         tuple(export or ()),
+        signer=open_signer(sign, time_stamp, quiet=quiet),
     ).with_export_of_out()
     run_request(request, picture, speak_options)
 

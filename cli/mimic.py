@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from cli.flags import Exports, Face, Hair, HairColor, Model, Out, switch
+from cli.flags import Exports, Face, Hair, HairColor, Model, Out, Sign, TimeStamp, open_signer, switch
 from cli.photo import Yes
 from cli.process import write_message
 from cli.progress import stage_bar
@@ -59,6 +59,8 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     ] = "auto",
     background: Annotated[str, Parameter(help="studio, transparent, blur, a colour, or an image file.")] = "studio",
     model: Model = None,
+    sign: Sign = None,
+    time_stamp: TimeStamp = None,
     yes: Yes = False,
     quiet: Annotated[bool, switch("Print no progress bar and no summary.")] = False,
 ) -> None:
@@ -88,7 +90,8 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     performance = Performance(
         take=take, gain=gain, fps=fps, audio=audio, take_fps=take_fps, append_missing=append_missing, model=model
     )
-    session = models.open_session()
+    signer = open_signer(sign, time_stamp, quiet=quiet)
+    session = models.open_session() if signer is None else models.open_session().signed_by(signer)
     picture = Picture(size=size, background=background)
     with stage_bar(quiet) as stages:
         written = session.write_performance(performance, out, picture=picture, exports=exports, stages=stages)

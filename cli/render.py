@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from cli.flags import Exports, Face, Hair, HairColor, Out, switch
+from cli.flags import Exports, Face, Hair, HairColor, Out, Sign, TimeStamp, open_signer, switch
 from cli.process import write_message
 from cli.speak import SpeakOptions, run_prepared
 
@@ -23,6 +23,8 @@ def render(  # noqa: PLR0913 - one parameter a flag
     explain: Annotated[
         Path | None, Parameter(help="File (.json or .txt) that lists the recorded tokens used for each phone.")
     ] = None,
+    sign: Sign = None,
+    time_stamp: TimeStamp = None,
     quiet: Annotated[bool, switch("Print neither progress nor summary.")] = False,
 ) -> None:
     """Render a project: the same motion as the studio shows."""
@@ -33,8 +35,9 @@ def render(  # noqa: PLR0913 - one parameter a flag
         name: value for name, value in (("size", size), ("quality", quality)) if value is not None
     }
     options = SpeakOptions(
-        out, content.models, explain, view=False, quiet=quiet, file=project, exports=tuple(export or ())
-    )
+        out, content.models, explain, view=False, quiet=quiet, file=project, exports=tuple(export or ()),
+        signer=open_signer(sign, time_stamp, quiet=quiet),
+    )  # fmt: skip
     run_prepared(content.prepare(), replace(content.picture, **chosen), options.with_export_of_out())
 
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from tts2face.session.speech_stream import Piece
     from tts2face.sound.alignment import TextMismatch
     from tts2face.sound.voice_pool import VoicePool
+    from tts2face.storage.signing import Signer
     from tts2face.types import Progress
 
 EXPLANATION_SUFFIXES = (".json", ".txt")
@@ -47,6 +48,7 @@ class SpeakOptions:
     file: Path | None = None
     exports: tuple[str, ...] = ()
     out_is_export: bool = False  # then it is the first of the exports
+    signer: "Signer | None" = None
 
     def with_export_of_out(self) -> "SpeakOptions":
         """The same options, with an output in an export format as an export."""
@@ -200,7 +202,9 @@ def _write_speech(prepared: "PreparedRequest", picture: Picture, options: SpeakO
     if not is_speech_only(prepared, outputs):
         return False
     person, seeded = options.models.shown_person(), prepared.with_seed(seed_of(options.models.description()))
-    _report_writing(lambda on_progress: write_speech(seeded, outputs, voices, on_progress, person), options)
+    _report_writing(
+        lambda on_progress: write_speech(seeded, outputs, voices, on_progress, person, options.signer), options
+    )
     return True
 
 
@@ -249,7 +253,8 @@ def _open_session(options: SpeakOptions, voices: "VoicePool") -> "Session":
 
     if options.out is not None:
         check_output(options.out)
-    return open_session(options.models, voices, draws=options.out is not None or options.view)
+    session = open_session(options.models, voices, draws=options.out is not None or options.view)
+    return session if options.signer is None else session.signed_by(options.signer)
 
 
 def open_session(models: Models, voices: "VoicePool | None" = None, *, draws: bool) -> "Session":

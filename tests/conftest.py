@@ -2,6 +2,7 @@
 
 import os
 
+os.environ.setdefault("SOURCE_DATE_EPOCH", "1796000000")  # the day in files: equal runs give equal bytes
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the processes of a run share the cores; numpy reads it when loaded
 
 import gc

@@ -198,7 +198,8 @@ def resting_head(n_frames: int, fps: float) -> Trajectory:
 class Speech:
     """Synthesised or recorded speech: sound with its phones and words.
 
-    ``phones`` starts at 0 s and ends at the duration of the sound, exact to half a sample.
+    ``phones`` starts at 0 s and ends at the duration of the sound, exact to half a sample. ``is_recorded``: the
+    sound is that of a recording, which files say.
 
     Raises
     ------
@@ -209,6 +210,7 @@ class Speech:
     waveform: Waveform
     phones: PhoneSequence
     words: tuple[WordSpan, ...]
+    is_recorded: bool = False
 
     def __post_init__(self) -> None:
         """Reject other types, phones that do not cover the sound exactly, and words beyond the phones."""
@@ -286,7 +288,8 @@ def concatenate_speech(parts: Sequence[Speech]) -> Speech:
     samples = np.concatenate([part.waveform.samples for part in parts])
     edges = phones.edges.copy()
     edges[-1] = len(samples) / rate
-    return Speech(Waveform(samples, rate), PhoneSequence(phones.phones, edges), words)
+    is_recorded = any(part.is_recorded for part in parts)
+    return Speech(Waveform(samples, rate), PhoneSequence(phones.phones, edges), words, is_recorded)
 
 
 def concatenate_clips(clips: Sequence[Clip]) -> Clip:

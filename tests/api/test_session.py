@@ -11,6 +11,7 @@ from PIL import Image
 import tts2face
 from lexicon.errors import InputError
 from tests.golden.requests import with_pictures
+from tests.walkers import unmarked
 from tests.world import World
 from tts2face.session.performance import Performance
 from tts2face.sound.voice_pool import VoicePool
@@ -48,7 +49,7 @@ def test_what_a_session_returns_can_be_drawn(
     session.write("" if "idle" in options else "Bob may.", tmp_path / "at_once", picture=SMALL, **options)
     again, at_once = (sorted((tmp_path / name).glob("*.png")) for name in ("again", "at_once"))
     assert len(again) == len(clip.motion)
-    assert [path.read_bytes() for path in again] == [path.read_bytes() for path in at_once]
+    assert [*map(unmarked, again)] == [*map(unmarked, at_once)]  # a clip alone does not know its text
 
 
 def test_speech_is_synthesised_while_the_renderer_is_built(

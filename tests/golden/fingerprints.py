@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from tests.walkers import unmarked
 from tts2face.types import Clip
 
 KEPT = Path(__file__).with_name("requests.json")
@@ -47,13 +48,13 @@ def of_clips(clips: Sequence[Clip]) -> Fingerprint:
 
 
 def of_pictures(folder: Path) -> Fingerprint:
-    """The PNG files of a folder."""
-    return {"pictures": hashed(*(path.read_bytes() for path in sorted(folder.glob("*.png"))))}
+    """The PNG files of a folder, without their marks."""
+    return {"pictures": hashed(*map(unmarked, sorted(folder.glob("*.png"))))}
 
 
 def of_files(paths: Iterable[Path]) -> Fingerprint:
-    """Files one by one, by name."""
-    return {"files": {path.name: hashed(path.read_bytes()) for path in sorted(paths)}}
+    """Files one by one, by name, without their marks."""
+    return {"files": {path.name: hashed(unmarked(path)) for path in sorted(paths)}}
 
 
 def environment() -> dict[str, str]:

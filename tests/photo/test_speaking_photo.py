@@ -158,7 +158,7 @@ def test_a_file_keeps_the_face(face: Face, renderer: MeshRenderer, tmp_path: Pat
     assert path.stat().st_size < 2_000_000
     kept = read_face(path)
     assert kept.metadata == face.metadata
-    assert "photograph of Ada" in kept.synthetic_notice
+    assert "photograph of Ada" in kept.mark.notice
     pose = {"jawOpen": 0.4, "eyeBlinkLeft": 0.5, "mouthSmileLeft": 0.3}
     again = mesh_renderer(kept, Picture())
     apart = np.abs(drawn(again, **pose).astype(int) - drawn(renderer, **pose))

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from tests.packages import package
 from tests.picture.bursts import BURSTS_S, MOVIES, SECONDS, STREAMED, TOLERANCE_S, encoded, encoded_movie, onsets
-from tts2face.picture import sound_stream
 from tts2face.picture.sound_stream import PCM_RATE, SOUND_KINDS
+from tts2face.storage import wave_files
 
 pytestmark = pytest.mark.formats
 
@@ -77,6 +77,6 @@ def test_pictures_and_sound_of_a_movie_begin_together(name: str, fps: Fraction, 
 def test_a_wave_file_that_is_too_long_is_refused_with_the_reason(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sound_stream, "UNKNOWN_BYTES", 60_000)
+    monkeypatch.setattr(wave_files, "MOST_BYTES", 60_000)
     with pytest.raises(InputError, match="at most 4 GB"):
         encoded("wav", 24_000, tmp_path / "long.wav")

@@ -14,6 +14,7 @@ from tts2face.models.light import Lamps, Light, Photographed
 from tts2face.models.mesh_coding import TANGENTS, UV
 from tts2face.models.score_map import ScoreMap
 from tts2face.numeric.arrays import make_read_only
+from tts2face.storage.marks import Mark
 from tts2face.storage.schema import Tensor, millimetres
 
 PART_KINDS = ("plain", "skin", "eye", "strands")
@@ -170,9 +171,11 @@ class Face(StoredModel):
     light: Light = field(default_factory=Lamps)
 
     @property
-    def synthetic_notice(self) -> str:
-        """Comment for files that show the face; empty unless it is the likeness of a real person, or a photograph."""
-        return self.light.notice(self.metadata.get("name", "a person"), is_of_person="consent" in self.metadata)
+    def mark(self) -> Mark:
+        """Mark of files that show the face."""
+        is_of_person = "consent" in self.metadata
+        unnamed = "a person" if is_of_person or self.light.is_flat else ""
+        return self.light.mark(str(self.metadata.get("name") or unnamed), is_of_person=is_of_person)
 
     @property
     def opening(self) -> int | None:

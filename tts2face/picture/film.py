@@ -16,8 +16,10 @@ from tts2face.picture.frame_renderer import FrameRenderer
 from tts2face.picture.gif import GifWriter
 from tts2face.picture.movie import MKV_MOVIE, MOV_MOVIE, MP4_MOVIE, WEBM_MOVIE, MovieWriter
 from tts2face.picture.png_folder import PngFolderWriter, is_png_folder
-from tts2face.storage.files import translate_disk_errors
+from tts2face.storage.files import translate_disk_errors, write_atomically
+from tts2face.storage.marks import UNKNOWN, Making, Mark, sound_mark
 from tts2face.storage.output_paths import MOVIE_SUFFIXES, check_name
+from tts2face.storage.signing import SIDECAR_SUFFIX
 from tts2face.storage.temporary import Temporary
 from tts2face.types import Clip, Progress, exact_rate, ignore_progress
 
@@ -45,6 +47,8 @@ class ClipWriter:
         Kind of the file, for a path with another suffix; None: that of its suffix.
     on_progress
         Called with the number of frames written and the number of frames added so far.
+    making
+        What the request adds to the mark of the file.
 
     Raises
     ------
@@ -68,7 +72,9 @@ class ClipWriter:
         *,
         kind: str | None = None,
         on_progress: Progress | None = None,
+        making: Making = UNKNOWN,
     ) -> None:
+        self._making, self._mark = making, renderer.mark
         self.path, self._kind = check_output(path), kind or output_kind(path)
         if self._kind in OPAQUE and renderer.picture.is_transparent:
             raise InputError(f"{self.path} cannot be transparent; give .webm, .gif or a folder, or another background")
@@ -125,21 +131,17 @@ class ClipWriter:
             raise InputError("ClipWriter writes only within a with statement; open it as `with ClipWriter(...)`")
         fps = exact_rate(clip.fps)
         rate = clip.speech.waveform.rate
-        picture = self._renderer.picture
+        picture, is_recorded = self._renderer.picture, clip.speech.is_recorded
+        mark = self._mark = self._renderer.mark.of(self._making, is_recorded=is_recorded)
         if self._kind == FOLDER:
-            return PngFolderWriter(self._temporary.path, rate, self._renderer.notice)
+            sound = sound_mark(self._making, is_recorded=is_recorded)
+            return PngFolderWriter(self._temporary.path, rate, mark, sound)
         if self._kind == GIF:
             frames = np.linspace(0, len(clip.motion) - 1, N_SWATCHES).astype(int)
             pictures = [self._renderer.frame(clip, int(i)) for i in frames]
-            return GifWriter(self._temporary.path, pictures, fps, self._renderer.notice)
+            return GifWriter(self._temporary.path, pictures, fps, mark)
         shape = (picture.height, picture.width, picture.channels)
-        return MovieWriter(
-            self._temporary.path,
-            _MOVIES[self._kind],
-            shape,
-            (fps, rate),
-            self._renderer.notice,
-        )
+        return MovieWriter(self._temporary.path, _MOVIES[self._kind], shape, (fps, rate), mark)
 
     def _complete(self) -> None:
         if self._encoder is None or self._temporary is None:
@@ -147,7 +149,7 @@ class ClipWriter:
         with translate_disk_errors(self.path):
             self._encoder.finish()
         self._encoder = None
-        move_into_place(self._temporary, self.path)
+        move_signed(self._temporary, self.path, self._mark)
         self._temporary = None
 
     def _clear(self) -> None:
@@ -217,13 +219,25 @@ def make_temporary(path: Path, kind: str) -> Temporary:
         return Temporary(path, is_folder=kind == FOLDER)
 
 
-def move_into_place(temporary: Temporary, path: Path) -> None:
-    """Rename a temporary file or folder to `path`, replacing what exists there.
+def move_signed(temporary: Temporary, path: Path, mark: Mark | None) -> None:
+    """Rename a complete temporary file to `path`, with the manifest beside it of a signed format that holds none.
 
     Raises
     ------
     BackendError
-        The folder cannot be written.
+        The folder cannot be written, or the file cannot be signed.
     """
+    signer = None if mark is None or path.suffix.lower() != WEBM else mark.signer
+    if signer is None or mark is None:
+        return move_into_place(temporary, path)
+    manifest = signer.sidecar(temporary.path, "webm", mark)
+    move_into_place(temporary, path)
+    with translate_disk_errors(path):
+        write_atomically(path.with_suffix(SIDECAR_SUFFIX), manifest)
+    return None
+
+
+def move_into_place(temporary: Temporary, path: Path) -> None:
+    """Rename a temporary file or folder to `path`, replacing what exists there."""
     with translate_disk_errors(path):
         temporary.replace(path)

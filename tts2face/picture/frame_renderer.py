@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.picture.options import Picture
+from tts2face.storage.marks import Mark
 from tts2face.types import Clip
 
 
@@ -21,8 +22,8 @@ class FrameRenderer(Protocol):
         """Drawing options of the frames."""
 
     @property
-    def notice(self) -> str:
-        """Comment for every file with these frames; empty unless they show a real person."""
+    def mark(self) -> Mark:
+        """Mark of every file with these frames."""
 
     def frames(
         self, clip: Clip, numbers: Iterable[int] | None = None, *, threads: int | None = None, first: int = 0

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.storage.marks import Mark, complete
+
 TICKS_PER_SECOND = 100  # ticks of a GIF's clock per second
 MIN_TICKS = 2  # browsers play shorter delays as 0.1 s
 COLOUR_BITS = 6  # bits of each channel in the colour lookup table
@@ -21,11 +23,13 @@ OPAQUE_COVERAGE = 128  # least coverage of an opaque pixel
 class GifWriter:
     """Sink that writes a GIF."""
 
-    def __init__(self, path: Path, swatches: Sequence[NDArray[np.uint8]], fps: Fraction, notice: str = "") -> None:
-        """Open a file with the comment `notice`; the palette is computed from the pictures `swatches`."""
+    def __init__(
+        self, path: Path, swatches: Sequence[NDArray[np.uint8]], fps: Fraction, mark: Mark | None = None
+    ) -> None:
+        """Open a file with a mark; the palette is computed from the pictures `swatches`."""
         import av
 
-        self._path, self._notice = path, notice
+        self._path, self._mark = path, mark
         self._fps = fps
         self._n_frames = 0
         self._last = -MIN_TICKS
@@ -68,23 +72,11 @@ class GifWriter:
         """Flush the encoder and close the file."""
         self._container.mux(self._video.encode(None))
         self._container.close()
-        if self._notice:
-            _write_comment(self._path, self._notice)
+        complete(self._path, "gif", self._mark)  # the muxer writes no comments
 
     def abandon(self) -> None:
         """Close the file without completing it."""
         self._container.close()
-
-
-def _write_comment(path: Path, notice: str) -> None:
-    """Insert a comment (GIF89a, section 24) before the trailer byte of a file; the muxer writes no comments."""
-    # a block of a GIF has at most 255 bytes
-    comment = notice.encode("ascii", "replace")[:255]
-    with path.open("r+b") as file:
-        file.seek(-1, 2)
-        trailer = file.read(1)
-        file.seek(-1, 2)
-        file.write(b"\x21\xfe" + bytes([len(comment)]) + comment + b"\x00" + trailer)
 
 
 def _colour_table(swatches: Sequence[NDArray[np.uint8]], n_colours: int) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.picture.provenance import append_to_mp4
 from tts2face.picture.write_buffer import WriteBuffer
+from tts2face.storage.marks import Mark, complete, container_tags, xmp_box
 from tts2face.types import SOUND_RATE
 
 BT709, LIMITED_RANGE = 1, 1  # H.273 code points: primaries, transfer and matrix of BT.709; studio range
@@ -127,11 +127,11 @@ class MovieWriter:
         kind: MovieKind,
         shape: tuple[int, ...],
         clock: tuple[Fraction, int],
-        notice: str = "",
+        mark: Mark | None = None,
     ) -> None:
         """Open a file, a stream, or the URL of a server, for pictures of `shape` (H, W, 3 or 4) at `clock` (fps, Hz).
 
-        `notice` becomes the comment in its metadata, and in MP4 an XMP packet.
+        `mark` becomes tags of the container, and in MP4 the last box.
         """
         import av
         from av.video.reformatter import VideoReformatter
@@ -139,15 +139,15 @@ class MovieWriter:
         self._reformatter = VideoReformatter()  # one for all pictures: making one takes as long as a conversion
         self._has_alpha = shape[2] == 4
         self._fps, self._rate = clock
-        self._path, self._notice = path, notice if kind.container == "mp4" else ""
+        self._path, self._mark = path, mark
+        self._format = kind.container
         self._layout = kind.audio_layout
         fps = self._fps
         self.n_frames = self._n_samples = 0
         self._fill_colour: NDArray[np.uint8] | None = None
         target = str(path) if isinstance(path, Path) else path
         self._container: Any = av.open(target, "w", format=kind.container, options=dict(kind.container_options))
-        if notice:
-            self._container.metadata["comment"] = notice
+        self._container.metadata.update(container_tags(kind.container, mark))
         video: Any = self._container.add_stream(kind.video, rate=fps, options=dict(kind.video_options))
         video.width, video.height = shape[1], shape[0]
         video.pix_fmt = "yuva420p" if self._has_alpha else "yuv420p"
@@ -218,8 +218,10 @@ class MovieWriter:
         mux_pictures(self._container, self._video.encode(None), self._audio)
         self._container.mux(self._audio.encode(None))
         self._container.close()
-        if not isinstance(self._path, str):
-            append_to_mp4(self._path, self._notice)
+        if isinstance(self._path, Path):
+            complete(self._path, self._format, self._mark)
+        elif isinstance(self._path, WriteBuffer) and self._format == "mp4" and self._mark is not None:
+            self._path.write(xmp_box(self._mark))
 
     def abandon(self) -> None:
         """Close the file without completing it."""

@@ -16,7 +16,7 @@ from lexicon.errors import InputError
 from tts2face.face.own_face import OwnFaceGestures
 from tts2face.models.appearance import Appearance, nearest_pixels
 from tts2face.models.landmarks import FACE_OVAL
-from tts2face.models.light import SYNTHETIC_NOTICE
+from tts2face.models.light import person_mark
 from tts2face.models.talker import ShapeModel, Talker
 from tts2face.numeric.arrays import Float32Array
 from tts2face.picture.kernels.warps import warp_image
@@ -29,6 +29,7 @@ from tts2face.picture.plate import (
     texture_samples,
 )
 from tts2face.processes.threads import map_in_order
+from tts2face.storage.marks import Mark
 from tts2face.types import Clip
 
 MOUTH_SUPERSAMPLING = 3  # samples along a pixel's side around the mouth, where the edge of the lips is drawn
@@ -73,9 +74,9 @@ class OwnFaceRenderer:
     n_returning: int | None = None
 
     @property
-    def notice(self) -> str:
-        """Comment for every written file: the talker's name and that the frames are synthetic."""
-        return SYNTHETIC_NOTICE.format(name=self.name)
+    def mark(self) -> Mark:
+        """Mark of every written file: the talker's name and that the frames are synthetic."""
+        return person_mark(self.name)
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.picture.provenance import png_labels
-from tts2face.storage.wave_files import open_wave, pcm_bytes
+from tts2face.storage.marks import Mark, complete, png_labels
+from tts2face.storage.wave_files import WaveFile
 
 SOUND_NAME = "sound.wav"
 # nine hours at 30 frames a second
@@ -17,10 +17,10 @@ COMPRESSION = 3  # zlib level: twice as fast as the default 6, 4 % larger
 class PngFolderWriter:
     """Sink that writes pictures to a folder."""
 
-    def __init__(self, folder: Path, sound_rate: int, notice: str = "") -> None:
-        """Open an existing folder; `notice` becomes the comment and an XMP packet of every picture."""
-        self._folder, self._n_frames, self._labels = folder, 0, png_labels(notice)
-        self._sound = open_wave(str(folder / SOUND_NAME), sound_rate)
+    def __init__(self, folder: Path, sound_rate: int, mark: Mark, sound_mark: Mark | None) -> None:
+        """Open an existing folder; `mark` is that of every picture, and `sound_mark` that of the sound."""
+        self._folder, self._n_frames, self._mark, self._labels = folder, 0, mark, png_labels(mark)
+        self._sound = WaveFile(folder / SOUND_NAME, sound_rate, sound_mark)
 
     def picture(self, pixels: NDArray[np.uint8]) -> None:
         """Write one picture (H, W, 3 or 4)."""
@@ -28,11 +28,12 @@ class PngFolderWriter:
 
         path = self._folder / f"{self._n_frames:0{NUMBER_DIGITS}d}.png"
         Image.fromarray(pixels).save(path, compress_level=COMPRESSION, pnginfo=self._labels)
+        complete(path, "png", self._mark)
         self._n_frames += 1
 
     def sound(self, samples: NDArray[np.float32]) -> None:
         """Append mono samples (n,) in [-1, 1] as 16-bit integers."""
-        self._sound.writeframes(pcm_bytes(samples))
+        self._sound.write(samples)
 
     def finish(self) -> None:
         """Complete the sound file."""

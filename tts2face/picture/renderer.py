@@ -18,6 +18,7 @@ from tts2face.picture.frame_renderer import FrameRenderer
 from tts2face.picture.options import STANDARD, STUDIO, Picture
 from tts2face.picture.scene import Scene, build_scene, draw_background
 from tts2face.processes.threads import map_in_order
+from tts2face.storage.marks import Mark
 from tts2face.types import Clip
 
 LABEL_TEXT = "synthetic"
@@ -42,9 +43,9 @@ class MeshRenderer:
         return self.scene.picture
 
     @property
-    def notice(self) -> str:
-        """Comment for every written file; empty unless the face is the likeness of a real person."""
-        return self.scene.face.synthetic_notice
+    def mark(self) -> Mark:
+        """Mark of every written file."""
+        return self.scene.face.mark
 
     def frames(
         self, clip: Clip, numbers: Iterable[int] | None = None, *, threads: int | None = None, first: int = 0
@@ -192,9 +193,9 @@ class MarkedRenderer:
         return self.renderer.picture
 
     @property
-    def notice(self) -> str:
-        """Comment for every file with these frames."""
-        return self.renderer.notice
+    def mark(self) -> Mark:
+        """Mark of every file with these frames."""
+        return self.renderer.mark
 
     def frames(
         self, clip: Clip, numbers: Iterable[int] | None = None, *, threads: int | None = None, first: int = 0

@@ -1,22 +1,20 @@
 """Encoded sound, sent while it is made or written as a complete file."""
 
-import struct
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from tts2face.picture.write_buffer import WriteBuffer
-from tts2face.storage.wave_files import pcm_bytes
+from tts2face.storage.marks import MARK_OPTIONS, Mark, complete, container_tags
+from tts2face.storage.wave_files import WaveFile, pcm_bytes, wave_head
 from tts2face.types import Chunk, Waveform
 
-UNKNOWN_BYTES = 0xFFFFFFFF  # size of a WAV file that is not yet known; players read to the end of the stream
-HEAD_BYTES = 44  # of a WAV file, before its samples
 OPUS_RATE = 48_000  # Hz
 PCM_RATE = 24_000  # Hz of samples without a header, whatever the voice: what OpenAI's and HeadTTS' clients play
 BLOCK_S = 0.5  # of sound that a codec encodes at a time; a sentence takes up to 0.2 s
@@ -66,7 +64,9 @@ _CONTAINER_OPTIONS = {"ogg": _NO_RANDOM_IDS, "webm": _NO_RANDOM_IDS}
 _STREAM_OPTIONS = {"webm": {"live": "1", "cluster_time_limit": "200"}}
 
 
-def encode_sound(sounds: Iterator[Waveform], format: str, path: Path | None = None) -> Iterator[Chunk]:
+def encode_sound(
+    sounds: Iterator[Waveform], format: str, path: Path | None = None, mark: Mark | None = None
+) -> Iterator[Chunk]:
     """Encode consecutive mono sounds of one sample rate as a file; yields its chunks in order.
 
     Parameters
@@ -75,6 +75,8 @@ def encode_sound(sounds: Iterator[Waveform], format: str, path: Path | None = No
         One of `SOUND_KINDS`; ``wav`` and ``pcm`` have 16 bits, ``pcm`` has no header and `PCM_RATE`.
     path
         Where a complete file is written, whose header has its length; chunks are empty then.
+    mark
+        What the file says of its making; ``pcm`` has no place for it.
 
     Raises
     ------
@@ -90,7 +92,7 @@ def encode_sound(sounds: Iterator[Waveform], format: str, path: Path | None = No
         for sound in sounds:
             if encoder is None:
                 rate = sound.rate
-                encoder = _CodecEncoder(kind, rate, path) if kind.codec else _PcmEncoder(kind, rate, path)
+                encoder = (_CodecEncoder if kind.codec else _PcmEncoder)(kind, rate, path, mark)
             if sound.rate != rate:
                 raise InputError(f"sounds of one file must share the sample rate {rate} Hz; one has {sound.rate} Hz")
             for block in _blocks(sound) if kind.codec else [sound]:
@@ -109,31 +111,20 @@ def _blocks(sound: Waveform) -> Iterator[Waveform]:
         yield sound.part(start, start + size)
 
 
-def wav_header(rate: int, n_bytes: int | None) -> bytes:
-    """Header of a mono 16-bit WAV file; `n_bytes` of samples, or None if not yet known (RIFF, Microsoft 1991)."""
-    size = UNKNOWN_BYTES if n_bytes is None else n_bytes
-    # the head without its first eight bytes, and the samples
-    riff = UNKNOWN_BYTES if n_bytes is None else n_bytes + 36
-    return b"".join((
-        struct.pack("<4sI4s", b"RIFF", riff, b"WAVE"),
-        struct.pack("<4sIHHIIHH", b"fmt ", 16, 1, 1, rate, 2 * rate, 2, 16),
-        struct.pack("<4sI", b"data", size),
-    ))  # fmt: skip
-
-
 class _PcmEncoder:
     """Encoder without compression; a kind with a rate of its own has no header."""
 
-    def __init__(self, kind: SoundKind, rate: int, path: Path | None) -> None:
-        self._rate, self._n_bytes = kind.rate or rate, 0
-        self._has_header = kind.rate is None
+    def __init__(self, kind: SoundKind, rate: int, path: Path | None, mark: Mark | None) -> None:
+        self._rate, has_header = kind.rate or rate, kind.rate is None
         self._resampler: Any = None
         if self._rate != rate:
             import soxr
 
             self._resampler = soxr.ResampleStream(rate, self._rate, 1, dtype="float32")
-        self._file = None if path is None else path.open("wb")
-        self._header = wav_header(self._rate, None) if self._has_header else b""
+        self._file: WaveFile | BinaryIO | None = None
+        if path is not None:
+            self._file = WaveFile(path, self._rate, mark) if has_header else path.open("wb")
+        self._header = wave_head(self._rate, None, mark) if has_header and path is None else b""
 
     def add(self, sound: Waveform) -> bytes:
         samples = sound.samples
@@ -144,36 +135,36 @@ class _PcmEncoder:
         if self._resampler is not None:
             rest = self._written(self._resampler.resample_chunk(np.zeros(0, np.float32), last=True))
         if self._file is not None:
-            if self._has_header:
-                self._file.seek(0)
-                self._file.write(wav_header(self._rate, self._n_bytes))
             self._file.close()
         return rest
 
     def _written(self, samples: NDArray[np.float32]) -> bytes:
         content = pcm_bytes(samples.clip(-1.0, 1.0))
-        # the size has 32 bits
-        if self._file is not None and self._has_header and self._n_bytes + len(content) > UNKNOWN_BYTES - HEAD_BYTES:
-            raise InputError("a .wav file has at most 4 GB of sound; choose flac, or divide the text")
-        self._n_bytes += len(content)
-        content, self._header = self._header + content, b""
         if self._file is None:
+            content, self._header = self._header + content, b""
             return content
-        self._file.write(content)
+        if isinstance(self._file, WaveFile):
+            self._file.write_pcm(content)
+        else:
+            self._file.write(content)
         return b""
 
 
 class _CodecEncoder:
     """Encoder with a codec of FFmpeg."""
 
-    def __init__(self, kind: SoundKind, rate: int, path: Path | None) -> None:
+    def __init__(self, kind: SoundKind, rate: int, path: Path | None, mark: Mark | None) -> None:
         import av
 
         self._buffer, self._rate, self._n_samples = WriteBuffer(), rate, 0
-        options, target = _CONTAINER_OPTIONS.get(kind.container, {}), self._buffer if path is None else str(path)
+        self._path, self._mark = path, mark
+        self._format = kind.container
+        target = self._buffer if path is None else str(path)
+        options = {**_CONTAINER_OPTIONS.get(kind.container, {}), **MARK_OPTIONS.get(kind.container, {})}
         if path is None:
             options = {"flush_packets": "1"} | options | _STREAM_OPTIONS.get(kind.container, {})
         self._container: Any = av.open(target, "w", format=kind.container, options=options)
+        self._container.metadata.update(container_tags(kind.container, mark))
         self._stream: Any = self._container.add_stream(kind.codec, rate=kind.rate or rate, layout="mono")
         if kind.bits:
             self._stream.codec_context.bit_rate = kind.bits
@@ -189,6 +180,8 @@ class _CodecEncoder:
     def finish(self) -> bytes:
         self._mux(self._stream.encode(None))
         self._container.close()
+        if self._path is not None:
+            complete(self._path, self._format, self._mark)
         return self._buffer.take()
 
     def _encode(self, samples: NDArray[np.float32]) -> None:

@@ -11,6 +11,7 @@ from tts2face.picture.movie import MP4_MOVIE, STREAMED_MP4, STREAMED_WEBM, WEBM_
 from tts2face.picture.options import Picture
 from tts2face.picture.pace import Pace
 from tts2face.picture.write_buffer import WriteBuffer
+from tts2face.storage.marks import UNKNOWN, Making
 from tts2face.types import Chunk, Clip, exact_rate
 
 
@@ -30,9 +31,9 @@ MOVIE_KINDS = {
 }
 
 
-def encode_movie(
+def encode_movie(  # noqa: PLR0913 - what a stream chooses
     clips: Iterable[Clip], renderer: FrameRenderer, format: str, *, threads: int | None = None,
-    pace: Pace | None = None, path: Path | None = None,
+    pace: Pace | None = None, path: Path | None = None, making: Making = UNKNOWN,
 ) -> Iterator[Chunk]:  # fmt: skip
     """Draw and encode consecutive clips; yields a chunk of the movie after each frame.
 
@@ -46,6 +47,8 @@ def encode_movie(
         As for `ClipFrames`.
     path
         Where a complete file is written, with its duration and an index; chunks are empty then.
+    making
+        What the request adds to the mark of the movie.
 
     Raises
     ------
@@ -57,7 +60,7 @@ def encode_movie(
     target, kind = (buffer, movie.kind) if path is None else (path, movie.complete)
     try:
         for clip in clips:
-            writer = writer or _open_movie(target, kind, clip, renderer)
+            writer = writer or _open_movie(target, kind, clip, (renderer, making))
             for pixels, samples in frames.add(clip):
                 seconds = (frames.n_frames - n_frames) / clip.fps
                 n_frames = frames.n_frames
@@ -87,6 +90,10 @@ def find_movie_kind(format: str, picture: Picture) -> StreamedMovie:
     return movie
 
 
-def _open_movie(target: Path | WriteBuffer, kind: MovieKind, clip: Clip, renderer: FrameRenderer) -> MovieWriter:
+def _open_movie(
+    target: Path | WriteBuffer, kind: MovieKind, clip: Clip, shown: tuple[FrameRenderer, Making]
+) -> MovieWriter:
+    renderer, making = shown
     picture, clock = renderer.picture, (exact_rate(clip.fps), clip.speech.waveform.rate)
-    return MovieWriter(target, kind, (picture.height, picture.width, picture.channels), clock, renderer.notice)
+    mark = renderer.mark.of(making, is_recorded=clip.speech.is_recorded)
+    return MovieWriter(target, kind, (picture.height, picture.width, picture.channels), clock, mark)

@@ -24,6 +24,7 @@ from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.prepared import PreparedRequest
 from tts2face.session.shared_models import SessionModels
 from tts2face.session.speech_stream import Piece, timed_speech
+from tts2face.storage.marks import Making, sound_mark
 from tts2face.types import Chunk
 
 BLOCK_BYTES = 1 << 18  # of a file that is read when it is complete
@@ -77,13 +78,14 @@ class StreamFormat:
 def encode_stream(prepared: PreparedRequest, models: SessionModels, format: StreamFormat) -> Iterator[Chunk]:
     """Synthesise and encode a request; yields consecutive chunks of a file."""
     request, name = prepared.request, format.name
+    making = models.making(prepared)
     if name in MOVIE_KINDS or name in SOUND_KINDS:
         return encode_media(
             lambda path: _encode_media(prepared, models, format, path), name, is_complete=format.is_complete
         )
     if name not in line_formats():
         file, face = f"clip.{name}", models.face(has_gestures=request.has_gestures)
-        return encode_whole(models.pieces(prepared), file, face, lambda folder: folder / file)
+        return encode_whole(models.pieces(prepared), file, (face, making), lambda folder: folder / file)
     mesh = models.face(has_gestures=request.has_gestures).mesh if line_formats()[name].uses_face else None
     return encode_lines(models.pieces(prepared), name, mesh)
 
@@ -107,16 +109,19 @@ def _encode_media(
     prepared: PreparedRequest, models: SessionModels, format: StreamFormat, path: Path | None
 ) -> Iterator[Chunk]:
     """Movie or sound of a request; `path` as for `encode_movie` and `encode_sound`."""
-    request = prepared.request
+    request, making = prepared.request, models.making(prepared)
     if format.name in MOVIE_KINDS:
         renderer = models.renderer(format.picture, has_gestures=request.has_gestures)
         clips = (piece.clip for piece in models.pieces(prepared))
-        return encode_movie(clips, renderer, format.name, threads=format.threads, pace=format.pace, path=path)
+        return encode_movie(
+            clips, renderer, format.name, threads=format.threads, pace=format.pace, path=path, making=making
+        )
     if not isinstance(request.source, Recorded):
         pieces = timed_speech(prepared, models.for_request(prepared).speech, has_phones=False)
     else:
         pieces = models.pieces(prepared)
-    return encode_sound((piece.speech.waveform for piece in pieces), format.name, path)
+    mark = sound_mark(making, is_recorded=isinstance(request.source, Recorded))
+    return encode_sound((piece.speech.waveform for piece in pieces), format.name, path, mark)
 
 
 def _encode_complete(write: Callable[[Path], Iterator[Chunk]], format: str) -> Iterator[Chunk]:
@@ -134,12 +139,14 @@ def _file_chunks(path: Path) -> Iterator[Chunk]:
 
 
 def encode_whole(
-    pieces: Iterable[Piece], name: str, face: AnimatedFace, choose: Callable[[Path], Path]
+    pieces: Iterable[Piece], name: str, shown: tuple[AnimatedFace, Making], choose: Callable[[Path], Path]
 ) -> Iterator[Chunk]:
     """Write pieces to an export of a name, whose bytes come after the last piece.
 
     Parameters
     ----------
+    shown
+        The face, and what the request adds to the marks of the files.
     choose
         Path of the file that is sent, in the folder of all files that were written.
 
@@ -148,9 +155,10 @@ def encode_whole(
     InputError, BackendError
         As `plan_exports`, `mesh_of` and `ExportWriter`.
     """
+    face, making = shown
     with tempfile.TemporaryDirectory(prefix="tts2face-") as folder:
         files = plan_exports([Path(folder, name)])
-        with ExportWriter(files, face=mesh_of(face, files)) as writer:
+        with ExportWriter(files, face=mesh_of(face, files), making=making) as writer:
             for piece in pieces:
                 writer.add(piece.clip, piece.text)
                 yield Chunk(b"", piece.clip.speech.waveform.duration)

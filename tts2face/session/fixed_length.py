@@ -15,7 +15,7 @@ from tts2face.session.joining import silent_frames, with_length
 from tts2face.session.prepared import PreparedRequest, prepare
 from tts2face.session.speech_stream import Piece
 from tts2face.source_options import IDLE_LIMITS_S, LEAD_S
-from tts2face.types import Clip, Speech, first_sample
+from tts2face.types import Clip, first_sample
 
 EASE_S = 0.25  # from and to rest; a head turns back within a quarter of a second
 OPENING_S = 0.03  # after the lead, within which a face is fully there: its lips speak
@@ -91,10 +91,11 @@ def first_frames(clip: Clip, n_frames: int) -> Clip:
     seconds, phones = n_samples / sound.rate, clip.speech.phones
     n_phones = max(int(np.searchsorted(phones.edges[:-1], seconds - MIN_PHONE_S)), 1)
     labels = [*phones.phones[:n_phones]]
-    speech = Speech(
-        sound.part(0, n_samples),
-        PhoneSequence(labels, [*phones.edges[:n_phones], seconds]),
-        tuple(word for word in clip.speech.words if word.last <= n_phones),
+    speech = replace(
+        clip.speech,
+        waveform=sound.part(0, n_samples),
+        phones=PhoneSequence(labels, [*phones.edges[:n_phones], seconds]),
+        words=tuple(word for word in clip.speech.words if word.last <= n_phones),
     )
     return Clip(clip.motion.part(0, n_frames), clip.head.part(0, n_frames), speech)
 

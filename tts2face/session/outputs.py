@@ -6,7 +6,7 @@ talker, face and palette, and without what draws and animates.
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +23,7 @@ from tts2face.session.speech import MarkTime
 from tts2face.session.speech_stream import Piece, SpeechModels, spoken_pieces
 from tts2face.sound.fitting import fitted_voices
 from tts2face.sound.voice_pool import VoicePool
+from tts2face.storage.marks import UNKNOWN, Making
 from tts2face.storage.output_paths import AnyPath, refuse_overwriting
 from tts2face.types import Clip, Progress, ignore_progress
 
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from tts2face.picture.frame_renderer import FrameRenderer
     from tts2face.session.animated_face import AnimatedFace
     from tts2face.sound.alignment import TextMismatch
+    from tts2face.storage.signing import Signer
 
 N_PIECES_AHEAD = 2  # pieces synthesised before they are drawn
 
@@ -67,7 +69,11 @@ class OutputFiles:
 
     @contextmanager
     def open(
-        self, face: "AnimatedFace | None", renderer: "FrameRenderer | None", on_frames: Progress
+        self,
+        face: "AnimatedFace | None",
+        renderer: "FrameRenderer | None",
+        on_frames: Progress,
+        making: Making = UNKNOWN,
     ) -> Iterator["OpenOutputs"]:
         """Writer of consecutive clips to all files; errors as `ClipWriter` and `ExportWriter`.
 
@@ -79,14 +85,17 @@ class OutputFiles:
             Draws the clips; None if `out` is None.
         on_frames
             Called with the number of frames drawn and the number added so far.
+        making
+            What the request adds to the marks of the files.
         """
         with ExitStack() as stack:
             film = None
             if self.out is not None and renderer is not None:
                 from tts2face.picture.film import ClipWriter
 
-                film = stack.enter_context(ClipWriter(self.out, renderer, on_progress=on_frames))
-            exports = stack.enter_context(ExportWriter(self.exports, face=mesh_of(face, self.exports)))
+                film = stack.enter_context(ClipWriter(self.out, renderer, on_progress=on_frames, making=making))
+            mesh = mesh_of(face, self.exports)
+            exports = stack.enter_context(ExportWriter(self.exports, face=mesh, making=making))
             yield OpenOutputs(film, exports)
 
 
@@ -249,6 +258,7 @@ def write_speech(
     voices: VoicePool,
     on_progress: Progress,
     person: Person | None = None,
+    signer: "Signer | None" = None,
 ) -> WrittenClip:
     """Write outputs for which `is_speech_only` holds: the same files as those of a session that shows a person.
 
@@ -261,5 +271,6 @@ def write_speech(
     has_phones = any(not file.format.is_sound for file in outputs.exports)
     has_names = any(isinstance(mark, NameMark) for mark in prepared.text.marks)
     pieces = spoken_pieces(prepared, models, has_phones=has_phones or has_names)
-    with outputs.open(None, None, ignore_progress) as files, ahead(pieces) as spoken:
+    making = replace(prepared.making(person), signer=signer)
+    with outputs.open(None, None, ignore_progress, making) as files, ahead(pieces) as spoken:
         return write_pieces(spoken, files, outputs, RequestSteps(prepared.n_steps, on_progress), None)

@@ -18,6 +18,7 @@ from tts2face.session.animated_face import AnimatedFace, FaceMotion
 from tts2face.session.outputs import OutputFiles, WrittenClip
 from tts2face.session.recording import clip_bounds
 from tts2face.session.shared_models import SessionModels
+from tts2face.storage.marks import Making
 from tts2face.types import SOUND_RATE, Clip, Speech, StageCallback, Waveform, exact_rate, ignore_progress
 from tts2face.video.blendshapes import BlendshapeReader
 from tts2face.video.livelink import MAX_CAPTURE_FPS, MIN_CAPTURE_FPS, TABLE_SUFFIXES, read_livelink
@@ -181,7 +182,7 @@ def take_clips(motion: FaceMotion, sound: Waveform) -> Iterator[Clip]:
     """Divide motion and sound into clips of at most `MAX_CLIP_FRAMES` frames; short sound is padded with silence."""
     body = Body(motion.face.channels, 0)
     for first, last, start, end in clip_bounds(len(motion.face), exact_rate(motion.face.fps), sound.rate):
-        speech = Speech.without_phones(sound.part(start, end).padded(end - start))
+        speech = replace(Speech.without_phones(sound.part(start, end).padded(end - start)), is_recorded=True)
         face, head = motion.face.part(first, last), motion.head.part(first, last)
         yield Clip(with_combinations(body.move(face, head, speech.phones)), head, speech)
 
@@ -202,7 +203,8 @@ def write_take(
         renderer = take.face.renderer(picture)
     n_frames = len(take.motion.face)
     draw = stages("writing" if renderer is None else "drawing")
-    with outputs.open(take.face, renderer, lambda done, _: draw(done, n_frames)) as files:
+    making = Making(signer=models.signer)
+    with outputs.open(take.face, renderer, lambda done, _: draw(done, n_frames), making) as files:
         for clip in take_clips(take.motion, take.sound):
             files.add(clip)
     is_silent = not len(take.sound.samples)

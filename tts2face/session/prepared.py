@@ -39,6 +39,7 @@ from tts2face.sound.fitting import Fitting, fitting_voice
 from tts2face.sound.voice_pool import usual_pitch_hz
 from tts2face.sound.voice_urls import is_voice_url
 from tts2face.source_options import IDLE_LIMITS_S
+from tts2face.storage.marks import Making
 from tts2face.storage.output_paths import AnyPath
 from tts2face.types import exact_rate
 
@@ -129,6 +130,15 @@ class PreparedRequest:
         if spoken is None or not spoken.text:
             return None
         return Fitting(spoken.voice) if spoken.voice else fitting_voice(person, self.request.language)
+
+    def making(self, person: Person | None) -> Making:
+        """Text that is spoken and the name of its voice, for the marks of files."""
+        fitting = self.fitting(person)
+        if fitting is None:
+            return Making(self.text.text)
+        # a path would tell where it lies, an address which server is used
+        name = fitting.name.rpartition("#")[2] if is_voice_url(fitting.name) else Path(fitting.name).stem
+        return Making(self.text.text, name)
 
     def preload_voice(self, voices: "VoicePool", person: Person | None = None) -> None:
         """Load the voice of the text in a thread; none for a recording or a request without text."""

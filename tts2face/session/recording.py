@@ -167,7 +167,9 @@ def recording_clips(
         samples = np.clip(volume * sound.next(end - start), -1.0, 1.0)
         seconds = (float(Fraction(first) / fps), len(samples) / SOUND_RATE)
         phones, words = _phones_within(transcript, *seconds)
-        yield Clip.at_rest(last - first, float(fps), Speech(Waveform(samples, SOUND_RATE), phones, words))
+        yield Clip.at_rest(
+            last - first, float(fps), Speech(Waveform(samples, SOUND_RATE), phones, words, is_recorded=True)
+        )
         first = last
 
 

@@ -426,7 +426,7 @@ class Session:
         face = self._models.face(has_gestures=has_gestures)
         with ahead(self._models.pieces(prepared, progress.report_heard)) as pieces:  # while the renderer is built
             renderer = None if outputs.out is None else self.renderer(picture, has_gestures=has_gestures)
-            with outputs.open(face, renderer, progress.report_frames) as files:
+            with outputs.open(face, renderer, progress.report_frames, self.making(prepared)) as files:
                 return write_pieces(pieces, files, outputs, progress, on_piece)
 
 

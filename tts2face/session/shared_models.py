@@ -34,7 +34,9 @@ from tts2face.session.speech_stream import Piece, SpeechModels
 from tts2face.session.steps import pieces
 from tts2face.sound.fitting import fitted_voices
 from tts2face.sound.voice_pool import VoicePool
+from tts2face.storage.marks import Making
 from tts2face.storage.memory import NO_MEMORY, ResultMemory
+from tts2face.storage.signing import Signer
 from tts2face.types import Progress, ignore_progress
 
 MAX_RENDERERS = 2  # renderers in memory, one for each picture; about 30 MB each
@@ -104,6 +106,7 @@ class SessionModels:
         self._renderers: OrderedDict[Hashable, FrameRenderer] = OrderedDict()
         self.voices = voices or VoicePool()
         shown = {**self.talker.metadata, "name": OWN_FACE} if mesh is None else mesh.metadata
+        self.signer: Signer | None = None  # of the files of all requests
         self.person, self.seed = person or person_of(shown), seed_of(shown)
         self.idle_motions: OrderedDict[str, Any] = OrderedDict()  # of `tts2face.session.live.idle`, by their options
         self._without: tuple[tuple[ExcludedToken, ...], ExemplarModel] | None = None
@@ -201,6 +204,16 @@ class SessionModels:
         deliveries = NO_DELIVERIES if palette is None else palette.deliveries
         speech = SpeechModels(load_voice, self.voices.yield_turn, self._memory, deliveries)
         return SynthesisModels(self.talker, exemplars, face, speech)
+
+    def making(self, prepared: PreparedRequest) -> Making:
+        """Parts of the marks of files that a request adds: its text, the name of its voice, and who signs them."""
+        return replace(prepared.making(self.person), signer=self.signer)
+
+    def signed_by(self, signer: Signer) -> "SessionModels":
+        """Models whose files are signed, which share everything else."""
+        new = copy(self)
+        new.signer = signer
+        return new
 
     def seeded(self, request: Request) -> Request:
         """A request with the seed of the face, where it has none."""

@@ -13,6 +13,7 @@ from lexicon.errors import BackendError
 from tts2face.picture.movie import LIVE_H264, MovieKind, MovieWriter
 from tts2face.processes.child import Call, Handler
 from tts2face.processes.program import Program
+from tts2face.storage.marks import Mark
 from tts2face.targets.states import CONNECTED
 from tts2face.targets.tick import LiveFormat
 from tts2face.types import SOUND_RATE
@@ -73,7 +74,8 @@ def _open(content: Mapping[str, Any], format: LiveFormat) -> MovieWriter:
     kind = live_kind(content["container"], content["audio"], format)
     kind = replace(kind, container_options=content["options"], video_bits=1000 * content["kbps"])
     shape = format.height, format.width, 3
-    writer = MovieWriter(content["url"], kind, shape, (format.fps, SOUND_RATE), content["notice"])
+    mark = Mark(**content["mark"]) if content["mark"] else None
+    writer = MovieWriter(content["url"], kind, shape, (format.fps, SOUND_RATE), mark)
     writer.start()
     if hasattr(signal, "setitimer"):
         signal.setitimer(signal.ITIMER_REAL, 0.0)

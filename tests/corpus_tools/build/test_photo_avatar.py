@@ -98,7 +98,7 @@ def test_an_avatar_is_a_head_like_any_other(avatars: dict[str, Path]) -> None:
     assert path.stat().st_size < 8_000_000
     face = load_face(str(path))
     assert face.metadata["consent"]["statement"] == "nobody"
-    assert face.synthetic_notice
+    assert face.mark.notice
     clip = Session(face=face).clip("Hello.", fps=10)
     assert len(clip.motion) > 5
     turned = draw(face, picture=Picture(size="64x64", camera="three-quarter"))

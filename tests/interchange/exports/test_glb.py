@@ -219,7 +219,9 @@ def test_metres_seconds_and_gaze(tmp_path):
     turns = file.animated("leftEye", "rotation")[1]
     turn = FACE.eyes[0].turns["eyeLookInLeft"]
     assert np.allclose(quaternion_matrix(turns[1]), rotation_matrix(turn), rtol=0, atol=1e-6)
-    assert file.content.asset.extras == {"fps": pytest.approx(30000 / 1001), "sound": "a.wav"}
+    extras = file.content.asset.extras
+    assert (extras["fps"], extras["sound"]) == (pytest.approx(30000 / 1001), "a.wav")
+    assert extras["digitalSourceType"].endswith("/trainedAlgorithmicMedia")
 
 
 def test_a_gesture_of_both_directions_has_two_targets_with_weights_from_0_to_1(tmp_path):

@@ -101,8 +101,8 @@ def test_wave_reads_the_sound(tmp_path):
 
 
 def test_sound_beyond_four_gigabytes_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("tts2face.interchange.exports.sound.MAX_SAMPLES", RATE)
-    with pytest.raises(InputError, match=r"a.wav would have more than 4 GB, 0 hours; export shorter clips"):
+    monkeypatch.setattr("tts2face.storage.wave_files.MOST_BYTES", RATE)
+    with pytest.raises(InputError, match=r"a .wav file has at most 4 GB of sound"):
         tts2face.export(made_stream(2), tmp_path / "a.wav")
     assert not list(tmp_path.iterdir())
 

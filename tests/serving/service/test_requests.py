@@ -23,7 +23,7 @@ from tests.serving.service.in_process import (
 )
 from tests.serving.service.job_requests import CLIP, finished, submit
 from tests.serving.service.test_uploads import png, png_bomb, wav
-from tts2face.picture.sound_stream import HEAD_BYTES
+from tests.walkers import samples_of
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.session.session_cache import SessionCache
@@ -294,9 +294,9 @@ def result(stored: dict[str, Any]) -> str:
 
 def test_a_job_is_a_complete_file_with_the_sound_of_its_stream(client: TestClient, result: str) -> None:
     made, streamed = client.get(result).content, client.post("/v1/clips", json={**CLIP, "format": "wav"}).content
-    assert made[HEAD_BYTES:] == streamed[HEAD_BYTES:]
+    assert samples_of(made) == samples_of(streamed)
     with wave.open(io.BytesIO(made)) as sound:
-        assert 2 * sound.getnframes() == len(made) - HEAD_BYTES
+        assert 2 * sound.getnframes() == len(samples_of(made))
 
 
 @pytest.mark.parametrize("given", ["bytes=abc", "bytes=5-2", "bytes=", "bytes=-", "lines=0-1", "0-1", "bytes=0-1,x"])

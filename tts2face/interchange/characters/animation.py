@@ -23,6 +23,7 @@ from tts2face.interchange.gltf.writer import GlbWriter
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import FloatArray
 from tts2face.storage.files import write_atomically
+from tts2face.storage.marks import UNKNOWN, Mark, mark_fields, sound_mark
 from tts2face.storage.output_paths import refuse_overwriting
 from tts2face.storage.wave_files import wave_bytes
 from tts2face.types import Clip, Trajectory
@@ -85,14 +86,22 @@ def write_character(
     out = Path(out)
     refuse_overwriting({"the output": out}, {"the character": character_file(read_binding(face), character)})
     end = clip.speech.waveform.duration
-    animated = animate_character(clip.motion, clip.head, face, character=character, end_s=end)
-    write_atomically(out.with_suffix(".wav"), wave_bytes(clip.speech.waveform.samples, clip.speech.waveform.rate))
+    mark = face.mark.of(UNKNOWN, is_recorded=clip.speech.is_recorded)
+    animated = animate_character(clip.motion, clip.head, face, mark, character=character, end_s=end)
+    sound, heard = clip.speech.waveform, sound_mark(UNKNOWN, is_recorded=clip.speech.is_recorded)
+    write_atomically(out.with_suffix(".wav"), wave_bytes(sound.samples, sound.rate, heard))
     write_atomically(out, animated.content)
     return WrittenCharacter(out, len(clip.motion), animated.n_targets, animated.bones)
 
 
 def animate_character(
-    motion: Trajectory, head: Trajectory, face: Face, *, end_s: float = 0.0, character: str | Path | None = None
+    motion: Trajectory,
+    head: Trajectory,
+    face: Face,
+    mark: Mark | None = None,
+    *,
+    end_s: float = 0.0,
+    character: str | Path | None = None,
 ) -> AnimatedCharacter:
     """Content of the character's file with an animation by motion (T, K) and head pose (T, 6); as `write_character`.
 
@@ -118,6 +127,7 @@ def animate_character(
         scene = file.root.index("scene", file.count("scenes"), "scenes") or 0
         tracks = [*add_vrm_animation(writer.root, own, scene), *tracks]
     writer.add_animation(ANIMATION, times, tracks)
+    writer.add_extras(mark_fields(mark))
     names = dict.fromkeys(bones.name_of(node) for node, _, _ in turned)
     return AnimatedCharacter(writer.content(), len(weights), tuple(names))
 

@@ -24,8 +24,8 @@ from tts2face.models.light import Photographed
 from tts2face.numeric.arrays import Pixels
 from tts2face.picture.camera import camera_matrices
 from tts2face.picture.options import STUDIO, Picture
-from tts2face.picture.provenance import png_labels
 from tts2face.picture.renderer import mesh_renderer
+from tts2face.storage.marks import Mark, png_labels
 from tts2face.types import Progress, ignore_progress
 
 if TYPE_CHECKING:
@@ -117,12 +117,12 @@ def draw_import_sheet(imported: "ImportedFace", on_progress: Progress = ignore_p
     return draw_contact_sheet(complete, on_progress, sources)
 
 
-def png_bytes(pixels: Pixels, notice: str = "") -> bytes:
-    """Content of a PNG file of a picture, labelled by the face's `notice`."""
+def png_bytes(pixels: Pixels, mark: Mark) -> bytes:
+    """Content of a PNG file of a picture with the mark of the face."""
     from PIL import Image
 
     content = io.BytesIO()
-    Image.fromarray(pixels).save(content, "PNG", pnginfo=png_labels(notice))
+    Image.fromarray(pixels).save(content, "PNG", pnginfo=png_labels(mark))
     return content.getvalue()
 
 

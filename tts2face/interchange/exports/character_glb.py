@@ -27,7 +27,8 @@ class CharacterGlbWriter:
     def finish(self) -> None:
         """Write the file."""
         motion, head = self._frames.trajectories(float(self._target.fps))
-        self._target.path.write_bytes(animate_character(motion, head, self._face, end_s=self._frames.end_s).content)
+        animated = animate_character(motion, head, self._face, self._target.mark, end_s=self._frames.end_s)
+        self._target.path.write_bytes(animated.content)
 
     def close(self) -> None:
         """Remove the temporary files."""

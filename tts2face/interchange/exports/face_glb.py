@@ -29,10 +29,10 @@ from tts2face.interchange.exports.surfaces import (
 from tts2face.interchange.gltf.container import INDICES, VERTICES, GltfBuffer, key_times
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import continuous_quaternions
+from tts2face.storage.marks import PROGRAM, mark_fields
 from tts2face.storage.spool import Spool
 
 MESH_NODE, FIRST_JOINT = 0, 1
-GENERATOR = "tts2face"
 SPECULAR = "KHR_materials_specular"
 
 
@@ -105,10 +105,8 @@ class FaceGlbWriter:
 
 
 def _asset(target: Target, face: Face) -> dict[str, Any]:
-    extras = {"fps": float(target.fps), "sound": target.sound_name}
-    if face.synthetic_notice:
-        extras["notice"] = face.synthetic_notice
-    asset: dict[str, Any] = {"version": "2.0", "generator": GENERATOR, "extras": extras}
+    extras = {"fps": float(target.fps), "sound": target.sound_name, **mark_fields(target.mark)}
+    asset: dict[str, Any] = {"version": "2.0", "generator": PROGRAM, "extras": extras}
     notes = [str(face.metadata[key]) for key in ("attribution", "licence") if face.metadata.get(key)]
     if notes:
         asset["copyright"] = ", ".join(notes)

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Protocol, TextIO
 
 from tts2face.interchange.exports.table import sound_name
 from tts2face.numeric.arrays import Float32Array
+from tts2face.storage.marks import Mark
 from tts2face.types import Clip
 
 if TYPE_CHECKING:
@@ -77,6 +78,8 @@ class Target:
         Mesh whose first shapes are these channels; None if not given.
     lines
         Receives the text of formats that consist of lines, in place of `path`.
+    mark, sound_mark
+        What the file says of its making; of sound alone None for a recording.
     beside
         Path to write another file to, which appears beside this one under the given name; asked for before any frame.
     """
@@ -89,6 +92,8 @@ class Target:
     channels: tuple[str, ...]
     face: "Face | None"
     lines: TextIO | None = None
+    mark: Mark | None = None
+    sound_mark: Mark | None = None
     beside: Callable[[str], Path] = Path
 
     def open_lines(self) -> TextIO:

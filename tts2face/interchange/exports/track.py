@@ -30,6 +30,7 @@ FLOAT32_FORMAT = "%.9g"  # nine digits identify every 32-bit number
 MAX_LINE_BYTES = 2_000_000_000  # of a piece: an hour at 48 kHz and 30 frames/s in one piece takes 1.1 GB
 _NEGATIVE_ZERO = re.compile(r"(?<![^,])-0(?![^,])")  # a JSON integer, which would lose its sign
 OPENING, CLOSING = '"pieces": [', "]}"
+RECORDED = "is_recorded"  # in the header, where the sound is that of a recording
 _TEXTS, _NUMBERS = (list_of(typed(kind), expected=EXPECTED[list]) for kind in (str, float))
 _PIECE_NAMES = ("motion", "head", "phones", "edges", "words", "text", "samples")
 
@@ -62,6 +63,7 @@ class TrackWriter:
             return
         if self._is_empty:
             header = self._header | {"fps": part.clip.fps, "rate": self._target.rate}
+            header |= {RECORDED: True} if part.clip.speech.is_recorded else {}
             self._file.write(f"{json.dumps(header, ensure_ascii=False)[:-1]}, {OPENING}\n")
         else:
             self._file.write(",\n")
@@ -193,7 +195,7 @@ def _parse_piece(piece: Any, header: Mapping[str, Any], name: str) -> TrackPiece
             Clip(
                 Trajectory(header["channels"], _rows(piece["motion"], len(header["channels"])), fps),
                 Trajectory(HEAD_CHANNELS, _rows(piece["head"], len(HEAD_CHANNELS)), fps),
-                Speech(Waveform(samples, header["rate"]), phones, words),
+                Speech(Waveform(samples, header["rate"]), phones, words, header.get(RECORDED) is True),
             ),
             check_type("text", piece["text"], str),
         )

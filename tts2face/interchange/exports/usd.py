@@ -32,6 +32,7 @@ from tts2face.interchange.exports.usd_materials import TextureFiles, define_mate
 from tts2face.interchange.gltf.container import key_times
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import decode_srgb
+from tts2face.storage.marks import PROGRAM, mark_fields
 from tts2face.storage.spool import Spool
 
 # millimetres, as faces have them
@@ -85,7 +86,7 @@ class UsdWriter:
         stage.SetStartTimeCode(0)
         codes = key_times(self._weights.n_rows, 1.0, self._end_s * float(target.fps)).tolist()
         stage.SetEndTimeCode(codes[-1])
-        about = {"sound": target.sound_name, "generator": "tts2face", "notice": self._face.synthetic_notice}
+        about = {"sound": target.sound_name, "generator": PROGRAM, **mark_fields(target.mark)}
         stage.GetRootLayer().customLayerData = {name: value for name, value in about.items() if value}
         root = usd.UsdSkel.Root.Define(stage, ROOT_PATH)
         stage.SetDefaultPrim(root.GetPrim())

@@ -23,6 +23,7 @@ from tts2face.interchange.gltf.fields import Fields
 from tts2face.interchange.gltf.reader import GltfFile
 from tts2face.interchange.gltf.vrm_animation import VrmMotion, add_vrm_animation
 from tts2face.interchange.gltf.writer import GlbWriter
+from tts2face.storage.marks import PROGRAM, mark_fields
 from tts2face.types import Trajectory
 
 
@@ -44,7 +45,8 @@ class VrmaWriter:
         times = key_times(self._frames.n_frames, fps, self._frames.end_s)
         motion, head = (held(frames, len(times)) for frames in self._frames.trajectories(fps))
         scene = {"scene": 0, "scenes": [{"nodes": []}]}
-        asset = {"version": "2.0", "generator": ANIMATION, "extras": {"fps": fps, "sound": self._target.sound_name}}
+        extras = {"fps": fps, "sound": self._target.sound_name, **mark_fields(self._target.mark)}
+        asset = {"version": "2.0", "generator": PROGRAM, "extras": extras}
         name = self._target.name
         writer = GlbWriter(GltfFile(Path(name), Fields({"asset": asset, **scene}, name), None))
         tracks = add_vrm_animation(writer.root, self._vrm_motion(motion, head))

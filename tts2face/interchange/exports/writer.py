@@ -11,6 +11,7 @@ from tts2face.interchange.exports.frame_grid import FrameGrid
 from tts2face.interchange.exports.parts import FormatWriter, Target
 from tts2face.interchange.exports.table import FormatInfo, find_format, sound_name, split_format
 from tts2face.storage.files import translate_disk_errors
+from tts2face.storage.marks import MOTION_NOTICE, UNKNOWN, Making, Mark, sound_mark
 from tts2face.storage.output_paths import check_name
 from tts2face.storage.temporary import Temporary
 from tts2face.types import Clip, exact_rate
@@ -125,6 +126,8 @@ class ExportWriter:
         have other channels.
     fps
         Frames per second of the formats with frames; None for those of the clips, or of the format.
+    making
+        What the request adds to the marks of the files.
 
     Raises
     ------
@@ -134,11 +137,18 @@ class ExportWriter:
         The disk is full or cannot be written, or a package is missing.
     """
 
-    def __init__(self, files: Sequence[ExportFile], *, face: "Face | None" = None, fps: float | None = None) -> None:
+    def __init__(
+        self,
+        files: Sequence[ExportFile],
+        *,
+        face: "Face | None" = None,
+        fps: float | None = None,
+        making: Making = UNKNOWN,
+    ) -> None:
         for file in files:
             if file.format.needs_mesh and face is None:
                 raise InputError(f"{file.path.name} holds the mesh of the face; give the face, as in face=session.face")
-        self._files = [_OpenFile(file, face, fps) for file in files]
+        self._files = [_OpenFile(file, face, fps, making) for file in files]
         self._n_clips = 0
 
     def __enter__(self) -> "ExportWriter":
@@ -190,10 +200,10 @@ class ExportWriter:
 class _OpenFile:
     """One file of an `ExportWriter`."""
 
-    def __init__(self, file: ExportFile, face: "Face | None", fps: float | None) -> None:
+    def __init__(self, file: ExportFile, face: "Face | None", fps: float | None, making: Making) -> None:
         self.path = file.path
         self._format = file.format
-        self._face = face
+        self._face, self._making = face, making
         self._fps = (fps or file.format.default_fps) if file.format.has_frames else None
         self._grid: FrameGrid | None = None
         self._writer: FormatWriter | None = None
@@ -241,7 +251,11 @@ class _OpenFile:
 
     def _target(self, grid: FrameGrid, clip: Clip, temporary: Temporary) -> Target:
         target = make_target(ExportFile(self.path, self._format), grid, clip, self._face, temporary.path)
-        return replace(target, beside=self._file_beside)
+        is_recorded = clip.speech.is_recorded
+        shown = Mark(MOTION_NOTICE) if self._face is None else self._face.mark
+        mark = shown.of(self._making, is_recorded=is_recorded)
+        sound = sound_mark(self._making, is_recorded=is_recorded)
+        return replace(target, mark=mark, sound_mark=sound, beside=self._file_beside)
 
     def _file_beside(self, name: str) -> Path:
         path = self.path.with_name(name)

@@ -1,6 +1,7 @@
 """Writing of a glTF file as one .glb file with further data: buffers joined, images embedded, animations added."""
 
 import copy
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,12 @@ class GlbWriter:
         ]
         animation = {"name": name, "samplers": samplers, "channels": channels}
         self.root["animations"] = [animation, *self.root.get("animations", [])]
+
+    def add_extras(self, fields: Mapping[str, str]) -> None:
+        """Add fields to ``asset.extras``; of another type than an object, as glTF allows (2.0, 5.9), it stays."""
+        asset = self.root.setdefault("asset", {"version": "2.0"})
+        if isinstance(asset.get("extras", {}), dict):
+            asset["extras"] = {**asset.get("extras", {}), **fields}
 
     def add_node_above(self, name: str, scene: int) -> int:
         """Add a node above all nodes of a scene; its index."""

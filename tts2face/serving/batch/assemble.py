@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.picture.film import MOV, MP4, WEBM, make_temporary, move_into_place
+from tts2face.picture.film import MOV, MP4, WEBM, make_temporary, move_signed
 from tts2face.picture.movie import MOV_MOVIE, MP4_MOVIE, WEBM_MOVIE, MovieKind, mux_pictures
-from tts2face.picture.provenance import append_to_mp4
 from tts2face.serving.batch.audio_track import open_track
 from tts2face.serving.batch.output import Sound
+from tts2face.session.inspection import joined_mark
 from tts2face.storage.files import translate_disk_errors
+from tts2face.storage.marks import complete, container_tags
+from tts2face.storage.signing import Signer
 from tts2face.types import SOUND_RATE, exact_rate, first_sample
 
 KINDS = {MP4: MP4_MOVIE, MOV: MOV_MOVIE, WEBM: WEBM_MOVIE}
@@ -28,7 +30,13 @@ DECODE_DELAY = 2
 SAMPLE_BLOCK = 48_000  # samples that are encoded at a time
 
 
-def join_segments(segments: Sequence[Path], out: Path, fps: float, sounds: Sequence[Sound | None] = ()) -> int:
+def join_segments(
+    segments: Sequence[Path],
+    out: Path,
+    fps: float,
+    sounds: Sequence[Sound | None] = (),
+    signer: Signer | None = None,
+) -> int:
     """Join segments into a video, which appears when it is complete; its number of frames.
 
     The suffix of `out` is .mp4 or .mov for segments of H.264, and .webm for those of VP9.
@@ -37,6 +45,8 @@ def join_segments(segments: Sequence[Path], out: Path, fps: float, sounds: Seque
     ----------
     sounds
         For each segment, what replaces its sound; empty: nothing.
+    signer
+        Who signs the video; None: nobody.
     """
     import av
 
@@ -46,14 +56,15 @@ def join_segments(segments: Sequence[Path], out: Path, fps: float, sounds: Seque
             translate_disk_errors(out),
             av.open(str(temporary.path), "w", format=kind.container, options=dict(kind.container_options)) as target,
         ):
+            mark = joined_mark(segments, signer, is_recorded=any(sound is not None for sound in sounds))
+            target.metadata.update(container_tags(kind.container, mark))
             joined = _Joined(target, kind, exact_rate(fps))
             for path, sound in zip(segments, sounds or [None] * len(segments), strict=True):
                 with av.open(str(path)) as source:
                     joined.append(source, path, sound)
             joined.finish()
-        if out.suffix == MP4:
-            append_to_mp4(temporary.path, joined.notice)
-        move_into_place(temporary, out)
+        complete(temporary.path, kind.container, mark)
+        move_signed(temporary, out, mark)
     except av.FFmpegError as broken:
         raise DataError(
             f"the segments of {out.name} cannot be joined ({broken}); remove them and run again"
@@ -72,16 +83,11 @@ class _Joined:
         self._video: Any = None
         self._audio: Any = None
         self._settings: tuple[Any, ...] = ()
-        self.notice = ""
         self.n_frames = self._n_samples = 0
         self._sounding = np.zeros(0, np.int16)  # of the segment before, after its last frame
 
     def _open(self, source: Any) -> None:
         """Streams like those of the first segment."""
-        for name, value in source.metadata.items():
-            # the notice of synthetic media goes into the joined file
-            if name.lower() == "comment":
-                self._target.metadata["comment"] = self.notice = value
         first = source.streams.video[0]
         self._video = self._target.add_stream_from_template(first)
         # WebM states in its metadata that its pictures have transparency

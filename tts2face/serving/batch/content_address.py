@@ -13,7 +13,7 @@ from tts2face import __version__
 from tts2face.storage.content_store import content_hash
 from tts2face.storage.shipped import find_file
 
-SEGMENT_FORMAT = 5  # raised when equal requests give other segments
+SEGMENT_FORMAT = 6  # raised when equal requests give other segments
 VOICE_PACKAGES = ("hibari-tts", "onnxruntime", "espeakng-loader", "piper-tts", "hama", "pyopenjtalk-plus", "av")
 
 

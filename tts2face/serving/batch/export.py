@@ -17,6 +17,8 @@ from tts2face.request import OWN_FACE, Request
 from tts2face.serving.batch.output import Output, Sound
 from tts2face.serving.batch.segment import Segment
 from tts2face.session.named_models import Models
+from tts2face.storage.marks import Making
+from tts2face.storage.signing import Signer
 from tts2face.types import SOUND_RATE, Clip, Speech, Waveform, exact_rate, first_sample
 
 if TYPE_CHECKING:
@@ -50,7 +52,7 @@ class Exporter:
         self._shown: Models | None = None
         self._session: Session | None = None
 
-    def write(self, output: Output, tracks: Sequence[Path], folder: Path) -> list[Path]:
+    def write(self, output: Output, tracks: Sequence[Path], folder: Path, signer: Signer | None = None) -> list[Path]:
         """Write the exports of an output from the tracks of its segments; their paths, those of sounds beside included.
 
         Raises
@@ -66,7 +68,8 @@ class Exporter:
             session = self._session_of(output)
             gestures = Request(gestures=output.segments[0].request.get("gestures", Request().gestures))
             face = mesh_of(session.animated_face(has_gestures=gestures.has_gestures), files)
-        with ExportWriter(files, face=face) as writer:
+        making = Making(_text_of(output), signer=signer)
+        with ExportWriter(files, face=face, making=making) as writer:
             lengths = [track.slot_frames if track.fills_slot else None for track in output.tracks]
             for clip in joined_clips(tracks, output.fps, output.sounds, lengths):
                 writer.add(clip)
@@ -113,7 +116,7 @@ def joined_clips(
                 origin = first_sample(sound.offset, SOUND_RATE, rate)
                 found = open_track(Path(sound.path)).read(origin + begin, origin + end)
                 made = Waveform(found / 32767.0, SOUND_RATE)
-            yield _with_sound(piece.clip, made)
+            yield _with_sound(piece.clip, made, is_recorded=sound is not None or piece.clip.speech.is_recorded)
         sounding = _sum(sounding, np.concatenate(later))
 
 
@@ -132,7 +135,7 @@ def _sum(values: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np.
     return total
 
 
-def _with_sound(clip: Clip, sound: Waveform) -> Clip:
+def _with_sound(clip: Clip, sound: Waveform, *, is_recorded: bool) -> Clip:
     """A clip with other sound, whose phones end with them; they last as long to half a sample of the former rate."""
     phones = clip.speech.phones
     seconds = sound.duration
@@ -141,8 +144,12 @@ def _with_sound(clip: Clip, sound: Waveform) -> Clip:
     # phones beyond the new end would last no time: all shrink alike
     if (np.diff(edges) <= 0).any():
         edges = phones.edges * (seconds / phones.end)
-    speech = Speech(sound, PhoneSequence(phones.phones, edges), clip.speech.words)
+    speech = Speech(sound, PhoneSequence(phones.phones, edges), clip.speech.words, is_recorded)
     return replace(clip, speech=speech)
+
+
+def _text_of(output: Output) -> str:
+    return " ".join(cue.text for cue in output.cues if cue.segment is not None)
 
 
 def _face_of(segment: Segment) -> tuple[str, ...]:

@@ -14,9 +14,11 @@ from tts2face.serving.batch.content_address import file_hash
 from tts2face.serving.batch.output import Output, Plan
 from tts2face.serving.batch.segment_result import SegmentResult
 from tts2face.storage.files import write_atomically
+from tts2face.storage.signing import Signer
 
 JSON_NAME, CSV_NAME = "manifest.json", "manifest.csv"
 FORMAT = 1
+SIGNED_BY = "signed_by"  # SHA-256 of the certificate in an entry
 COLUMNS = (
     "file", "status", "source", "cues", "begin_s", "duration_s", "n_frames", "fps", "rate", "overflow_s", "cut_s",
     "overlap_s", "warnings", "sha256", "bytes", "took_s",
@@ -49,10 +51,12 @@ def read_segments(folder: Path) -> set[str]:
     return set(map(str, segments))
 
 
-def is_current(entry: Mapping[str, Any] | None, output: Output, folder: Path) -> bool:
-    """Whether a file is what the plan would make: its entry has the same address, and the file the same size."""
+def is_current(entry: Mapping[str, Any] | None, output: Output, folder: Path, signer: Signer | None = None) -> bool:
+    """Whether a file is what the plan would make: its entry has the same address and signer, and the file its size."""
     # a failed output is tried again
     if entry is None or entry.get("address") != output.address or entry.get("status") != "done":
+        return False
+    if signed_entry(signer) != {name: entry[name] for name in (SIGNED_BY,) if name in entry}:
         return False
     files = {output.name: entry.get("bytes")} if output.suffix else {}
     files |= {
@@ -61,6 +65,11 @@ def is_current(entry: Mapping[str, Any] | None, output: Output, folder: Path) ->
     if not set(output.names) <= set(files):
         return False
     return all((folder / name).is_file() and (folder / name).stat().st_size == size for name, size in files.items())
+
+
+def signed_entry(signer: Signer | None) -> dict[str, str]:
+    """Part of the entry of an output that says who signed it; empty for nobody."""
+    return {} if signer is None else {SIGNED_BY: signer.fingerprint}
 
 
 def done_entry(

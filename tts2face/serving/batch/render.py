@@ -57,7 +57,7 @@ class SegmentRenderer:
             return replace(_write_file(session, segment, out), took_s=round(time.perf_counter() - began, 3))
         with excerpt_of(segment, Request(**segment.request)) as request:
             fitted, result = fit_segment(session, request, segment)
-            with _writer(session, segment, fitted.request, (out, result.n_frames)) as writer:
+            with _writer(session, segment, fitted, (out, result.n_frames)) as writer:
                 for clip in session.stream_to_length(fitted, result.n_frames):
                     writer.add(clip)
                 if segment.fills_slot and segment.audio_begin is None and result.speech_s > 0.0:
@@ -117,18 +117,19 @@ def _write_file(session: Session, segment: Segment, out: Path) -> SegmentResult:
 
 
 def _writer(
-    session: Session, segment: Segment, request: Request, target: tuple[Path, int]
+    session: Session, segment: Segment, prepared: PreparedRequest, target: tuple[Path, int]
 ) -> ClipWriter | ExportWriter:
     """Writer of the medium of a segment into a path, for a number of frames."""
     out, n_frames = target
     if segment.medium == TRACK:
         return ExportWriter(plan_exports([out], format=TRACK))
-    renderer: FrameRenderer = session.renderer(Picture(**segment.picture), has_gestures=request.has_gestures)
+    renderer: FrameRenderer = session.renderer(Picture(**segment.picture), has_gestures=prepared.request.has_gestures)
     if isinstance(renderer, OwnFaceRenderer):
         renderer = replace(renderer, n_returning=n_frames)
     if isinstance(renderer, MeshRenderer):
         renderer = before_studio(renderer, load_face(DRAWN_FACE).light)
-    return ClipWriter(out, renderer, kind=MKV if segment.medium == ALPHA_MOVIE else None)
+    kind = MKV if segment.medium == ALPHA_MOVIE else None
+    return ClipWriter(out, renderer, kind=kind, making=session.making(prepared))
 
 
 def fit_segment(session: Session, request: Request, segment: Segment) -> tuple[PreparedRequest, SegmentResult]:

@@ -19,6 +19,7 @@ from tts2face.serving.batch.manifest import (
     failed_entry,
     is_current,
     read_manifest,
+    signed_entry,
     write_manifest,
 )
 from tts2face.serving.batch.output import Output, Plan
@@ -26,6 +27,7 @@ from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.segment_result import SegmentResult
 from tts2face.serving.batch.store import Store, open_store
 from tts2face.storage.output_paths import refuse_overwriting
+from tts2face.storage.signing import Signer
 from tts2face.storage.temporary import Temporary
 from tts2face.types import Progress
 
@@ -63,9 +65,10 @@ class _Run:
     seconds: float = 0.0
     warnings: list[str] = field(default_factory=list)
     exporter: Exporter = field(default_factory=Exporter)
+    signer: Signer | None = None
 
 
-def run_batch(
+def run_batch(  # noqa: PLR0913 - one parameter a part of the run
     plan: Plan,
     out: Path | str,
     *,
@@ -73,6 +76,7 @@ def run_batch(
     engine: Engine | None = None,
     on_progress: Progress | None = None,
     on_output: Callable[[dict[str, Any]], None] | None = None,
+    signer: Signer | None = None,
 ) -> BatchResult:
     """Make the outputs of a plan in a folder; outputs that are current are left as they are.
 
@@ -86,6 +90,8 @@ def run_batch(
         Called with the number of segments done and of all segments that this run needs.
     on_output
         Called with the entry of the manifest of each output that was made or has failed.
+    signer
+        Who signs the outputs; those that somebody else has signed, or nobody, are made anew.
 
     Raises
     ------
@@ -98,9 +104,9 @@ def run_batch(
     folder = Path(out)
     _prepare_folder(folder)
     check_outputs(plan, folder)
-    run = _Run(plan, folder, store or open_store(folder / SEGMENT_FOLDER), read_manifest(folder))
+    run = _Run(plan, folder, store or open_store(folder / SEGMENT_FOLDER), read_manifest(folder), signer=signer)
     write_manifest(folder, plan, run.entries)  # its list of segments keeps them from being pruned
-    stale = [output for output in plan.outputs if not is_current(run.entries.get(output.name), output, folder)]
+    stale = [output for output in plan.outputs if not is_current(run.entries.get(output.name), output, folder, signer)]
     needed = {segment.address: segment for output in stale for segment in output.needed}
     for output in stale:
         run.waiting[output.name] = {segment.address for segment in output.needed}
@@ -210,11 +216,14 @@ def _finish_output(run: _Run, output: Output) -> None:
             parts = {segment.address: run.store.fetch(segment.address, Path(copies)) for segment in output.needed}
             written = []
             if output.exports:
-                written = run.exporter.write(output, [parts[segment.address] for segment in output.tracks], run.folder)
+                written = run.exporter.write(
+                    output, [parts[segment.address] for segment in output.tracks], run.folder, run.signer
+                )
             if output.suffix:
                 path = run.folder / output.name
-                join_segments([parts[segment.address] for segment in output.segments], path, output.fps, output.sounds)
-        entry = done_entry(output, run.folder, results, written)
+                segments = [parts[segment.address] for segment in output.segments]
+                join_segments(segments, path, output.fps, output.sounds, run.signer)
+        entry = done_entry(output, run.folder, results, written) | signed_entry(run.signer)
     except Tts2faceError as wrong:
         run.entries[output.name] = failed_entry(output, str(wrong))
         return

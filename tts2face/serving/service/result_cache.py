@@ -18,7 +18,7 @@ from tts2face.serving.service.messages import QUALITY, Work
 from tts2face.storage.content_store import FolderStore, content_hash
 from tts2face.storage.temporary import Temporary
 
-FORMAT = 3  # of entries; those of others are not found
+FORMAT = 4  # of entries; those of others are not found
 CACHED_KINDS = frozenset({"file", "speech"})
 MAX_SHARE = 0.25  # of the budget that one entry may take
 FILE_FIELDS = (

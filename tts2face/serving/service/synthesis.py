@@ -61,17 +61,18 @@ def timed_speech(session: "Session", work: Work, _: Inputs) -> Iterator[Event | 
     """
     from tts2face.picture.sound_stream import encode_sound
     from tts2face.session.encoded_stream import encode_media
+    from tts2face.storage.marks import sound_mark
 
-    format = work.format or "pcm"
+    format, prepared = work.format or "pcm", session.prepare(Request(**work.request))
     events: list[Event] = []
 
     def sounds() -> Iterator[Waveform]:
-        for timed in session.stream_speech(Request(**work.request)):
+        for timed in session.stream_speech(prepared):
             events.append(_timed_event(timed))
             yield timed.speech.waveform
 
     def write(path: Path | None) -> Iterator[Chunk]:
-        return encode_sound(sounds(), format, path)
+        return encode_sound(sounds(), format, path, sound_mark(session.making(prepared)))
 
     for chunk in encode_media(write, format, is_complete=work.is_complete):
         yield from events

@@ -161,7 +161,8 @@ def project_export(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]
 
     project = read_project(work)
     face = session.animated_face(has_gestures=project.request.has_gestures)
-    return encode_whole(session.stream(project.prepare()), work.request["name"], face, _packed)
+    prepared = session.prepare(project.prepare())
+    return encode_whole(session.stream(prepared), work.request["name"], (face, session.making(prepared)), _packed)
 
 
 def _packed(folder: Path) -> Path:

@@ -93,19 +93,19 @@ def _decoding(kind: str, source: Path, *errors: type[Exception]) -> Iterator[Non
 
 def decode_sound(source: Path, target: Path, max_seconds: float) -> tuple[str, ...]:
     """Write the sound of a file as mono 16-bit .wav at `SOUND_RATE`; notes on what is guessed of it."""
-    from tts2face.storage.wave_files import open_wave
+    from tts2face.storage.wave_files import WaveFile
     from tts2face.video.media import sound_blocks
     from tts2face.video.sound_survey import survey_sound
 
     n_left = int(max_seconds * SOUND_RATE)
     try:
-        with _decoding(SOUND, source), open_wave(str(target), SOUND_RATE) as out:
+        with _decoding(SOUND, source), WaveFile(target, SOUND_RATE) as out:
             for block in sound_blocks(source, SOUND_RATE, SOUND_FORMATS, max_seconds):
                 n_left -= len(block)
                 if n_left < 0:
                     raise RefusedFileError(f"it is longer than {max_seconds:g} s")
                 steps = np.clip(np.rint(block * HALF_RANGE), -HALF_RANGE, HALF_RANGE - 1).astype("<i2")
-                out.writeframesraw(steps.tobytes())
+                out.write_pcm(steps.tobytes())
     except RefusedFileError:
         raise
     except DataError as wrong:

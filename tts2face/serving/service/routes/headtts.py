@@ -14,13 +14,15 @@ from fastapi.responses import JSONResponse, PlainTextResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from tts2face.interchange.exports.labels import Label
-from tts2face.picture.sound_stream import PCM_RATE, wav_header
+from tts2face.picture.sound_stream import PCM_RATE
 from tts2face.serving.service.client_names import Adjustments, choose_voice, limited_rate
 from tts2face.serving.service.clip_options import OptionValues, described, resolve_dictionary
 from tts2face.serving.service.errors import ErrorBody, RefusedError
 from tts2face.serving.service.live_text import REFUSED_S, parse_message
 from tts2face.serving.service.results import timed_speech
 from tts2face.serving.service.state import service_state
+from tts2face.storage.marks import UNKNOWN, sound_mark
+from tts2face.storage.wave_files import wave_head
 
 router = APIRouter(tags=["headtts"])
 
@@ -169,7 +171,7 @@ async def _speak(
     await adjustments.note_words(state, OptionValues({}, fields, {}))
     fields = await resolve_dictionary(state.library, request.state.key, fields)
     events, pcm = await timed_speech(request, state.results.work(kind="speech", request=fields))
-    sound = pcm if body.audioEncoding == "pcm" else wav_header(PCM_RATE, len(pcm)) + pcm
+    sound = pcm if body.audioEncoding == "pcm" else wave_head(PCM_RATE, len(pcm), sound_mark(UNKNOWN)) + pcm
     return audio_fields(events, subtitles) | {"audioEncoding": body.audioEncoding}, sound
 
 
