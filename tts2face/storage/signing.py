@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import BackendError, DataError, InputError, import_of_extra
 from lexicon.values.json_text import parse_json
-from tts2face import __version__
-from tts2face.storage.marks import COMPOSITE, SOURCE_TYPES, TRAINED, Mark
+from tts2face.storage.marks import COMPOSITE, SOURCE_TYPES, TRAINED, VERSION, Mark
 
 if TYPE_CHECKING:
     from cryptography.x509 import Certificate
@@ -160,7 +159,7 @@ class Signer:
 
 
 def _statement(mark: Mark) -> dict[str, Any]:
-    agent = {"name": "tts2face", "version": __version__}
+    agent = {"name": "tts2face", "version": VERSION}
     action = {"action": "c2pa.created", "digitalSourceType": mark.source_uri, "softwareAgent": agent}
     return {
         "claim_generator_info": [agent],
