@@ -18,6 +18,7 @@ from lexicon.locales.tables import alternatives, find_locale
 
 _KANA = re.compile("[ァ-ヺー]+")
 _OF_NUMBERS = frozenset("0123456789０１２３４５６７８９.,．，")
+_NO_NUMBER_BEFORE = "(?<![一二三四五六七八九十百千万億])"
 _MINUS = str.maketrans("−", "-")
 _MARKS = "。、，．！？…!?,;:；："
 # what stands between marks and spaces, with the brackets around it
@@ -98,9 +99,17 @@ def _read_phrases(text: str) -> tuple[JapanesePhrase, ...]:
         end = start
         for piece in chunk.split(" "):  # white space alone is dropped
             end = text.index(piece, end) + len(piece)
-        found += _phrases(read(chunk), _folded(text[start:end]), start)
+        found += _phrases(read(_with_digits(chunk)), _folded(text[start:end]), start)
         start = end
     return tuple(_whole_numbers(found, text))
+
+
+def _with_digits(text: str) -> str:
+    """A text in which numbers are digits where the library reads their characters as another word (十分, 八百)."""
+    locale = find_locale("ja")
+    for pattern, row in locale.rows("counted").items() if locale else ():
+        text = re.sub(f"{_NO_NUMBER_BEFORE}(?:{pattern})", row.spoken, text)
+    return text
 
 
 def numbers_in_kana(words: str) -> str:

@@ -35,6 +35,7 @@ letter       name of a letter
 letter_value number of a letter that is a digit (Greek ΙΘ΄)
 initialism   capitals that are read letter by letter (``letters``), or their words
 form         written form with a pattern and a template of its own (`lexicon.locales.templates`)
+counted      pattern of a number in Chinese characters that is also another word, and the number in digits
 kana         Chinese characters of numbers in kana, for Japanese without its reader
 numeral      words of numbers of which CLDR has no grammatical forms
 ============ ====================================================================================================
@@ -114,7 +115,7 @@ def _read(name: str) -> dict[str, dict[str, Row]] | None:
     for line in path.read_text(encoding="utf-8").splitlines()[1:]:
         kind, written, spoken, details = (line.split("\t") + [""] * COLUMNS)[:COLUMNS]
         row = Row(spoken, MappingProxyType(dict(_detail(part) for part in details.split(";") if part)))
-        for form in [written] if kind in {"fix", "form", "one"} or len(written) == 1 else written.split("|"):
+        for form in [written] if kind in {"fix", "form", "one", "counted"} or len(written) == 1 else written.split("|"):
             kinds.setdefault(kind, {})[form] = row
     return kinds
 

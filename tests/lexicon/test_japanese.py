@@ -32,6 +32,18 @@ def test_most_sentences_are_read_as_a_person_reads_them() -> None:
 
 
 @JAPANESE
+@pytest.mark.parametrize(
+    ("text", "kana"),
+    [
+        ("5分待つ。", "ゴフンマツ"), ("10分です。", "ジュップンデス"), ("9:12", "クジジューニフン"), ("800です。", "ハッピャクデス"),
+        ("十分で食べた。", "ジュップンデタベタ"), ("それで十分だ。", "ソレデジューブンダ"), ("八百屋", "ヤオヤ"), ("3行", "サンギョー"),
+    ],
+)  # fmt: skip
+def test_a_number_whose_characters_are_another_word_is_read_as_a_number(text: str, kana: str) -> None:
+    assert reading(spoken_form(text, "ja")) == kana
+
+
+@JAPANESE
 def test_phrases_are_separated_and_punctuation_is_kept() -> None:
     assert japanese.to_kana("今日は、東京へ行きます。") == "キョーワ、 トーキョーエ イキマス。"
 
