@@ -35,10 +35,16 @@ def test_most_sentences_are_read_as_a_person_reads_them() -> None:
 @pytest.mark.parametrize(
     ("text", "kana"),
     [
-        ("5分待つ。", "ゴフンマツ"), ("10分です。", "ジュップンデス"), ("9:12", "クジジューニフン"), ("800です。", "ハッピャクデス"),
-        ("十分で食べた。", "ジュップンデタベタ"), ("それで十分だ。", "ソレデジューブンダ"), ("八百屋", "ヤオヤ"), ("3行", "サンギョー"),
+        ("5分待つ。", "ゴフンマツ"),
+        ("10分です。", "ジュップンデス"),
+        ("9:12", "クジジューニフン"),
+        ("800です。", "ハッピャクデス"),
+        ("十分で食べた。", "ジュップンデタベタ"),
+        ("それで十分だ。", "ソレデジューブンダ"),
+        ("八百屋", "ヤオヤ"),
+        ("3行", "サンギョー"),
     ],
-)  # fmt: skip
+)
 def test_a_number_whose_characters_are_another_word_is_read_as_a_number(text: str, kana: str) -> None:
     assert reading(spoken_form(text, "ja")) == kana
 
@@ -94,11 +100,13 @@ def test_kana_without_the_reader_have_their_particles(monkeypatch: pytest.Monkey
 @pytest.mark.parametrize(
     ("text", "spoken"),
     [
-        ("100000えんです。", "じゅうまんえんです。"), ("3600えん", "さんぜんろっぴゃくえん"),
-        ("-5どです。", "マイナスごどです。"), ("14:30に あう。", "じゅうよじさんじゅっぷんに あう。"),
+        ("100000えんです。", "じゅうまんえんです。"),
+        ("3600えん", "さんぜんろっぴゃくえん"),
+        ("-5どです。", "マイナスごどです。"),
+        ("14:30に あう。", "じゅうよじさんじゅっぷんに あう。"),
         ("2024/5/1", "にせんにじゅうよねんごがつついたち"),
     ],
-)  # fmt: skip
+)
 def test_numbers_are_kana_without_the_reader(text: str, spoken: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(japanese, "has_reader", lambda: False)
     assert spoken_form(text, "ja") == spoken
