@@ -29,7 +29,7 @@ def read_measure(place: Place) -> str | None:
     said = said or count(locale, place.amount("amount"), row, grammar.case)
     if place.match["per"]:
         said = f"{said} {_per_unit(locale, place.match['per'])}"
-    return said
+    return _with_stop(place, said)
 
 
 def _magnified(place: Place, row: Row, case: str) -> str:
@@ -58,7 +58,13 @@ def read_money(place: Place) -> str:
     case = place.grammar("cardinal").case
     said = _magnified(place, row, case) if place.match["magnitude"] else money(locale, amount, row, case)
     per = place.match.groupdict().get("per")
-    return f"{said} {_per_unit(locale, per)}" if per else said
+    return _with_stop(place, f"{said} {_per_unit(locale, per)}" if per else said)
+
+
+def _with_stop(place: Place, said: str) -> str:
+    """Words with the full stop of an abbreviation where it also ends the sentence: 3 млн руб. Цена ..."""
+    ends = place.match.group().endswith(".") and place.after[:1].isupper() and not place.locale.setting("capital_nouns")
+    return f"{said}." if ends else said
 
 
 def _per_unit(locale: Locale, written: str) -> str:

@@ -8,6 +8,11 @@ from lexicon.locales.place import Place
 from lexicon.locales.tables import Locale, Row
 
 _DAYS, _MONTHS = 31, 12
+# Both times of a span have four digits (08.00-17.00): other numbers with a full stop are amounts.
+_DOTTED_TIME = re.compile(r"[0-2][0-9]\.[0-5][0-9](?![0-9.])")
+_DOTTED_SPAN = re.compile(rf"{_DOTTED_TIME.pattern} ?[-–] ?{_DOTTED_TIME.pattern}")
+_SPAN_BEFORE = re.compile(r"(?<![0-9.])[0-2][0-9]\.[0-5][0-9] ?[-–] ?\Z")
+_SPAN = 10  # characters of a time and its dash, at most
 
 
 def read_numeric_date(place: Place) -> str | None:
@@ -151,7 +156,11 @@ def read_time(place: Place) -> str | None:
 
 
 def _is_after_time_word(place: Place) -> bool:
-    return place.before.lower() in place.locale.words("time_before")
+    start = place.match.start()
+    is_span = _DOTTED_SPAN.match(place.text, start) or (
+        _DOTTED_TIME.match(place.text, start) and _SPAN_BEFORE.search(place.text[max(start - _SPAN, 0) : start])
+    )
+    return bool(is_span) or place.before.lower() in place.locale.words("time_before")
 
 
 def time_words(locale: Locale, hour: int, minute: int, case: str = "") -> str:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from lexicon.locales.harmony import with_tail
 from lexicon.locales.place import Place
-from lexicon.locales.scanner import PLACE, scanner
+from lexicon.locales.scanner import PLACE, VOWEL_SIGNS, scanner
 from lexicon.locales.tables import Locale, find_locale
 from lexicon.written_forms import WrittenForm, read_table
 
@@ -15,7 +15,7 @@ _PLAIN = {0xA0: " ", 0x202F: " ", 0x2009: " ", 0x2007: " ", 0x2212: "-", 0x2010:
           0x7C: " ", 0xFF05: "%", 0x66A: "%", 0x66B: ".", 0x66C: ",", 0x2019: "'", 0x2BC: "'",
           0x2126: "\u03a9"}  # fmt: skip
 _MINUS = re.compile(r"(?<![\w.,])([-−][0-9]{1,400}(?:[.,][0-9]{1,400})?)")
-_LAST_WORD = re.compile(r"[^\W\d_]+\Z")
+_LAST_WORD = re.compile(rf"(?:[^\W\d_]|[{VOWEL_SIGNS}])+\Z")
 
 
 class _PlainCharacters(dict[int, str]):

@@ -17,8 +17,8 @@ LETTER = r"[^\W\d_\u00b2\u00b3\u00b9\u00bc-\u00be\u2070-\u209f\u2150-\u218b]"
 # Latin letters among others are words of their own (我的iPhone, وWi-Fi); signs of vowels belong to a word (डॉ.).
 _LATIN = "A-Za-z\u00aa\u00ba\u00c0-\u00d6\u00d8-\u00f6\u00f8-\u024f\u0300-\u036f\u1e00-\u1eff"
 _UNSPACED = "\u2e80"  # the first character of writing without spaces
-_VOWEL_SIGNS = "\u064b-\u065f\u0670\u0900-\u0903\u093a-\u094f\u0955-\u0957\u0962\u0963"
-WORD = rf"(?:[{_LATIN}]+|(?:(?![{_LATIN}]){LETTER}|[{_VOWEL_SIGNS}])+)"
+VOWEL_SIGNS = "\u064b-\u065f\u0670\u0900-\u0903\u093a-\u094f\u0955-\u0957\u0962\u0963"
+WORD = rf"(?:[{_LATIN}]+|(?:(?![{_LATIN}]){LETTER}|[{VOWEL_SIGNS}])+)"
 PLACE = re.compile(rf"(?P<number>[0-9\u00bc-\u00be\u2150-\u215e])|(?P<word>{WORD})|[^\w\s]|\S")
 _LEADING_LETTERS = re.compile(rf"{WORD}?")
 _INITIALISM = r"(?P<letters>[A-ZÄÖÜÀ-ÖØ-ÞĄ-ŽА-ЯЁ]{2,8})(?P<ending>s)?(?!{letter})"
@@ -130,7 +130,8 @@ _NUMBER_FORMS: tuple[tuple[str, Reader], ...] = (
         dates.read_time,
     ),
     (
-        r"\+[0-9]{1,3}(?:[ ./-]?\(?[0-9]{1,5}\)?){2,6}(?!\w)|0[0-9]{1,4}(?:[ ./-][0-9]{2,8}){1,5}(?!\w)"
+        r"\+[0-9]{1,3}(?:[ ./-]?\(?[0-9]{1,5}\)?){2,6}(?!\w)"
+        r"|0(?![0-9]\.[0-5][0-9](?![0-9.]))[0-9]{1,4}(?:[ ./-][0-9]{2,8}){1,5}(?!\w)"  # but 08.00-17.00
         r"|\(?[0-9]{2,3}\) ?[0-9]{2,5}[ -][0-9]{2,5}(?:[ -][0-9]{2,4})?(?!\w)",
         digit_groups.read_telephone,
     ),
