@@ -14,7 +14,6 @@ from typing import Any
 
 from lexicon.chunks import split_chunks
 from lexicon.errors import BackendError, import_of_extra
-from lexicon.locales.tables import alternatives, find_locale
 
 _KANA = re.compile("[ァ-ヺー]+")
 _OF_NUMBERS = frozenset("0123456789０１２３４５６７８９.,．，")
@@ -116,6 +115,8 @@ def numbers_in_kana(words: str) -> str:
     """Words of a number in kana, where the library that reads Chinese characters is not installed."""
     if has_reader():
         return words
+    from lexicon.locales.tables import alternatives, find_locale
+
     locale = find_locale("ja")
     if locale is None:
         return words

@@ -19,7 +19,6 @@ from lexicon.sentence_length import MAX_SENTENCE_CHARACTERS
 from lexicon.ssml_leniency import nearest_style
 from lexicon.written_forms import read_table
 
-AUTO_STYLE = "auto"  # the style that follows the words
 # Styles of speech services for moods; their nearest ones are shown (`lexicon.ssml_leniency.nearest_style`).
 MOODS: Mapping[str, str] = MappingProxyType(
     {"happy": "happy", "sad": "sad", "angry": "angry", "frustrated": "disgruntled", "surprised": "surprised"}
@@ -86,11 +85,6 @@ def sentence_mood(sentence: str) -> Mood:
     if sums.get(best, 0.0) < (LEAST if strongest > 1.0 else LEAST_OF_HINTS) or sums[best] - second < MARGIN:
         return Mood(None)
     return Mood(best, tuple((part.words, part.weight) for part in found if part.mood == best))
-
-
-def is_auto(style: str | None) -> bool:
-    """Whether a style is that of the words."""
-    return style is not None and style.strip() == AUTO_STYLE
 
 
 def with_moods(text: MarkedText, language: str) -> tuple[MarkedText, tuple[str, ...]]:

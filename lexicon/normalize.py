@@ -15,7 +15,6 @@ from lexicon.capitals import sentence_case
 from lexicon.form_table import form_table
 from lexicon.japanese import numbers_in_kana
 from lexicon.kept_signs import keep_signs, written_signs
-from lexicon.locales.reading import read_forms
 from lexicon.number_words import MAX_CARDINAL_DIGITS
 from lexicon.pauses import MARKS, last_mark
 from lexicon.scripts import name_foreign_letters, name_letters_in_words
@@ -118,6 +117,8 @@ def spoken_forms(text: str, language: str) -> list[WrittenForm]:
     of other writing systems are replaced by their names; a word of more than 100 letters is divided, as are the digits
     of a longer number than English names.
     """
+    from lexicon.locales.reading import read_forms  # with its patterns, of which English needs none
+
     forms = read_forms(text, language)
     if language == "ja":
         forms = [form if form.source == form.spoken else _in_kana(form) for form in forms]

@@ -19,7 +19,6 @@ from importlib import resources
 from types import MappingProxyType
 
 from lexicon import written_forms as readings
-from lexicon.locales.tables import find_locale
 
 _WORD = re.compile(r"""[^\s("'“‘«„\[]*\Z""")
 _FIRST_WORD = re.compile(r"""["'“‘«(\[]*([^\W\d_]{1,40})""")
@@ -60,6 +59,10 @@ def _rules(language: str) -> dict[str, _StopRule]:
     """Rules of a language by abbreviation: of its rows, of all languages without rows, and of its own table."""
     table = _rule_table()
     own = dict(table.get(language, table["*"]))
+    if language == "en":  # whose rows are in the tables above
+        return own
+    from lexicon.locales.tables import find_locale
+
     locale = find_locale(language)
     for written, row in locale.rows("abbreviation").items() if locale else ():
         if written.endswith(".") and not {"end", "after"} & row.details.keys():

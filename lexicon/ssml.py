@@ -24,7 +24,7 @@ from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.inline_marks import Cue, Rules, Text, read_words
 from lexicon.mark_cues import PlacedCue, with_cues
 from lexicon.mark_table import MarkTable, shipped_marks
-from lexicon.marked_text import MAX_NESTING, GestureMark, MarkedText, NameMark, PhoneMark
+from lexicon.marked_text import MAX_NESTING, GestureMark, MarkedText, NameMark
 from lexicon.marked_text_builder import MarkedTextBuilder
 from lexicon.say_as import reads_kind, say_as
 from lexicon.ssml_leniency import (
@@ -41,11 +41,13 @@ from lexicon.ssml_prosody import look_up_value, parse_contour, parse_pitch, pars
 from lexicon.ssml_values import (
     ALPHABETS,
     BREAKS_S,
+    VoiceHz,
+    add_phonemes,
     check_lengths,
     choose_voice,
     known_language,
-    phoneme_words,
     primary_subtag,
+    typical_hz,
 )
 from lexicon.tones import Tone
 
@@ -58,14 +60,7 @@ SPAN_KINDS = frozenset({"emphasis", "prosody", "express-as", "voice", "lang"})
 LEAF_KINDS = frozenset({"break", "mark", "sub", "phoneme", "say-as"})  # contain no elements
 PASSED = ""  # in place of the name of an element that is not followed, whose text is spoken
 REPLACED_KINDS = frozenset({"phoneme", "say-as"})  # speak other words than their text
-TYPICAL_HZ = 165.0  # between the usual pitch of men and of women, for a voice of which it is not known
 Attributes = Mapping[str, str]
-VoiceHz = Callable[[str | None, str], float]  # usual pitch of a voice (None: that of the request) in a language
-
-
-def typical_hz(_: str | None, __: str) -> float:
-    """Pitch of a voice of which nothing is known, in Hz."""
-    return TYPICAL_HZ
 
 
 def parse_ssml(
@@ -302,7 +297,7 @@ class _SsmlReader:
         if kind == "phoneme" and alphabet in ALPHABETS:
             self._add_text(" " if self._is_apart and self._builder.last_character.isalnum() else "")
             try:
-                _add_phonemes(self._builder, text, attributes["ph"], alphabet)
+                add_phonemes(self._builder, text, attributes["ph"], alphabet)
             except InputError as wrong:
                 self._note(f"<phoneme> is not followed: {wrong}")
                 self._add_text(text)
@@ -398,11 +393,3 @@ def _parse_time(written: str, element: str) -> float:
     if match is None:
         raise InputError(f'cannot read the time {written[:40]!r} of a {element}; write "400ms" or "0.4s"')
     return float(match[1]) / (1000 if match[2].lower() == "ms" else 1)
-
-
-def _add_phonemes(builder: MarkedTextBuilder, text: str, phones: str, alphabet: str) -> None:
-    """Add words with given phones."""
-    for number, (word, segments) in enumerate(phoneme_words(text, phones, alphabet)):
-        start = builder.at + (number > 0)
-        builder.add_mark(PhoneMark(start, start + len(word), segments))
-        builder.add_text(f" {word}" if number else word)

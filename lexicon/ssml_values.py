@@ -9,8 +9,12 @@ from lexicon.dictionary import arpabet_segments
 from lexicon.errors import InputError
 from lexicon.ipa import IpaPhone, parse_ipa
 from lexicon.languages import language_code
+from lexicon.marked_text import PhoneMark
+from lexicon.marked_text_builder import MarkedTextBuilder
 
 Attributes = Mapping[str, str]
+TYPICAL_HZ = 165.0  # between the usual pitch of men and of women, for a voice of which it is not known
+VoiceHz = Callable[[str | None, str], float]  # usual pitch of a voice (None: that of the request) in a language
 MAX_ATTRIBUTE_CHARACTERS = 10_000  # longer text belongs between tags
 # Seconds by strength: from pauses of read speech at commas (0.2-0.4 s) to those between paragraphs (1 s).
 BREAKS_S = MappingProxyType({"none": 0.0, "x-weak": 0.1, "weak": 0.2, "medium": 0.4, "strong": 0.7, "x-strong": 1.0})
@@ -27,6 +31,11 @@ MAX_WORD_CHARACTERS = 60  # characters of a word with given phones
 _LOCALE = re.compile(r"([a-z]{2,3}-[A-Z]{2})-\w")  # de-DE-KatjaNeural, en-US-Neural2-C
 _NO_WORD = re.compile(r"[^\w'’-]+")
 PhonemeWord = tuple[str, tuple[IpaPhone, ...]]
+
+
+def typical_hz(_: str | None, __: str) -> float:
+    """Pitch of a voice of which nothing is known, in Hz."""
+    return TYPICAL_HZ
 
 
 def primary_subtag(tag: str) -> str:
@@ -125,3 +134,11 @@ def _language_of_name(name: str) -> str | None:
         return language_code(match[1]) if match else None
     except InputError:
         return None
+
+
+def add_phonemes(builder: MarkedTextBuilder, text: str, phones: str, alphabet: str) -> None:
+    """Add words with given phones."""
+    for number, (word, segments) in enumerate(phoneme_words(text, phones, alphabet)):
+        start = builder.at + (number > 0)
+        builder.add_mark(PhoneMark(start, start + len(word), segments))
+        builder.add_text(f" {word}" if number else word)

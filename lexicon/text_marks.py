@@ -22,7 +22,7 @@ from lexicon.mark_table import MarkTable, shipped_marks
 from lexicon.markdown import PARAGRAPH_END
 from lexicon.marked_text import GestureMark, MarkedText
 from lexicon.marked_text_builder import MarkedTextBuilder
-from lexicon.ssml import VoiceHz, _add_phonemes, parse_ssml, typical_hz
+from lexicon.ssml_values import VoiceHz, add_phonemes, typical_hz
 
 USUAL_PAUSE_S = 0.7  # of [pause] without a number, as of a strong break in SSML
 # without possessive repeats, which Python 3.11.2 loses within each other
@@ -99,6 +99,8 @@ def _read_plain(text: str, _: Reading) -> MarkedText:
 
 
 def _read_ssml(text: str, reading: Reading) -> MarkedText:
+    from lexicon.ssml import parse_ssml  # with its tables, of which other texts need none
+
     document = text if is_ssml(text) else f"<speak>{text}</speak>"
     return parse_ssml(document, reading.language, reading.voice_hz, reading.table)
 
@@ -200,7 +202,7 @@ def _read_mark(builder: MarkedTextBuilder, match: "re.Match[str]") -> None:
                 raise InputError(f"write {_mark_syntax('nod')}")
             builder.add_mark(gesture)
         elif match["name"] is None:
-            _add_phonemes(builder, match["words"], match["phones"], "ipa")
+            add_phonemes(builder, match["words"], match["phones"], "ipa")
         else:
             _read_named(builder, match["name"], match["rest"].strip(), shown)
     except InputError as wrong:

@@ -11,6 +11,7 @@ from tts2face.exclusions import check_exclusions
 from tts2face.option import check_choices, check_option_limits, option
 
 AUTO_MARKUP = "auto"
+AUTO_STYLE = "auto"  # the style that follows the words (`lexicon.moods`)
 MARKUPS = (AUTO_MARKUP, "plain", "ssml", "llm")  # as `lexicon.text_marks.MARKUPS`, which is not loaded for flags
 RECOGNISED = "phones"
 AUDIO_MAP_NAMES = (RECOGNISED, "voices", "network", "linear")
@@ -18,6 +19,11 @@ IDLE_LIMITS_S = (0.01, 3600.0)
 LEAD_S = 0.1  # from the start of a clip to its first sound: three frames at 30 Hz, in which the lips open
 LEAD_LIMITS_S = (0.0, 1.0)
 AUTO = "auto"  # the voice that fits the face, as where none is named
+
+
+def is_auto(style: str | None) -> bool:
+    """Whether a style is that of the words."""
+    return style is not None and style.strip() == AUTO_STYLE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

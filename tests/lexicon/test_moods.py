@@ -6,10 +6,11 @@ from collections import Counter
 import pytest
 
 from lexicon.marked_text import MarkedText, StyleRun
-from lexicon.moods import MOODS, is_auto, mood_rows, sentence_mood, with_moods
+from lexicon.moods import MOODS, mood_rows, sentence_mood, with_moods
 from lexicon.ssml_leniency import nearest_style
 from lexicon.text_marks import parse_marks
 from tests.bench.bench_moods import read_sentences
+from tts2face.source_options import is_auto
 
 
 @pytest.mark.parametrize(("use", "least"), [("given", 48), ("kept", 43)])

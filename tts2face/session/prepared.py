@@ -15,7 +15,6 @@ from lexicon.ipa import IpaPhone
 from lexicon.languages import language_code
 from lexicon.mark_table import read_marks_table
 from lexicon.marked_text import PITCH_LIMITS, RANGE_LIMITS, RATE_LIMITS, VOLUME_LIMITS, GestureMark, MarkedText
-from lexicon.moods import is_auto, with_moods
 from lexicon.scripts import check_readable
 from lexicon.sentence_length import check_silence, marked_silence_s
 from lexicon.sentences import MAX_LAST_GESTURE_S, Sentence, split_sentences
@@ -38,7 +37,7 @@ from tts2face.session.request_timeline import build_request_timeline, listening_
 from tts2face.sound.fitting import Fitting, fitting_voice
 from tts2face.sound.voice_pool import usual_pitch_hz
 from tts2face.sound.voice_urls import is_voice_url
-from tts2face.source_options import IDLE_LIMITS_S
+from tts2face.source_options import IDLE_LIMITS_S, is_auto
 from tts2face.storage.marks import Making
 from tts2face.storage.output_paths import AnyPath
 from tts2face.types import exact_rate
@@ -222,8 +221,12 @@ def read_text(request: Request, person: Person | None = None) -> tuple[MarkedTex
     """
     written = with_styles_of(read_marks(request, person), None)
     text, notes = make_readable(written, request.language)
-    text, moods = with_moods(text, request.language) if is_auto(request.style) else (text, ())
-    return written, replace(text, notes=(*written.notes, *notes, *moods))
+    if is_auto(request.style):
+        from lexicon.moods import with_moods
+
+        text, moods = with_moods(text, request.language)
+        notes = (*notes, *moods)
+    return written, replace(text, notes=(*written.notes, *notes))
 
 
 def reading_notes(request: Request, palette: str | Path | None) -> tuple[str, ...]:

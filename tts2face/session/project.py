@@ -11,7 +11,6 @@ from types import MappingProxyType
 from lexicon.dictionary import Dictionary, parse_dictionary
 from lexicon.errors import InputError
 from lexicon.ipa import IpaPhone
-from lexicon.moods import is_auto
 from lexicon.values.fields import check_fields
 from tts2face.gestures.elements import Gains, StyleSpan, check_feature
 from tts2face.gestures.timeline import Timeline, parse_style
@@ -23,6 +22,7 @@ from tts2face.request import Request
 from tts2face.session.corrections import SentenceEdges
 from tts2face.session.named_models import Models
 from tts2face.session.prepared import PreparedRequest, prepare
+from tts2face.source_options import is_auto
 
 MAX_NAME = 200
 

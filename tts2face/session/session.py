@@ -18,9 +18,7 @@ from tts2face.request import Request
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.encoded_stream import StreamFormat, encode_stream
 from tts2face.session.fixed_length import Length, clips_of_length
-from tts2face.session.live.lips import LiveLips
-from tts2face.session.live.speech import LiveSpeech
-from tts2face.session.live.stream import AHEAD_S, FaceStream
+from tts2face.session.live import AHEAD_S
 from tts2face.session.outputs import (
     OutputFiles,
     RequestSteps,
@@ -49,6 +47,9 @@ from tts2face.types import (
 )
 
 if TYPE_CHECKING:
+    from tts2face.session.live.lips import LiveLips
+    from tts2face.session.live.speech import LiveSpeech
+    from tts2face.session.live.stream import FaceStream
     from tts2face.session.performance import Performance
 
 
@@ -207,11 +208,13 @@ class Session:
         prepared = self.prepare(text, **options)
         return timed_speech(prepared, self._models.for_request(prepared).speech)
 
-    def live(self, *, sound_rate: int | None = SOUND_RATE, **options: Any) -> LiveSpeech:
+    def live(self, *, sound_rate: int | None = SOUND_RATE, **options: Any) -> "LiveSpeech":
         """A clip without an end, extended by `say`, `idle` and `listen` of the result; options and errors as `clip`.
 
         All pieces have the sample rate `sound_rate` in Hz; None: that of their voice, in silence `SOUND_RATE`.
         """
+        from tts2face.session.live.speech import LiveSpeech
+
         return LiveSpeech(self._models.seeded(Request(**options)), self._models, sound_rate)
 
     def face_stream(
@@ -223,7 +226,7 @@ class Session:
         ahead_s: float = AHEAD_S,
         draws: bool = True,
         **options: Any,
-    ) -> FaceStream:
+    ) -> "FaceStream":
         """One face on a clock: text or sound goes in, frames come out (docs/live.md).
 
         Parameters
@@ -242,6 +245,8 @@ class Session:
         options
             Fields of `Request`, such as ``style="delighted"``; errors as `clip`.
         """
+        from tts2face.session.live.stream import FaceStream
+
         picture, options = split_picture(picture, options)
         speech = self.live(fps=fps, **options)
         has_gestures = speech.request.has_gestures
@@ -249,8 +254,10 @@ class Session:
         channels = self.animated_face(has_gestures=has_gestures).channels
         return FaceStream(speech, self.listen, renderer, channels, idle=idle, ahead_s=ahead_s)
 
-    def listen(self, rate: int = FEATURE_RATE, *, audio_map: str | None = None) -> LiveLips:
+    def listen(self, rate: int = FEATURE_RATE, *, audio_map: str | None = None) -> "LiveLips":
         """Lip motion of speech that is still being spoken; arguments and errors as `LiveLips`."""
+        from tts2face.session.live.lips import LiveLips
+
         return LiveLips(self._models, rate, audio_map)
 
     def stream_file(

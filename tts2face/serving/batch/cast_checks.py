@@ -5,7 +5,6 @@ from functools import lru_cache
 from typing import Any
 
 from lexicon.errors import InputError
-from lexicon.moods import is_auto
 from tts2face.articulation import NATURAL, parse_articulation
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_names import BALD
@@ -15,7 +14,7 @@ from tts2face.session.catalogue import identities
 from tts2face.session.named_models import Models
 from tts2face.sound.voice_pool import find_voice
 from tts2face.sound.voice_urls import is_voice_url
-from tts2face.source_options import AUTO
+from tts2face.source_options import AUTO, is_auto
 
 
 def check_names(models: Models, request: Mapping[str, Any]) -> None:

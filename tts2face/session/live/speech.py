@@ -6,7 +6,6 @@ from functools import partial
 
 from lexicon.errors import InputError
 from lexicon.marked_text import GestureMark
-from lexicon.moods import is_auto
 from lexicon.pauses import pause_behind
 from lexicon.sequence import PhoneSequence
 from tts2face.gestures.elements import ListeningSpan
@@ -21,6 +20,7 @@ from tts2face.session.prepared import PreparedRequest, prepare
 from tts2face.session.shared_models import SessionModels
 from tts2face.session.speech_stream import Piece, after_listening
 from tts2face.session.steps import moved_pieces, pieces_from
+from tts2face.source_options import is_auto
 from tts2face.types import SOUND_RATE, Clip, Speech, Trajectory, Waveform, exact_rate
 
 UNUSED_IDLE_S = 1.0  # of the request from which the gestures of the whole are made

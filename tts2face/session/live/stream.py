@@ -18,6 +18,7 @@ from lexicon.gesture_marks import parse_gesture
 from lexicon.gesture_names import GESTURES
 from lexicon.marked_text import GestureMark
 from tts2face.picture.frame_renderer import FrameRenderer
+from tts2face.session.live import AHEAD_S
 from tts2face.session.live.blocks import Item
 from tts2face.session.live.frames import Frame
 from tts2face.session.live.line import Line, Place
@@ -27,7 +28,6 @@ from tts2face.session.live.speech import LiveSpeech
 from tts2face.sound.features import FEATURE_RATE
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, resting_head
 
-AHEAD_S = 0.2  # of frames in the line: six at 30 a second
 MOST_AHEAD_S = 2.0  # frames of 512 x 512 are 0.8 MB each
 READY_S = 2.0  # of motion and sound that are made before the line has room: the next sentences
 IDLE_AHEAD_S = 2.0  # of idle motion that is made before it is needed
