@@ -105,6 +105,8 @@ def _read_phrases(text: str) -> tuple[JapanesePhrase, ...]:
 
 def _with_digits(text: str) -> str:
     """A text in which numbers are digits where the library reads their characters as another word (十分, 八百)."""
+    from lexicon.locales.tables import find_locale
+
     locale = find_locale("ja")
     for pattern, row in locale.rows("counted").items() if locale else ():
         text = re.sub(f"{_NO_NUMBER_BEFORE}(?:{pattern})", row.spoken, text)
