@@ -355,7 +355,8 @@ class _Scanner:
             return None
         is_attribute = not found.is_verb and (word := _LAST_WORD.search(self.tail)) and is_function_word(word[1])
         stands_alone = _CLAUSE_START.search(self.tail) or self._is_first() or _CLOSE_END.match(self._after(match.end()))
-        is_model = self._rules.is_model and not is_attribute
+        is_exclaimed = "!" in words  # (looks!) is said, but where it stands alone
+        is_model = self._rules.is_model and not is_attribute and not is_exclaimed
         shows = any(mark.gesture or mark.style or mark.pause_s for mark in found.marks)
         if not (stands_alone or is_model or (found.is_verb and shows and " " not in words)):
             return None

@@ -18,7 +18,7 @@ from lexicon.kept_signs import keep_signs, written_signs
 from lexicon.number_words import MAX_CARDINAL_DIGITS
 from lexicon.pauses import MARKS, last_mark
 from lexicon.scripts import name_foreign_letters, name_letters_in_words
-from lexicon.sources import written_groups
+from lexicon.sources import with_written_sources, written_groups
 from lexicon.vowels import add_vowels
 from lexicon.written_forms import WrittenForm
 from lexicon.written_words import spaced_words
@@ -72,6 +72,10 @@ def _find_forms(text: str) -> Iterator[tuple[re.Match[str], forms.Reader]]:
 
 def split_tokens(text: str) -> Iterator[WrittenForm]:
     """Written forms of an English text in order, with their words; the text between them is white space."""
+    return with_written_sources(_tokens(text), text)
+
+
+def _tokens(text: str) -> Iterator[WrittenForm]:
     previous = ""
     for match, read in _find_forms(name_letters_in_words(sentence_case(canonical_text(keep_signs(text))))):
         spoken = _name_letters(read(match, previous))

@@ -1,7 +1,8 @@
 """Written forms of spoken words: which part of a text (1 234 567, 3,50 €) each word is a part of."""
 
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import accumulate
 
 from lexicon.written_forms import WrittenForm
@@ -55,6 +56,39 @@ def written_groups(words: Sequence[str], forms: Sequence[WrittenForm]) -> list[t
             found.append((source, range(at, at + 1)))
         before = number
     return found
+
+
+def with_written_sources(forms: Iterable[WrittenForm], text: str) -> Iterator[WrittenForm]:
+    """Forms with sources as they are written (cm², ½, H₂O), where characters of the text were replaced (cm^2).
+
+    The letters of the sources are those of the text in order, in compatible characters (NFKC); where they differ, that
+    form and those behind it stay as they are.
+    """
+    letters = [(letter, at) for at, sign in enumerate(text) for letter in _folded(sign)] if not text.isascii() else []
+    first = 0
+    for form in forms:
+        own = _folded(form.source)
+        found = letters[first : first + len(own)]
+        if not own or "".join(letter for letter, _ in found) != own:
+            letters = letters if not own else []
+            yield form
+            continue
+        first += len(own)
+        start, end = found[0][1], found[-1][1] + 1
+        while start and not form.source[0].isalnum() and _is_sign(text[start - 1]):
+            start -= 1
+        while end < len(text) and not form.source[-1].isalnum() and _is_sign(text[end]):
+            end += 1
+        written = text[start:end]
+        yield form if form.source.isascii() and written.isascii() else replace(form, source=written)
+
+
+def _folded(text: str) -> str:
+    return _letters(unicodedata.normalize("NFKC", text)).casefold()
+
+
+def _is_sign(character: str) -> bool:
+    return not character.isalnum() and not character.isspace()
 
 
 def _n_letters(text: str) -> int:

@@ -5,7 +5,7 @@
 ``break``               silence: ``time`` (``400ms``, ``0.4s``), or ``strength``; also ``mstts:silence`` at both ends
 ``emphasis``            F0, length and level of words, and a nod; ``level`` strong, moderate, none, reduced (no nod)
 ``prosody``             ``rate``, ``volume``, ``pitch``, ``range``, ``contour``, ``duration`` (`lexicon.ssml_prosody`)
-``mark``                a ``name`` whose time is reported
+``mark``                a ``name`` whose time is reported; ``gesture:wink left`` is a gesture, as in square brackets
 ``sub``                 ``alias`` is spoken instead of the text
 ``phoneme``             ``ph`` is spoken instead of the text: IPA, or ARPABET with ``alphabet="x-arpabet"``
 ``say-as``              the text is read as ``interpret-as`` (`lexicon.say_as`)
@@ -21,6 +21,7 @@ from xml.parsers import expat
 
 from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE
+from lexicon.gesture_marks import parse_gesture
 from lexicon.inline_marks import Cue, Rules, Text, read_words
 from lexicon.mark_cues import PlacedCue, with_cues
 from lexicon.mark_table import MarkTable, shipped_marks
@@ -364,7 +365,9 @@ class _SsmlReader:
         name = attributes.get("name", "")
         if not name.strip():
             raise InputError('a <mark> needs a name; write <mark name="here"/>')
-        self._builder.add_mark(NameMark(self._builder.at, name))
+        kind, _, written = name.partition(":")
+        gesture = parse_gesture(written, self._builder.at) if kind.strip() == "gesture" else None
+        self._builder.add_mark(gesture or NameMark(self._builder.at, name))
 
     def _sub(self, attributes: Attributes) -> None:
         alias = attributes.get("alias", "")

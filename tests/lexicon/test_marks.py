@@ -210,6 +210,12 @@ def test_an_element_that_is_not_understood_costs_the_element(inside: str, reason
     assert found.runs[-1].is_spoken_as(StyleRun(0))
 
 
+def test_marks_of_ssml_are_gestures_by_their_name() -> None:
+    found = ssml('a <mark name="gesture:look at left 20 2s"/>b <mark name="gesture:nod 9"/>c <mark name="gesture:so"/>d')
+    assert found.marks == (GestureMark(2, "look_at", 1.0, 2.0, None, 20.0), NameMark(6, "gesture:so"))
+    assert "<mark> is not followed: the size of the gesture nod must lie" in found.notes[0]
+
+
 def test_marks_and_emoji_within_ssml_are_silent() -> None:
     found = ssml("One [nod] two \U0001f622. [style:a]Three[/style] [laughs] four")
     assert found.text.split() == ["One", "two", ".", "Three", "four"]

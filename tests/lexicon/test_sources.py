@@ -3,8 +3,10 @@
 import pytest
 
 from lexicon.locales.harmony import with_tail
+from lexicon.marked_text import MarkedText
 from lexicon.normalize import spoken_forms, written_pieces
 from lexicon.sources import sources_of, written_groups
+from lexicon.spoken_words import pronounce_marked
 from lexicon.written_forms import WrittenForm
 
 
@@ -41,3 +43,16 @@ def test_forms_side_by_side_are_one_word() -> None:
 )  # fmt: skip
 def test_endings_follow_the_last_vowel(said: str, tail: str, joined: str) -> None:
     assert with_tail(said, tail) == joined
+
+
+@pytest.mark.parametrize(
+    ("text", "sources"),
+    [
+        ("It is 5 cm² wide.", ["It", "is", "5 cm²", "5 cm²", "5 cm²", "wide"]),
+        ("Drink H₂O, and ½ cup.", ["Drink", "H₂O", "H₂O", "H₂O", "and", "½", "½", "cup"]),
+        ("It’s №5 at 10 °C.", ["It’s", "№", "5", "at", "10 °C", "10 °C", "10 °C"]),
+        ("x² costs €5", ["x", "²", "costs", "€5", "€5"]),
+    ],
+)
+def test_english_sources_are_what_is_written(text: str, sources: list[str]) -> None:
+    assert [word.source for word in pronounce_marked(MarkedText(text)).words] == sources

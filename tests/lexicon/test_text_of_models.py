@@ -155,3 +155,9 @@ def test_comparisons_and_names_in_brackets_are_spoken(text: str, spoken: str) ->
     assert " ".join(word.text for word in pronounce_marked(parse_marks(text)).words) == spoken
     model = " ".join(word.text for word in pronounce_marked(parse_marks("So, x<y then y>x.", markup="llm")).words)
     assert model == "So x less than y then y greater than x"
+
+
+def test_an_exclamation_in_parentheses_is_said_but_where_it_stands_alone() -> None:
+    for markup in ("auto", "llm"):
+        assert parse_marks("She has it all (looks!) and brains.", "en-us", markup).text.count("looks!") == 1
+        assert "laughs" not in parse_marks("(laughs!) Sure.", "en-us", markup).text
