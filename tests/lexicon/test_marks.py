@@ -211,7 +211,8 @@ def test_an_element_that_is_not_understood_costs_the_element(inside: str, reason
 
 
 def test_marks_of_ssml_are_gestures_by_their_name() -> None:
-    found = ssml('a <mark name="gesture:look at left 20 2s"/>b <mark name="gesture:nod 9"/>c <mark name="gesture:so"/>d')
+    marks = [f'<mark name="gesture:{name}"/>' for name in ("look at left 20 2s", "nod 9", "so")]
+    found = ssml(f"a {marks[0]}b {marks[1]}c {marks[2]}d")
     assert found.marks == (GestureMark(2, "look_at", 1.0, 2.0, None, 20.0), NameMark(6, "gesture:so"))
     assert "<mark> is not followed: the size of the gesture nod must lie" in found.notes[0]
 
