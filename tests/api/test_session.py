@@ -55,7 +55,7 @@ def test_what_a_session_returns_can_be_drawn(
 def test_speech_is_synthesised_while_the_renderer_is_built(
     session: tts2face.Session, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    begun, models, build = threading.Event(), session._models, session.renderer
+    begun, models, build = threading.Event(), session._models, session._models.renderer
     synthesise, waited = type(models).pieces, []
 
     def pieces(*given):  # type: ignore[no-untyped-def]
@@ -67,7 +67,7 @@ def test_speech_is_synthesised_while_the_renderer_is_built(
         return build(*given, **named)
 
     monkeypatch.setattr(type(models), "pieces", pieces)
-    monkeypatch.setattr(session, "renderer", renderer)
+    monkeypatch.setattr(models, "renderer", renderer)
     written = session.write("Bob may.", tmp_path / "frames", picture=SMALL)
     assert waited == [True]
     assert written.n_frames == len(list((tmp_path / "frames").glob("*.png")))

@@ -30,7 +30,9 @@ from tts2face.types import Clip, Progress, ignore_progress
 if TYPE_CHECKING:
     from tts2face.picture.film import ClipWriter
     from tts2face.picture.frame_renderer import FrameRenderer
+    from tts2face.picture.options import Picture
     from tts2face.session.animated_face import AnimatedFace
+    from tts2face.session.shared_models import SessionModels
     from tts2face.sound.alignment import TextMismatch
     from tts2face.storage.signing import Signer
 
@@ -209,6 +211,25 @@ class RequestSteps:
 def ahead(pieces: Iterable[Piece]) -> Prefetch[Piece]:
     """Pieces that are synthesised in a thread, ahead of their use, as long as the ``with`` block lasts."""
     return Prefetch(pieces, N_PIECES_AHEAD)
+
+
+def write_request(
+    prepared: PreparedRequest,
+    models: "SessionModels",
+    outputs: OutputFiles,
+    picture: "Picture",
+    on_progress: Progress | None = None,
+    on_piece: Callable[[Piece], None] | None = None,
+) -> WrittenClip:
+    """Synthesise a request and write it to its outputs; arguments as of `tts2face.Session.write`."""
+    has_gestures = prepared.request.has_gestures
+    prepared.preload_voice(models.voices, models.person)  # while the face is prepared
+    progress = RequestSteps(prepared.n_steps, on_progress or ignore_progress)
+    face = models.face(has_gestures=has_gestures)
+    with ahead(models.pieces(prepared, progress.report_heard)) as pieces:  # while the renderer is built
+        renderer = None if outputs.out is None else models.renderer(picture, has_gestures=has_gestures)
+        with outputs.open(face, renderer, progress.report_frames, models.making(prepared)) as files:
+            return write_pieces(pieces, files, outputs, progress, on_piece)
 
 
 def write_pieces(

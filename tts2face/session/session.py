@@ -6,7 +6,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lexicon.errors import InputError
 from tts2face.models.face import Face
 from tts2face.models.palette import Derivation, Palette
 from tts2face.models.person import parse_person
@@ -20,15 +19,12 @@ from tts2face.session.encoded_stream import StreamFormat, encode_stream
 from tts2face.session.fixed_length import Length, clips_of_length
 from tts2face.session.live import AHEAD_S
 from tts2face.session.outputs import (
-    OutputFiles,
-    RequestSteps,
     WrittenClip,
-    ahead,
     plan_outputs,
-    write_pieces,
+    write_request,
 )
 from tts2face.session.prepared import PreparedRequest, input_paths, prepare_request, split_picture
-from tts2face.session.shared_models import SessionModels, shown_face
+from tts2face.session.shared_models import SessionModels, photographed_face, shown_face
 from tts2face.session.speech_stream import Piece, SpeechSpan, measure_speech, timed_speech
 from tts2face.sound.features import FEATURE_RATE
 from tts2face.sound.voice_pool import VoicePool
@@ -42,7 +38,6 @@ from tts2face.types import (
     Progress,
     StageCallback,
     concatenate_clips,
-    ignore_progress,
     ignore_stage,
 )
 
@@ -115,7 +110,7 @@ class Session:
         memory_mb: float = 0.0,
     ) -> None:
         if photo is not None:
-            face = _face_of(photo, consent, smile, (face, identity, hair, hair_color))
+            face = photographed_face(photo, consent, smile, (face, identity, hair, hair_color))
         memory = ResultMemory(round(memory_mb * 1e6))
         mesh = shown_face(face, identity, hair, hair_color)
         self._models = SessionModels(
@@ -231,28 +226,20 @@ class Session:
 
         Parameters
         ----------
-        picture
-            Drawing options; if None, fields of `Picture` may be given among the options.
-        fps
-            Frames per second.
         idle
-            Whether the face moves between utterances; otherwise there are frames of speech, listening and gestures
-            only.
+            Whether it moves between utterances, too.
         ahead_s
             Seconds of frames that are made, and drawn, before they are read.
         draws
             Whether frames have pictures; senders of curves need none.
-        options
-            Fields of `Request`, such as ``style="delighted"``; errors as `clip`.
         """
         from tts2face.session.live.stream import FaceStream
 
         picture, options = split_picture(picture, options)
         speech = self.live(fps=fps, **options)
-        has_gestures = speech.request.has_gestures
+        has_gestures, face = speech.request.has_gestures, self.animated_face(has_gestures=speech.request.has_gestures)
         renderer = partial(self.renderer, picture, has_gestures=has_gestures) if draws else None
-        channels = self.animated_face(has_gestures=has_gestures).channels
-        return FaceStream(speech, self.listen, renderer, channels, idle=idle, ahead_s=ahead_s)
+        return FaceStream(speech, self.listen, renderer, face.channels, idle=idle, ahead_s=ahead_s)
 
     def listen(self, rate: int = FEATURE_RATE, *, audio_map: str | None = None) -> "LiveLips":
         """Lip motion of speech that is still being spoken; arguments and errors as `LiveLips`."""
@@ -339,7 +326,7 @@ class Session:
         picture, options = split_picture(picture, options)
         prepared = self.prepare(text, **options)
         outputs = plan_outputs(out, exports, input_paths(prepared.request, picture))
-        return self._write(prepared, outputs, picture, on_progress or ignore_progress, on_piece)
+        return write_request(prepared, self._models, outputs, picture, on_progress, on_piece)
 
     def export(
         self,
@@ -367,7 +354,7 @@ class Session:
         prepared = self.prepare(text, **options)
         exports = [paths] if isinstance(paths, str | Path) else paths
         outputs = plan_outputs(None, exports, input_paths(prepared.request, Picture()))
-        return self._write(prepared, outputs, Picture(), on_progress or ignore_progress, on_piece)
+        return write_request(prepared, self._models, outputs, Picture(), on_progress, on_piece)
 
     def write_performance(
         self,
@@ -430,29 +417,3 @@ class Session:
         new = copy(self)
         new._models = self._models.with_style(name, derived)
         return new
-
-    def _write(
-        self,
-        prepared: PreparedRequest,
-        outputs: OutputFiles,
-        picture: Picture,
-        on_progress: Progress,
-        on_piece: Callable[[Piece], None] | None,
-    ) -> WrittenClip:
-        has_gestures = prepared.request.has_gestures
-        prepared.preload_voice(self._models.voices, self._models.person)  # while the face is prepared
-        progress = RequestSteps(prepared.n_steps, on_progress)
-        face = self._models.face(has_gestures=has_gestures)
-        with ahead(self._models.pieces(prepared, progress.report_heard)) as pieces:  # while the renderer is built
-            renderer = None if outputs.out is None else self.renderer(picture, has_gestures=has_gestures)
-            with outputs.open(face, renderer, progress.report_frames, self.making(prepared)) as files:
-                return write_pieces(pieces, files, outputs, progress, on_piece)
-
-
-def _face_of(photo: str | Path, consent: str | None, smile: str | Path | None, others: tuple[object, ...]) -> Face:
-    """Face of a photo, beside which there are no other choices of a face."""
-    from tts2face.photo.face_from_photo import face_from_photo
-
-    if any(other is not None for other in others):
-        raise InputError("a photo has its own face and hair; remove face, identity and hair, or the photo")
-    return face_from_photo(photo, consent=consent, smile=smile)

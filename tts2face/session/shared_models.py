@@ -71,6 +71,17 @@ def shown_face(
     return None
 
 
+def photographed_face(
+    photo: str | Path, consent: str | None, smile: str | Path | None, others: tuple[object, ...]
+) -> Face:
+    """Face of a photo, beside which there are no other choices of a face."""
+    from tts2face.photo.face_from_photo import face_from_photo
+
+    if any(other is not None for other in others):
+        raise InputError("a photo has its own face and hair; remove face, identity and hair, or the photo")
+    return face_from_photo(photo, consent=consent, smile=smile)
+
+
 class SessionModels:
     """Talker, faces, palette, exemplars, gesture fields, renderers and voices of a session.
 

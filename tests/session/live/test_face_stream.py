@@ -93,7 +93,7 @@ def test_words_and_phones_begin_in_their_frames(session: tts2face.Session) -> No
     assert [event.text for _, event in events if event.kind == "word"] == ["We", "were", "away.", "Bob", "may", "move."]
     assert [event.text for _, event in events if event.kind == "sentence"] == ["We were away.", "Bob may move."]
     for number, event in events:
-        assert 0.0 <= event.begin - number / 30 < 1 / 30 + 1e-6
+        assert 0.0 <= event.start - number / 30 < 1 / 30 + 1e-6
 
 
 def test_utterances_follow_one_another_in_order(hearing: tts2face.Session) -> None:

@@ -17,8 +17,7 @@ from tts2face.interchange.characters.own_weights import own_names, own_weights
 from tts2face.interchange.characters.shapes import ShapeMapping
 from tts2face.interchange.exports.arkit import ARKIT_SHAPES, arkit_projection
 from tts2face.serving.service.messages import Line
-from tts2face.session.live.blocks import Block
-from tts2face.session.live.idle import IdleMotion
+from tts2face.session.live.blocks import Block, SharedMotion
 from tts2face.types import Trajectory
 
 if TYPE_CHECKING:
@@ -28,7 +27,7 @@ MAX_FRAMES = 200  # of an event, whose writing is one step of the server's event
 GAZE = tuple(name for name in ARKIT_SHAPES if name.startswith("eyeLook"))  # for a client that turns eyes by bones
 Frames = NDArray[np.float32]  # (T, W) weights, or (T, W + H) with the head
 Texts = tuple[list[str], list[str]]  # rows of weights and of head poses as JSON
-_IDLE_TEXTS: "WeakKeyDictionary[IdleMotion, Texts]" = WeakKeyDictionary()
+_IDLE_TEXTS: "WeakKeyDictionary[SharedMotion, Texts]" = WeakKeyDictionary()
 
 
 class Projection:
@@ -95,7 +94,7 @@ class Curves:
         weights, heads = self._idle_texts(idle)
         return weights[part], heads[part]
 
-    def _idle_texts(self, idle: IdleMotion) -> Texts:
+    def _idle_texts(self, idle: SharedMotion) -> Texts:
         """Rows of idle motion as JSON, which all streams share."""
         weights, heads = known = _IDLE_TEXTS.setdefault(idle, ([], []))
         if len(heads) < len(idle):

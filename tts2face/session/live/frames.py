@@ -21,13 +21,13 @@ class LiveEvent:
     ----------
     text
         Written sentence or word, phone in IPA, name of the gesture, or the note.
-    begin, end
+    start, end
         Seconds of the stream; the same for gestures and notes.
     """
 
     kind: Literal["sentence", "word", "phone", "gesture", "note"]
     text: str
-    begin: float
+    start: float
     end: float
 
 
@@ -71,7 +71,7 @@ def events_of(block: Block) -> Mapping[int, list[LiveEvent]]:
     found: dict[int, list[LiveEvent]] = defaultdict(list)
     last = len(block.motion) - 1
     for event in itertools.chain(_spoken(block), _shown(block)):
-        found[min(max(int(event.begin * block.motion.fps + 1e-6), 0), last)].append(event)
+        found[min(max(int(event.start * block.motion.fps + 1e-6), 0), last)].append(event)
     return found
 
 
@@ -84,8 +84,8 @@ def _spoken(block: Block) -> Iterator[LiveEvent]:
         yield LiveEvent("sentence", block.piece.text, 0.0, edges[-1])
     for word in speech.words:
         yield LiveEvent("word", word.text, edges[word.first], edges[word.last])
-    for phone, (begin, end) in zip(speech.phones.phones, itertools.pairwise(edges), strict=True):
-        yield LiveEvent("phone", phone, begin, end)
+    for phone, (start, end) in zip(speech.phones.phones, itertools.pairwise(edges), strict=True):
+        yield LiveEvent("phone", phone, start, end)
 
 
 def _shown(block: Block) -> Iterator[LiveEvent]:

@@ -60,7 +60,8 @@ class Joins:
 
     def _begin(self, weights: Float32Array, head: Float32Array) -> None:
         assert self.last is not None
-        self._from, self._turned, self._n_joined = self.last[0], self.last[1] - head, 0
+        self._from, self._n_joined = self.last[0], 0
+        self._turned = self.last[1] - head
         if max(np.abs(self._from - weights).max(initial=0.0), np.abs(self._turned).max()) <= LEAST_STEP:
             self._from = None
 

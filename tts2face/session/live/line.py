@@ -5,7 +5,7 @@ Without threads: `tts2face.session.live.stream` calls it under one lock.
 
 import math
 from collections import OrderedDict, deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -64,7 +64,8 @@ class Line:
     """
 
     def __init__(self, fps: float, length: int, *, has_idle: bool, draws: bool) -> None:
-        self.fps, self.length, self.late = fps, length, 0
+        self.fps, self.length = fps, length
+        self.late = 0
         self.idle: IdlePlayer | None = None
         self._has_idle, self._draws = has_idle, draws
         self._rate = exact_rate(fps)
@@ -102,7 +103,7 @@ class Line:
     @property
     def is_speaking(self) -> bool:
         """Whether an utterance has not been read to its end."""
-        waiting = any(not isinstance(one, Block) or one.utterance for one in self._blocks)
+        waiting = any(not isinstance(item, Block) or item.utterance for item in self._blocks)
         return bool(self._speaks) or waiting or any(place.utterance for place in self._places)
 
     def add(self, item: Item) -> None:
@@ -151,12 +152,12 @@ class Line:
         if self._last is None:
             return None
         self._number += 1
-        last, count = self._last, self._samples(self._number - 1)
-        state, number = last.block.state, self._speaks
-        return Frame(self._number - 1, None, np.zeros(count, np.float32), last.weights, last.head, state, number)
+        last, number = self._last, self._number - 1
+        sound = np.zeros(self._samples(number), np.float32)
+        return Frame(number, None, sound, last.weights, last.head, last.block.state, self._speaks)
 
     def _frame(self, place: Place) -> Frame:
-        pixels, begin = place.pixels, self._number / self.fps
+        pixels, start = place.pixels, self._number / self.fps
         if pixels is None and self._draws:
             self.late += 1
             pixels, self._late_pixels = self._late_pixels, None  # of a frame before it, better than none
@@ -166,8 +167,9 @@ class Line:
             while len(self._heard) > KNOWN_UTTERANCES:
                 self._heard.popitem(last=False)
         if self._ended:
-            utterance, place.ends, self._ended = self._ended, True, 0
-        events = tuple(replace(event, begin=event.begin + begin, end=event.end + begin) for event in place.events)
+            utterance, self._ended = self._ended, 0
+            place.ends = True
+        events = tuple(replace(event, start=event.start + start, end=event.end + start) for event in place.events)
         state: State = "speaking" if place.utterance else place.block.state
         return Frame(self._number, pixels, place.sound, place.weights, place.head, state, utterance, place.ends, events)
 
@@ -186,10 +188,12 @@ class Line:
         return True
 
     def _begin(self, block: Block) -> None:
-        self._now, self._joined, self._n_entered = block, self._joins.add(block), 0
+        self._now, self._n_entered = block, 0
+        self._joined = self._joins.add(block)
         self._events = events_of(block)
         if block.utterance:
-            self._speaks, self._is_pushed, self._is_gap = block.utterance, block.source == "sound", False
+            self._speaks, self._is_gap = block.utterance, False
+            self._is_pushed = block.source == "sound"
         if block.sound is not None:
             self._sound = np.concatenate([self._sound, block.sound.samples])
         elif len(self._sound):
@@ -197,16 +201,19 @@ class Line:
 
     def _enter(self) -> None:
         """Append the next frame of the present block."""
-        block, joined, at = self._now, self._joined, self._n_entered
+        block, joined = self._now, self._joined
         assert block is not None
         assert joined is not None
+        at = self._n_entered
         number = self._number + len(self._places)
         count = self._samples(number)
         sound, self._sound = self._sound[:count], self._sound[count:]
         if len(sound) < count:
             sound = np.pad(sound, (0, count - len(sound)))
-        begin = at / self.fps
-        events = [replace(one, begin=one.begin - begin, end=one.end - begin) for one in self._events.get(at, ())]
+        start = at / self.fps
+        events = [
+            replace(event, start=event.start - start, end=event.end - start) for event in self._events.get(at, ())
+        ]
         events, self._notes = [*self._notes, *events], []
         pose = joined.motion.values[at], joined.head.values[at]
         self._places.append(Place(block, *pose, sound, number, tuple(events), block.utterance or self._speaks))
@@ -230,9 +237,8 @@ class Line:
     def _give_way(self) -> None:
         """Leave out silence that waits: what is said is shown at once."""
         n_before = len(self._places)
-        waiting = deque(one for one in self._blocks if isinstance(one, End) or one.utterance)
-        self._n_waiting -= sum(len(one.motion) for one in self._blocks if isinstance(one, Block) and not one.utterance)
-        self._blocks = waiting
+        said = deque(item for item in self._blocks if isinstance(item, End) or item.utterance)
+        self._blocks, self._n_waiting = said, _n_frames(said)
         if self._now is not None and not self._now.utterance:
             self._now = self._joined = None
             self._joins.cut(self._pose())
@@ -280,9 +286,8 @@ class Line:
         blocks: list[Block | End] = [*kept]
         if self._now is not None and number is not None and self._now.utterance not in (0, number):
             blocks.append(self._now)
-        blocks += [one for one in self._blocks if number is not None and one.utterance != number]
-        self._blocks = deque(blocks)
-        self._n_waiting = sum(len(one.motion) for one in blocks if isinstance(one, Block))
+        blocks += [item for item in self._blocks if number is not None and item.utterance != number]
+        self._blocks, self._n_waiting = deque(blocks), _n_frames(blocks)
         self._now = self._joined = None
         self._sound = self._sound[:0]
         if number is None or self._speaks == number:
@@ -304,3 +309,7 @@ class Line:
             self._late_pixels = pixels
         elif not place.is_read:
             place.pixels = pixels
+
+
+def _n_frames(items: Iterable[Block | End]) -> int:
+    return sum(len(item.motion) for item in items if isinstance(item, Block))

@@ -1,4 +1,4 @@
-"""What a live face does next: its rules of speech, pushed sound, listening, gestures and interruption.
+"""Rules of a live face: speech, pushed sound, listening, gestures and interruption.
 
 Without threads and clock: `tts2face.session.live.stream` runs it in a thread, the service's live stream in its turns.
 """
@@ -114,7 +114,7 @@ class LiveFace:
             found.growing = None
 
     def _find(self, number: int) -> "_Text | PushedSound | None":
-        return next((one for one in self._utterances if one.number == number), None)
+        return next((waiting for waiting in self._utterances if waiting.number == number), None)
 
     def listen(self, rate: int | None) -> None:
         """Listen until the next speech, to sound of a partner with a rate in Hz; None where it is not heard."""
@@ -152,7 +152,7 @@ class LiveFace:
 
     def forget(self, number: int | None = None) -> None:
         """Forget an utterance; None: all. What is made of it by `speak` ends."""
-        self._utterances = deque(one for one in self._utterances if number not in (None, one.number))
+        self._utterances = deque(found for found in self._utterances if number not in (None, found.number))
         self._n_interruptions += 1
         self.rest()
 

@@ -28,7 +28,8 @@ class PushedSound:
     """
 
     def __init__(self, lips: LiveLips, rate: int, number: int) -> None:
-        self.number, self.rate, self.is_ended = number, rate, False
+        self.number, self.rate = number, rate
+        self.is_ended = False
         self._lips, self._resampler = lips, _resampler(rate)
         self._seconds = 0.0  # of all sound
         self._sound = np.zeros(0, np.float32)  # at `SOUND_RATE`, of frames that are not made

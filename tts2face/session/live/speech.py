@@ -42,17 +42,13 @@ class LiveSpeech:
     ----------
     models
         Of the session.
-
-    Raises
-    ------
-    InputError, DataError
-        The request has a text, recording or timeline, or an option is invalid.
     """
 
     def __init__(self, request: Request, models: SessionModels, sound_rate: int | None = SOUND_RATE) -> None:
         if not isinstance(request.source, Spoken) or request.source.text or request.timeline is not None:
             raise InputError("a live request has options only; send its text in parts")
-        self._request, self.models, self._sound_rate = request, models, sound_rate
+        self._request, self.models = request, models
+        self._sound_rate = sound_rate
         self._spoken = request.source
         self._silent = replace(request, source=Idle(UNUSED_IDLE_S), dictionary=None)
         self._layer = models.gesture_layer(prepare(self._silent))
@@ -118,7 +114,7 @@ class LiveSpeech:
         self._pause_s = pause_behind(text)
 
     def new_notes(self) -> list[str]:
-        """What of the texts since the last call is spoken or shown otherwise than a reader may expect."""
+        """Notes on texts since the last call: parts that are spoken or shown otherwise than a reader may expect."""
         notes, self._notes = self._notes, []
         return notes
 
@@ -175,9 +171,9 @@ class LiveSpeech:
         """Whether a gesture waits or is being made."""
         return self.gestures.move_at(self.seconds)
 
-    def shown(self, begin: float) -> tuple[ShownGesture, ...]:
-        """Gestures that are made since the last call, in seconds from `begin` of the clip."""
-        return tuple(replace(gesture, time=gesture.time - begin) for gesture in self.gestures.shown())
+    def shown(self, start: float) -> tuple[ShownGesture, ...]:
+        """Gestures that are made since the last call, in seconds after `start` of the clip."""
+        return tuple(replace(gesture, time=gesture.time - start) for gesture in self.gestures.shown())
 
     def change_style(self, style: str) -> str:
         """From the next word or the next silence on, the face and its voice have another style, whose name is returned.
@@ -218,7 +214,7 @@ def _with_lips(lips: Trajectory, piece: Piece) -> Piece:
 
 
 def _at_rate(piece: Piece, rate: int) -> Piece:
-    """A piece with sound at another rate. Pieces begin and end in silence, so that each is resampled alone."""
+    """A piece with sound at another rate. Silence is at both ends of a piece, so that each is resampled alone."""
     speech = piece.clip.speech
     if speech.waveform.rate == rate:
         return piece

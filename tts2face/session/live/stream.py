@@ -6,7 +6,7 @@ import time
 import weakref
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager
 from functools import partial
 from types import TracebackType
 
@@ -20,20 +20,21 @@ from lexicon.marked_text import GestureMark
 from tts2face.picture.frame_renderer import FrameRenderer
 from tts2face.session.live import AHEAD_S
 from tts2face.session.live.blocks import Item
+from tts2face.session.live.clock import FrameClock
+from tts2face.session.live.drawing import PoseDrawer
 from tts2face.session.live.frames import Frame
 from tts2face.session.live.line import Line, Place
 from tts2face.session.live.lips import RATE_LIMITS, LiveLips
 from tts2face.session.live.live_face import LiveFace
+from tts2face.session.live.numbers import UtteranceNumbers
 from tts2face.session.live.speech import LiveSpeech
 from tts2face.sound.features import FEATURE_RATE
-from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, resting_head
 
 MOST_AHEAD_S = 2.0  # frames of 512 x 512 are 0.8 MB each
 READY_S = 2.0  # of motion and sound that are made before the line has room: the next sentences
 IDLE_AHEAD_S = 2.0  # of idle motion that is made before it is needed
-SHARED_WAIT_S = 0.02  # after which is looked again whether another stream has made more of the idle motion
-MAX_LAG_S = 0.25  # by which a reader may be late; beyond it, the clock goes on from then, so that no burst follows
-FIRST_WAIT_S = 0.005  # between two looks of an asynchronous reader for the first frame
+SHARED_WAIT_S = 0.02  # until it is seen whether another stream has made more of the idle motion
+FIRST_WAIT_S = 0.005  # after which an asynchronous reader asks for the first frame again
 THREAD = "live face"
 CLOSED = "the stream is closed; open another one"
 
@@ -87,39 +88,34 @@ class FaceStream:
         self._errors: deque[BaseException] = deque()
         self._failure: BaseException | None = None  # that ended a thread
         self._is_closed, self._can_draw = False, renderer is None
-        self._n_utterances, self._forgotten, self._all_forgotten = 0, set[int](), 0
-        self._open_text = 0
-        self._open_sound: tuple[int, int] = (0, 0)  # number and rate
-        works = [self._make, *([] if renderer is None else [partial(self._draw, renderer)])]
+        self._numbers = UtteranceNumbers()
+        tasks = [self._make, *([] if renderer is None else [partial(self._draw, renderer)])]
         self._threads = [
-            threading.Thread(target=self._guarded, args=[work], name=THREAD, daemon=True) for work in works
+            threading.Thread(target=self._guarded, args=[task], name=THREAD, daemon=True) for task in tasks
         ]
         # a process that ends while native code runs in a thread aborts
         self._at_exit = weakref.finalize(self, _join, self._threads)
         for thread in self._threads:
             thread.start()
 
-    # ------------------------------------------------------------------------------------------------ what goes in
-
     def say(self, text: str) -> int:
         """Speak a text, of one sentence or several, after everything before it; returns the number of the utterance."""
         with self._lock:
-            number = self._next_number()
+            number = self._numbers.next()
             self._post(number, lambda: self._face.say(number, text))
             return number
 
     def push_text(self, part: str) -> int:
         """Speak more of a text as it is written, sentence by sentence; until `end_text` it is one utterance."""
         with self._lock:
-            number = self._open_text = self._open_text or self._next_number()
+            number = self._numbers.open_text()
             self._post(number, lambda: self._face.add_text(number, part))
             return number
 
     def end_text(self) -> None:
         """Speak the rest of the text that was pushed."""
         with self._lock:
-            number, self._open_text = self._open_text, 0
-            if number:
+            if number := self._numbers.end_text():
                 self._post(number, lambda: self._face.end(number))
 
     def push_sound(self, samples: NDArray[np.floating], rate: int) -> int:
@@ -136,19 +132,18 @@ class FaceStream:
         if not low <= rate <= high:
             raise InputError(f"the sample rate must lie between {low} and {high} Hz, not {rate}; convert the sound")
         with self._lock:
-            number, open_rate = self._open_sound
-            if number and rate != open_rate:
-                raise InputError(f"the sound began with {open_rate} Hz, not {rate}; end it before another rate")
-            number = number or self._next_number()
-            self._open_sound = number, rate
+            if self._numbers.open_rate not in (0, rate):
+                raise InputError(
+                    f"the sound began with {self._numbers.open_rate} Hz, not {rate}; end it before another rate"
+                )
+            number = self._numbers.open_sound(rate)
             self._post(number, lambda: self._face.add_sound(number, samples, rate))
             return number
 
     def end_sound(self) -> None:
         """The sound that was pushed is complete: the frames of its end can be made."""
         with self._lock:
-            (number, _), self._open_sound = self._open_sound, (0, 0)
-            if number:
+            if number := self._numbers.end_sound():
                 self._post(number, lambda: self._face.end(number))
 
     def listen(self, samples: NDArray[np.floating] | None = None, rate: int | None = None) -> None:
@@ -180,21 +175,13 @@ class FaceStream:
             self._post(0, change)
 
     def interrupt(self, utterance: int | None = None) -> float:
-        """Forget an utterance, or all; the mouth closes within 0.15 s of the last frame that was read.
+        """Forget an utterance, or all; returns the seconds of it (None: of the present one) that have been read.
 
-        Returns
-        -------
-        The seconds of it (None: of the present one) that have been read.
+        The mouth closes, and the head goes on, from the last frame that was read.
         """
         with self._lock:
-            if utterance is None:
-                self._all_forgotten = self._n_utterances
-                self._open_text, self._open_sound = 0, (0, 0)
-            else:
-                self._forgotten.add(utterance)
-                self._open_text = 0 if self._open_text == utterance else self._open_text
-                self._open_sound = (0, 0) if self._open_sound[0] == utterance else self._open_sound
-            self._inbox = deque(one for one in self._inbox if not self._is_forgotten(one[0]))
+            self._numbers.forget(utterance)
+            self._inbox = deque(message for message in self._inbox if not self._numbers.is_forgotten(message[0]))
             self._post(0, lambda: self._forget(utterance))
             return self._line.interrupt(utterance)
 
@@ -204,20 +191,11 @@ class FaceStream:
         else:
             self._face.forget(utterance)
 
-    def _next_number(self) -> int:
-        self._n_utterances += 1
-        return self._n_utterances
-
     def _post(self, number: int, follow: Callable[[], None]) -> None:
         if self._is_closed:
             raise InputError(CLOSED)
         self._inbox.append((number, follow))
         self._changed.notify_all()
-
-    def _is_forgotten(self, number: int) -> bool:
-        return number in self._forgotten or 0 < number <= self._all_forgotten
-
-    # ------------------------------------------------------------------------------------------------ what comes out
 
     @property
     def late(self) -> int:
@@ -232,15 +210,13 @@ class FaceStream:
     def read(self, timeout: float | None = None) -> Frame | None:
         """The next frame, for a reader with a clock of its own: each call is one tick.
 
+        It is None, and uses no number, if there is none in time or the stream is closed.
+
         Parameters
         ----------
         timeout
             Seconds to wait for it, after which idle motion fills a gap of an utterance that is not made in time; None:
             until there is one, or the stream is closed.
-
-        Returns
-        -------
-        The frame; None if there is none in time, where no number is used, or if the stream is closed.
 
         Raises
         ------
@@ -270,7 +246,7 @@ class FaceStream:
             One a tick of a steady clock: frame n of a reader is due ``n / fps`` seconds after its first one, and where
             no motion is made in time, the last pose stands. Otherwise as soon as each is made.
         """
-        clock = _Clock(self.fps)
+        clock = FrameClock(self.fps)
         while (frame := self.read(None if clock.is_new or not paced else 0.0) or self._held()) is not None:
             yield frame
             if paced:
@@ -278,7 +254,7 @@ class FaceStream:
 
     async def __aiter__(self) -> AsyncIterator[Frame]:
         """Frames on a steady clock, as `frames`; the event loop goes on meanwhile."""
-        clock = _Clock(self.fps)
+        clock = FrameClock(self.fps)
         while not self._is_closed:
             frame = self.read(0.0) or (None if clock.is_new else self._held())
             if frame is not None:
@@ -322,11 +298,9 @@ class FaceStream:
         """Close the stream in a thread."""
         await asyncio.to_thread(self.close)
 
-    # ------------------------------------------------------------------------------------------------ threads
-
-    def _guarded(self, work: Callable[[], None]) -> None:
+    def _guarded(self, task: Callable[[], None]) -> None:
         try:
-            work()
+            task()
         except BaseException as error:  # noqa: BLE001 - whoever reads gets it
             with self._lock:
                 self._failure = error
@@ -342,7 +316,7 @@ class FaceStream:
                 is_speaking = self._line.is_speaking
             for number, follow in messages:
                 with self._reported():
-                    if not self._is_forgotten(number):
+                    if not self._numbers.is_forgotten(number):
                         follow()
             if face.has_speech and not is_speaking:
                 face.rest()
@@ -372,13 +346,15 @@ class FaceStream:
     def _has_idle(self) -> bool:
         return self._line.idle is self._face.idle and self._face.idle.has(self._n_idle)
 
-    def _reported(self) -> "_Reported":
-        return _Reported(self._report)
-
-    def _report(self, error: Tts2faceError) -> None:
-        with self._lock:
-            self._errors.append(error)
-            self._changed.notify_all()
+    @contextmanager
+    def _reported(self) -> Iterator[None]:
+        """Errors of the product are raised by the next `read`."""
+        try:
+            yield
+        except Tts2faceError as error:
+            with self._lock:
+                self._errors.append(error)
+                self._changed.notify_all()
 
     def _put(self, items: Iterator[Item]) -> None:
         """Put what is made in line, each when there is room for it; ends with an utterance that is forgotten."""
@@ -392,25 +368,20 @@ class FaceStream:
                 self._changed.notify_all()
 
     def _has_ended(self, number: int) -> bool:
-        return self._is_closed or self._is_forgotten(number)
+        return self._is_closed or self._numbers.is_forgotten(number)
 
     def _draw(self, load: Callable[[], FrameRenderer]) -> None:
         """Draw frames of the line until the stream is closed."""
-        renderer = load()
-        silence = Speech.without_phones(Waveform(np.zeros(1, np.float32), 1_000_000))
-        rest = np.zeros((1, len(self.channels)), np.float32)
-        # kernels compile with the first picture
-        renderer.frame(Clip(Trajectory(self.channels, rest, self.fps), resting_head(1, self.fps), silence), 0)
+        drawer = PoseDrawer(load(), self.channels, self.fps)
+        drawer.prepare()
         with self._lock:
             self._can_draw = True
             self._changed.notify_all()
         while (place := self._next_place()) is not None:
-            began = time.monotonic()
-            head = Trajectory(HEAD_CHANNELS, place.head[None], self.fps)
-            clip = Clip(Trajectory(self.channels, place.weights[None], self.fps), head, silence)
-            (pixels,) = renderer.frames(clip, threads=1, first=place.number)
+            started = time.monotonic()
+            pixels = drawer.draw(place.weights, place.head, place.number)
             with self._lock:
-                self._line.drawn(place, pixels, time.monotonic() - began)
+                self._line.drawn(place, pixels, time.monotonic() - started)
 
     def _next_place(self) -> Place | None:
         """The next frame to draw; None when the stream is closed."""
@@ -419,45 +390,6 @@ class FaceStream:
             while not self._is_closed and (place := self._line.next_to_draw()) is None:
                 self._changed.wait()
             return None if self._is_closed else place
-
-
-class _Reported(suppress):
-    """Suppresses errors of the product and reports them."""
-
-    def __init__(self, report: Callable[[Tts2faceError], None]) -> None:
-        super().__init__(Tts2faceError)
-        self._report = report
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> bool:
-        if isinstance(error, Tts2faceError):
-            self._report(error)
-        return super().__exit__(kind, error, trace)
-
-
-class _Clock:
-    """Instants at which the frames of one reader are due."""
-
-    def __init__(self, fps: float) -> None:
-        self._fps, self._n_frames = fps, 0
-        self._began = 0.0
-
-    @property
-    def is_new(self) -> bool:
-        """Whether no frame has been read."""
-        return self._n_frames == 0
-
-    def wait_s(self) -> float:
-        """Seconds from now until the frame after the present one is due."""
-        now = time.monotonic()
-        if self.is_new:
-            self._began = now
-        self._n_frames += 1
-        wait = self._began + self._n_frames / self._fps - now
-        if wait < -MAX_LAG_S:
-            self._began -= wait
-        return max(wait, 0.0)
 
 
 def _checked(samples: NDArray[np.floating]) -> NDArray[np.float32]:
