@@ -5,16 +5,17 @@ movement is that of the sentence, and accents choose the direction of small ones
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
-from tts2face.gestures.speech_plan import Accent, SpeechPlan, SpokenSentence
+from tts2face.gestures.speech_plan import Accent, Span, SpeechPlan, SpokenSentence
 from tts2face.numeric.arrays import FloatArray, smoothstep
 
 # Course of a sentence: share of it, degrees of pitch, mm of the brows. 104 sentences of 4 to 7 s of free English.
 COURSE = ((0.10, -1.0, 0.45), (0.25, -2.2, 0.8), (0.50, -0.9, 0.7), (0.75, 0.5, 0.35))
+OPEN_COURSE = COURSE[:3]  # of a sentence whose end is not known
 FALL_S = 0.30  # before its last accent, from which on it falls
 FALL, END = (3.4, -1.1), (2.6, -0.9)  # there, and at its end
 BEFORE_S = 0.30  # the rise begins so long before the first phone
@@ -52,6 +53,8 @@ ITEM_WIDTH_S = 0.13
 # Contrasts: to one side, then to the other.
 SIDE_TURN_DEG, SIDE_TILT_DEG = 3.6, 1.4
 SIDE_S = 0.3
+KNOWN_S = 0.2  # from which on an accent of a sound that arrives is shown
+SAME_S = 1e-3  # within which two onsets are one
 KEPT_S = 2.0  # after their end, movements are forgotten
 NOTHING = np.zeros(5)
 
@@ -74,6 +77,20 @@ class _Bell:
     size: FloatArray
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _OpenSentence:
+    """A sentence whose sound still arrives: its onset, sizes (5,) of its course, its last accent and rise of brows.
+
+    Times are seconds of the clip; `n_phrases` have ended.
+    """
+
+    onset: float
+    sizes: FloatArray
+    last_accent: float
+    last_brows: float
+    n_phrases: int = 0
+
+
 @dataclass(slots=True)
 class PhraseMotion:
     """Movements of a clip's sentences; those of a sentence depend on its time and the seed alone.
@@ -85,10 +102,11 @@ class PhraseMotion:
     _steps: list[_Step] = field(default_factory=list)
     _bells: list[_Bell] = field(default_factory=list)
     _left: FloatArray = field(default_factory=lambda: NOTHING)  # of steps that are forgotten
+    _open: _OpenSentence | None = None
 
     def copy(self) -> "PhraseMotion":
         """Movements that continue as these, independently of them."""
-        return PhraseMotion(self.seed, self._steps.copy(), self._bells.copy(), self._left)
+        return PhraseMotion(self.seed, self._steps.copy(), self._bells.copy(), self._left, self._open)
 
     def add(self, plan: SpeechPlan, start: float) -> None:
         """Add what a plan, in seconds of the clip, does from `start` seconds on; what was shown before stays."""
@@ -97,7 +115,13 @@ class PhraseMotion:
         self._steps = [step for step in self._steps if step.end > forgotten]
         self._bells = [bell for bell in self._bells if bell.time > forgotten]
         for sentence in plan.sentences:
-            self._add_sentence(sentence, start)
+            if self._open is not None and abs(self._open.onset - sentence.span.start) > SAME_S:
+                self._end_arriving(start, start, self._open.sizes, 0.0)  # it broke off
+                self._open = None
+            if sentence.is_open or self._open is not None:
+                self._add_arriving(sentence, start)
+            else:
+                self._add_sentence(sentence, start)
 
     def at(self, times: FloatArray) -> FloatArray:
         """(T, 5) degrees of pitch, yaw and roll, and mm of the left and the right brow, at T times."""
@@ -127,6 +151,48 @@ class PhraseMotion:
             self._hold(turn, (denied.start, SIDE_S), (said.start - 0.1, SIDE_S), start)
             self._hold(-turn, (said.start - 0.1, SIDE_S), (said.end + 0.2, 2 * SIDE_S), start)
 
+    def _add_arriving(self, sentence: SpokenSentence, start: float) -> None:
+        """Add what is known now of a sentence whose sound arrives: its onset, its new accents, its end."""
+        before = self._open
+        if before is None:
+            onset = sentence.span.start
+            chances = np.random.default_rng([*self.seed, round(1000 * onset)])
+            size = float(np.exp(COURSE_SPREAD * chances.normal()))
+            sizes = size * np.array([COURSE_SHARE, 0.0, 0.0, BROW_COURSE_SHARE, BROW_COURSE_SHARE])
+            before = _OpenSentence(onset, sizes, -np.inf, -np.inf)
+            keys = [(onset - BEFORE_S, 0.0, 0.0)] + [(onset + share * USUAL_S, *pose) for share, *pose in OPEN_COURSE]
+            self._follow(keys, sizes, start)
+        last, brows = before.last_accent, before.last_brows
+        for accent in sentence.accents:
+            if accent.time > last + 1e-6:
+                chances = np.random.default_rng([*self.seed, round(1000 * accent.time)])
+                # an accent that is known late is shown late: cut off, it would not be seen
+                late = replace(accent, time=max(accent.time, start + KNOWN_S))
+                brows = self._add_accent(late, start, brows, chances)
+                last = accent.time
+        for phrase in sentence.phrases[before.n_phrases : -1]:
+            self._add_pause(phrase, before.sizes, start)
+        n_phrases = len(sentence.phrases) - 1
+        self._open = replace(before, last_accent=last, last_brows=brows, n_phrases=n_phrases)
+        if not sentence.is_open:
+            self._open = None
+            depth = QUESTION_FALL if sentence.rises else 1.0
+            self._end_arriving(max(sentence.span.end, start), start, before.sizes, depth)
+
+    def _end_arriving(self, end: float, start: float, sizes: FloatArray, depth: float) -> None:
+        """Lower the chin at the end of a sentence, which is known now, and come back."""
+        held = OPEN_COURSE[-1][1:]
+        keys = [(end, *held), (end + FALL_S, depth * END[0], depth * END[1])]
+        keys += [(keys[-1][0] + HOLD_S, *keys[-1][1:]), (keys[-1][0] + HOLD_S + RETURN_S, 0.0, 0.0)]
+        self._follow(keys, sizes, start)
+
+    def _follow(self, keys: Sequence[tuple[float, float, float]], sizes: FloatArray, start: float) -> None:
+        """Move from key to key of the course: seconds, pitch and brows."""
+        for (from_s, pitch, brows), (to_s, next_pitch, next_brows) in pairwise(keys):
+            change = sizes * np.array([next_pitch - pitch, 0.0, 0.0, *[next_brows - brows] * 2])
+            if change.any():
+                self._step(from_s - ROUND_S, to_s + ROUND_S, change, start)
+
     def _add_course(self, sentence: SpokenSentence, start: float, chances: np.random.Generator) -> None:
         onset, end = sentence.span.start, sentence.span.end
         length = end - onset
@@ -140,14 +206,15 @@ class PhraseMotion:
         keys += [(fall - FALL_S, *keys[-1][1:]), (fall, depth * FALL[0], depth * FALL[1])]
         keys += [(max(end, fall + 0.05), depth * END[0], depth * END[1])]
         keys += [(keys[-1][0] + HOLD_S, *keys[-1][1:]), (keys[-1][0] + HOLD_S + RETURN_S, 0.0, 0.0)]
-        for (from_s, pitch, brows), (to_s, next_pitch, next_brows) in pairwise(keys):
-            change = sizes * np.array([next_pitch - pitch, 0.0, 0.0, *[next_brows - brows] * 2])
-            if change.any():
-                self._step(from_s - ROUND_S, to_s + ROUND_S, change, start)
+        self._follow(keys, sizes, start)
         for phrase in sentence.phrases[:-1]:
-            for after, pitch, brows, width in COMMA:
-                moved = COMMA_SHARE * sizes * np.array([pitch, 0.0, 0.0, brows, brows])
-                self._bell(phrase.end + after, width, moved, start)
+            self._add_pause(phrase, sizes, start)
+
+    def _add_pause(self, phrase: Span, sizes: FloatArray, start: float) -> None:
+        """Lower the chin at the end of a phrase within a sentence."""
+        for after, pitch, brows, width in COMMA:
+            moved = COMMA_SHARE * sizes * np.array([pitch, 0.0, 0.0, brows, brows])
+            self._bell(phrase.end + after, width, moved, start)
 
     def _add_accent(self, accent: Accent, start: float, last: float, chances: np.random.Generator) -> float:
         """Add the movements of an accent; returns the time of the last rise of the brows."""

@@ -80,6 +80,9 @@ class SpokenSentence:
         Accents of the items of a list.
     sides
         Two things that are set against each other, in pairs.
+    is_open
+        Whether it goes on in a sound that still arrives: later plans have the same sentence with more of its accents,
+        and at last its end.
     """
 
     span: Span
@@ -89,6 +92,7 @@ class SpokenSentence:
     rises: bool = False
     items: tuple[float, ...] = ()
     sides: tuple[tuple[Span, Span], ...] = ()
+    is_open: bool = False
 
     def shift(self, seconds: float) -> "SpokenSentence":
         """The same sentence, later."""
@@ -100,6 +104,7 @@ class SpokenSentence:
             self.rises,
             tuple(item + seconds for item in self.items),
             tuple((denied.shift(seconds), said.shift(seconds)) for denied, said in self.sides),
+            self.is_open,
         )
 
 
@@ -141,10 +146,10 @@ class SoundFeatures:
     intensity: SpeechIntensity | None = None
 
     @classmethod
-    def of(cls, sound: Waveform) -> "SoundFeatures":
-        """Smoothed features of a sound; pitch goes on between voiced frames."""
+    def of(cls, sound: Waveform, intensity: SpeechIntensity | None = None) -> "SoundFeatures":
+        """Smoothed features of a sound with its intensity, if it is known; pitch goes on between voiced frames."""
         times = np.arange(0.0, max(sound.duration, STEP_S), STEP_S)
-        intensity = speech_intensity(sound)
+        intensity = intensity or speech_intensity(sound)
         level = prosody_features(sound, times, intensity, with_pitch=False)[:, 0].astype(np.float64)
         return replace(cls.smoothed(times, level, semitones(sound, times)), intensity=intensity)
 
@@ -338,18 +343,23 @@ def _turns(words: Sequence[_Word], at: int) -> bool:
 
 def heard_sentences(sound: SoundFeatures) -> Iterator[SpokenSentence]:
     """Sentences of sound whose words are not known: between long pauses; phrases between shorter ones."""
-    phrases = _runs(sound, PHRASE_PAUSE_S)
-    peaks = _peaks(sound)
-    for whole in _runs(sound, SENTENCE_PAUSE_S):
+    phrases = heard_spans(sound, PHRASE_PAUSE_S)
+    peaks = heard_accents(sound)
+    for whole in heard_spans(sound, SENTENCE_PAUSE_S):
         inside = tuple(phrase for phrase in phrases if whole.start <= phrase.start < whole.end)
         accents = tuple(peak for peak in peaks if whole.start <= peak.time < whole.end)
-        last, before = (sound.highest(whole.end - late, whole.end - early)[1] for late, early in RISE_S)
-        rises = last - before > RISE_SEMITONES
+        rises = heard_rise(sound, whole.end)
         question = Span(max(whole.start, whole.end - ASKED_S), whole.end) if rises else None
         yield SpokenSentence(whole, inside or (whole,), accents, question, rises)
 
 
-def _runs(sound: SoundFeatures, pause_s: float) -> list[Span]:
+def heard_rise(sound: SoundFeatures, end: float) -> bool:
+    """Whether the pitch rises before the end of a sentence, in seconds, so that it asks."""
+    last, before = (sound.highest(end - late, end - early)[1] for late, early in RISE_S)
+    return last - before > RISE_SEMITONES
+
+
+def heard_spans(sound: SoundFeatures, pause_s: float) -> list[Span]:
     """Spans of speech that pauses of at least some seconds divide."""
     loud = sound.times[sound.level > PAUSE_DB]
     if not len(loud):
@@ -360,7 +370,7 @@ def _runs(sound: SoundFeatures, pause_s: float) -> list[Span]:
     return [span for span in spans if span.end - span.start >= LEAST_PHRASE_S]
 
 
-def _peaks(sound: SoundFeatures) -> list[Accent]:
+def heard_accents(sound: SoundFeatures) -> list[Accent]:
     """Accents of a sound: peaks of level and pitch, the most prominent first, at least `PEAK_GAP_S` apart."""
     loud = sound.level > PAUSE_DB
     if not loud.any():

@@ -81,7 +81,7 @@ class LiveFace:
     def _is_ready(self, utterance: _Text | PushedSound) -> bool:
         if isinstance(utterance, _Text):
             return utterance.is_ready
-        return utterance.is_ended or utterance.n_ready(self.speech.fps) > 0
+        return utterance.is_ready(self.speech.fps)
 
     def say(self, number: int, text: str) -> None:
         """Speak a text after everything that waits."""
@@ -182,8 +182,8 @@ class LiveFace:
     def _speak_sound(self, pushed: PushedSound) -> Iterator[Item]:
         fps = self.speech.fps
         try:
-            if n_frames := pushed.n_ready(fps):
-                yield pushed.make(n_frames, self.speech)
+            if pushed.n_ready(fps):
+                yield pushed.make(self.speech)
         finally:
             is_done = pushed.is_ended and not pushed.n_ready(fps)
             if is_done and self._utterances and self._utterances[0] is pushed:

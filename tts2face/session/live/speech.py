@@ -140,19 +140,21 @@ class LiveSpeech:
         yield from self._append(prepare(replace(self._silent, source=Listening(seconds))), responding.merge(listened))
         self._has_listened = True
 
-    def follow(self, sound: Waveform, lips: Trajectory, plan: SpeechPlan | None = None) -> Piece:
+    def follow(self, sound: Waveform, lips: Trajectory, plan: SpeechPlan, followed: Waveform) -> Piece:
         """Append the sound of whole frames, which is spoken already, with its lip motion (T, K).
 
         Parameters
         ----------
         plan
-            Its sentences and accents, in seconds of the piece; None for those that are heard in it.
+            Its sentences and accents, in seconds of the piece.
+        followed
+            The sound, and what is known behind it.
         """
         self.rest()
         made, fps = self.gestures.waiting, lips.fps
         piece = Piece(
             Clip.at_rest(len(lips), fps, Speech.without_phones(sound)), self.seconds, 0,
-            self.gestures.now().shift(self.seconds), plan=plan,
+            self.gestures.now().shift(self.seconds), plan=plan, voice_sound=followed,
         )  # fmt: skip
         (piece,) = moved_pieces([piece], partial(_with_lips, lips), self._layer, self.models.voices.yield_turn)
         self._n_frames += len(lips)

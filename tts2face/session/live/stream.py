@@ -1,9 +1,9 @@
 """A live face on a clock: text or sound goes in from any thread, frames come out."""
 
 import asyncio
+import atexit
 import threading
 import time
-import weakref
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import contextmanager
@@ -93,8 +93,7 @@ class FaceStream:
         self._threads = [
             threading.Thread(target=self._guarded, args=[task], name=THREAD, daemon=True) for task in tasks
         ]
-        # a process that ends while native code runs in a thread aborts
-        self._at_exit = weakref.finalize(self, _join, self._threads)
+        atexit.register(self.close)  # a process that ends while native code runs in a thread aborts
         for thread in self._threads:
             thread.start()
 
@@ -276,7 +275,9 @@ class FaceStream:
         with self._lock:
             self._is_closed = True
             self._changed.notify_all()
-        self._at_exit()
+        for thread in self._threads:
+            thread.join()
+        atexit.unregister(self.close)
 
     def __enter__(self) -> "FaceStream":
         """Return the stream itself."""
@@ -397,9 +398,3 @@ def _checked(samples: NDArray[np.floating]) -> NDArray[np.float32]:
     if found.ndim != 1 or not np.isfinite(found).all():
         raise InputError(f"a block of sound must be a vector of finite samples; its shape is {found.shape}")
     return found
-
-
-def _join(threads: list[threading.Thread]) -> None:
-    for thread in threads:
-        if thread is not threading.current_thread():
-            thread.join()
