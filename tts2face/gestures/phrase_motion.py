@@ -15,7 +15,8 @@ from tts2face.numeric.arrays import FloatArray, smoothstep
 
 # Course of a sentence: share of it, degrees of pitch, mm of the brows. 104 sentences of 4 to 7 s of free English.
 COURSE = ((0.10, -1.0, 0.45), (0.25, -2.2, 0.8), (0.50, -0.9, 0.7), (0.75, 0.5, 0.35))
-OPEN_COURSE = COURSE[:3]  # of a sentence whose end is not known
+OPEN_S = 2.4  # as which the length of a sentence counts whose sound still arrives
+OPEN_END = 0.4  # of the fall at its end, which is known when the sound is silent
 FALL_S = 0.30  # before its last accent, from which on it falls
 FALL, END = (3.4, -1.1), (2.6, -0.9)  # there, and at its end
 BEFORE_S = 0.30  # the rise begins so long before the first phone
@@ -160,7 +161,7 @@ class PhraseMotion:
             size = float(np.exp(COURSE_SPREAD * chances.normal()))
             sizes = size * np.array([COURSE_SHARE, 0.0, 0.0, BROW_COURSE_SHARE, BROW_COURSE_SHARE])
             before = _OpenSentence(onset, sizes, -np.inf, -np.inf)
-            keys = [(onset - BEFORE_S, 0.0, 0.0)] + [(onset + share * USUAL_S, *pose) for share, *pose in OPEN_COURSE]
+            keys = [(onset - BEFORE_S, 0.0, 0.0)] + [(onset + share * OPEN_S, *pose) for share, *pose in COURSE]
             self._follow(keys, sizes, start)
         last, brows = before.last_accent, before.last_brows
         for accent in sentence.accents:
@@ -176,12 +177,12 @@ class PhraseMotion:
         self._open = replace(before, last_accent=last, last_brows=brows, n_phrases=n_phrases)
         if not sentence.is_open:
             self._open = None
-            depth = QUESTION_FALL if sentence.rises else 1.0
+            depth = OPEN_END * (QUESTION_FALL if sentence.rises else 1.0)
             self._end_arriving(max(sentence.span.end, start), start, before.sizes, depth)
 
     def _end_arriving(self, end: float, start: float, sizes: FloatArray, depth: float) -> None:
         """Lower the chin at the end of a sentence, which is known now, and come back."""
-        held = OPEN_COURSE[-1][1:]
+        held = COURSE[-1][1:]
         keys = [(end, *held), (end + FALL_S, depth * END[0], depth * END[1])]
         keys += [(keys[-1][0] + HOLD_S, *keys[-1][1:]), (keys[-1][0] + HOLD_S + RETURN_S, 0.0, 0.0)]
         self._follow(keys, sizes, start)

@@ -359,15 +359,15 @@ def heard_rise(sound: SoundFeatures, end: float) -> bool:
     return last - before > RISE_SEMITONES
 
 
-def heard_spans(sound: SoundFeatures, pause_s: float) -> list[Span]:
-    """Spans of speech that pauses of at least some seconds divide."""
+def heard_spans(sound: SoundFeatures, pause_s: float, least_s: float = LEAST_PHRASE_S) -> list[Span]:
+    """Spans of speech, of at least `least_s` seconds, that pauses of at least some seconds divide."""
     loud = sound.times[sound.level > PAUSE_DB]
     if not len(loud):
         return []
     cuts = np.flatnonzero(np.diff(loud) > pause_s)
     starts, ends = loud[np.concatenate([[0], cuts + 1])], loud[np.concatenate([cuts, [len(loud) - 1]])]
     spans = [Span(float(start), float(end) + sound.step_s) for start, end in zip(starts, ends, strict=True)]
-    return [span for span in spans if span.end - span.start >= LEAST_PHRASE_S]
+    return [span for span in spans if span.end - span.start >= least_s]
 
 
 def heard_accents(sound: SoundFeatures) -> list[Accent]:
