@@ -161,7 +161,8 @@ class PhraseMotion:
             size = float(np.exp(COURSE_SPREAD * chances.normal()))
             sizes = size * np.array([COURSE_SHARE, 0.0, 0.0, BROW_COURSE_SHARE, BROW_COURSE_SHARE])
             before = _OpenSentence(onset, sizes, -np.inf, -np.inf)
-            keys = [(onset - BEFORE_S, 0.0, 0.0)] + [(onset + share * OPEN_S, *pose) for share, *pose in COURSE]
+            keys = [(onset - BEFORE_S, 0.0, 0.0)]
+            keys += [(onset + share * OPEN_S, pitch, brows) for share, pitch, brows in COURSE]
             self._follow(keys, sizes, start)
         last, brows = before.last_accent, before.last_brows
         for accent in sentence.accents:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +14,10 @@ from tts2face.picture.options import Picture
 from tts2face.picture.pace import Pace
 from tts2face.request import Request
 from tts2face.session.animated_face import AnimatedFace
+from tts2face.session.asynchronous import AsyncCalls
 from tts2face.session.encoded_stream import StreamFormat, encode_stream
 from tts2face.session.fixed_length import Length, clips_of_length
-from tts2face.session.live import AHEAD_S
+from tts2face.session.live.calls import LiveCalls
 from tts2face.session.outputs import (
     WrittenClip,
     plan_outputs,
@@ -26,13 +26,11 @@ from tts2face.session.outputs import (
 from tts2face.session.prepared import PreparedRequest, input_paths, prepare_request, split_picture
 from tts2face.session.shared_models import SessionModels, photographed_face, shown_face
 from tts2face.session.speech_stream import Piece, SpeechSpan, measure_speech, timed_speech
-from tts2face.sound.features import FEATURE_RATE
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.storage.marks import Making
 from tts2face.storage.memory import ResultMemory
 from tts2face.storage.signing import Signer
 from tts2face.types import (
-    SOUND_RATE,
     Chunk,
     Clip,
     Progress,
@@ -42,13 +40,10 @@ from tts2face.types import (
 )
 
 if TYPE_CHECKING:
-    from tts2face.session.live.lips import LiveLips
-    from tts2face.session.live.speech import LiveSpeech
-    from tts2face.session.live.stream import FaceStream
     from tts2face.session.performance import Performance
 
 
-class Session:
+class Session(LiveCalls, AsyncCalls):
     """A talker, a face and a palette for any number of requests.
 
     Talker and face are loaded by the constructor; palette, voices and renderers at their first use. All methods are
@@ -202,50 +197,6 @@ class Session:
         """
         prepared = self.prepare(text, **options)
         return timed_speech(prepared, self._models.for_request(prepared).speech)
-
-    def live(self, *, sound_rate: int | None = SOUND_RATE, **options: Any) -> "LiveSpeech":
-        """A clip without an end, extended by `say`, `idle` and `listen` of the result; options and errors as `clip`.
-
-        All pieces have the sample rate `sound_rate` in Hz; None: that of their voice, in silence `SOUND_RATE`.
-        """
-        from tts2face.session.live.speech import LiveSpeech
-
-        return LiveSpeech(self._models.seeded(Request(**options)), self._models, sound_rate)
-
-    def face_stream(
-        self,
-        picture: Picture | None = None,
-        *,
-        fps: float = 30.0,
-        idle: bool = True,
-        ahead_s: float = AHEAD_S,
-        draws: bool = True,
-        **options: Any,
-    ) -> "FaceStream":
-        """One face on a clock: text or sound goes in, frames come out (docs/live.md).
-
-        Parameters
-        ----------
-        idle
-            Whether it moves between utterances, too.
-        ahead_s
-            Seconds of frames that are made, and drawn, before they are read.
-        draws
-            Whether frames have pictures; senders of curves need none.
-        """
-        from tts2face.session.live.stream import FaceStream
-
-        picture, options = split_picture(picture, options)
-        speech = self.live(fps=fps, **options)
-        has_gestures, face = speech.request.has_gestures, self.animated_face(has_gestures=speech.request.has_gestures)
-        renderer = partial(self.renderer, picture, has_gestures=has_gestures) if draws else None
-        return FaceStream(speech, self.listen, renderer, face.channels, idle=idle, ahead_s=ahead_s)
-
-    def listen(self, rate: int = FEATURE_RATE, *, audio_map: str | None = None) -> "LiveLips":
-        """Lip motion of speech that is still being spoken; arguments and errors as `LiveLips`."""
-        from tts2face.session.live.lips import LiveLips
-
-        return LiveLips(self._models, rate, audio_map)
 
     def stream_file(
         self,
