@@ -115,7 +115,7 @@ def read_number(place: Place) -> str:
     several = is_plural(locale, amount)
     own = gender_of(locale, noun, plural=several) if agrees else ""
     gender = grammar.gender or own or (locale.setting("default_gender") if agrees else "")
-    grammar = Grammar(gender, (case_of(locale, noun) if several else "") or grammar.case)
+    grammar = Grammar(gender, case_of(locale, noun, plural=several) or grammar.case)
     if written == "1" and noun and (one := one_before(locale, gender, noun)):
         said = one
     elif amount.sign or amount.decimals or not written.isdigit():

@@ -73,7 +73,25 @@ def noun_form(locale: Locale, row: Row, amount: Amount, case: str = "") -> str:
         return own[min(category, 1, len(own) - 1)]
     if case == "genitive" and len(forms) == 4:  # few is the genitive singular in Russian, other in Polish
         return forms[2] if category else forms[3]
+    declined = _declined(locale, forms[1], category, case) if case and len(forms) > 1 and not amount.decimals else ""
+    if declined:
+        return declined
     return forms[min(category, len(forms) - 1)]
+
+
+def _declined(locale: Locale, few: str, category: int, case: str) -> str:
+    """A noun in a case that its row lacks, by the ending of its form behind two; empty where no rule is stated."""
+    words = few.split(" ")
+    for at, word in enumerate(words):
+        row = _by_ending(locale.rows("declension"), word)
+        endings = row.details.get(case, "").split("/") if row else [""]
+        ending = endings[min(category, 1, len(endings) - 1)]
+        if row is None or not ending:
+            return ""
+        words[at] = word.removesuffix(row.spoken) + ending
+        if "adjective" not in row.details:  # квадратных метрах, but градусах Цельсия
+            break
+    return " ".join(words)
 
 
 def is_plural(locale: Locale, amount: Amount) -> bool:
@@ -91,10 +109,10 @@ def gender_of(locale: Locale, word: str, *, plural: bool = False) -> str:
     return row.details.get("plural", row.spoken) if plural else row.spoken
 
 
-def case_of(locale: Locale, noun: str) -> str:
-    """Case that the ending of a plural noun tells (z dwoma kotami, в двух случаях); empty where it does not."""
+def case_of(locale: Locale, noun: str, *, plural: bool) -> str:
+    """Case that the ending of a noun tells (z dwoma kotami, в двух случаях); empty where it does not."""
     row = _by_ending(locale.rows("case"), noun.lower(), "+")
-    return row.spoken if row else ""
+    return row.spoken if row and ("one" in row.details) != plural else ""
 
 
 def _by_ending(rows: Mapping[str, Row], word: str, mark: str = "") -> Row | None:

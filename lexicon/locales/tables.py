@@ -9,7 +9,8 @@ rule         rule set of CLDR by kind, gender and case (``cardinal f genitive``)
 fix          pattern and replacement in words of numbers that CLDR misspells
 ordinal      ordinals that CLDR lacks, in the masculine nominative; ``inflection`` has endings by gender and case
 case         gender or case that a word requires of the number behind it; details: of which kind of number; behind a
-             plus sign, ending of a plural noun, and the case that it has
+             plus sign, ending of a plural noun (``one``: of one), and the case that it has
+declension   ending of a noun behind two, and those of one and of several in each case; ``adjective``: a noun follows
 construct    end of the words of a number before its noun
 one          form of the number one, by a pattern of the gender and the noun behind it
 gender       endings of nouns, longest first, and whole nouns (with a caret) of a gender; details: ``plural``, the
