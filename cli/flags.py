@@ -175,13 +175,22 @@ def check_options(app: App, arguments: Sequence[str]) -> None:
             )
 
 
-def open_signer(sign: tuple[Path, Path] | None, time_stamp: str | None, *, quiet: bool) -> "Signer | None":
-    """Who signs the files of a command, after a note on what happens when the certificate ends; None for nobody."""
+def sign_credentials(sign: tuple[Path, Path] | None, time_stamp: str | None) -> Credentials | None:
+    """Files with which a command signs; None where it does not."""
     if sign is None:
         if time_stamp is not None:
             raise InputError("--time-stamp belongs to a signature; add --sign CERTIFICATE KEY, or remove it")
         return None
-    signer = Credentials(*sign, os.environ.get(PASSWORD, ""), time_stamp or "").open()
+    certificate, key = (path.absolute() for path in sign)
+    return Credentials(certificate, key, os.environ.get(PASSWORD, ""), time_stamp or "")
+
+
+def open_signer(sign: tuple[Path, Path] | None, time_stamp: str | None, *, quiet: bool) -> "Signer | None":
+    """Who signs the files of a command, after a note on what happens when the certificate ends; None for nobody."""
+    credentials = sign_credentials(sign, time_stamp)
+    if credentials is None:
+        return None
+    signer = credentials.open()
     if signer.note and not quiet:
         write_message(f"tts2face: note: {signer.note}")
     return signer

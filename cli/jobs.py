@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-from cli.flags import switch, whole_number
+from cli.flags import Sign, TimeStamp, open_signer, sign_credentials, switch, whole_number
 from cli.lists import AsJson
 from cli.process import WhatRemains, write_message
 from lexicon.errors import InputError
@@ -32,6 +32,8 @@ def worker(
     database: Database = DEFAULT_DATABASE,
     store: Annotated[str, Parameter(help="Store of rendered segments that the batch uses: a folder or a URL.")],
     jobs: Annotated[int, whole_number("Number of workers on this machine.")] = 1,
+    sign: Sign = None,
+    time_stamp: TimeStamp = None,
 ) -> None:
     """Render segments and execute jobs of the service until interrupted; start one on each machine."""
     if jobs < 1:
@@ -43,7 +45,10 @@ def worker(
     # before workers start, each of which would fail in a process of its own
     open_store(store).check()
     prepare_database(database_url(database))
-    wanted = LocalWorkers(database, store, jobs, on_message=write_message)
+    open_signer(sign, time_stamp, quiet=False)  # a wrong key is refused before workers start
+    credentials = sign_credentials(sign, time_stamp)
+    signing = None if credentials is None else credentials.as_json()
+    wanted = LocalWorkers(database, store, jobs, on_message=write_message, signing=signing)
     write_message(
         f"{jobs} workers of {os.uname().nodename if hasattr(os, 'uname') else 'this machine'}; Ctrl-C ends them"
     )

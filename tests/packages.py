@@ -20,6 +20,7 @@ EXTRAS = {  # modules that the product imports where they are installed; what on
     "pyopenjtalk": "japanese",
     "pyvista": "view",
     "pxr": "usd",
+    "c2pa": "c2pa",
 }  # fmt: skip
 OTHERS = "test-all"
 

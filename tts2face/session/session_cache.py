@@ -13,6 +13,7 @@ from tts2face.session.named_models import Models
 if TYPE_CHECKING:
     from tts2face.session.session import Session
     from tts2face.sound.voice_pool import VoicePool
+    from tts2face.storage.signing import Signer
 
 
 class SessionCache:
@@ -28,6 +29,8 @@ class SessionCache:
         Memory of this process beyond which the least recently used sessions are released, all but one; None: any.
     memory_mb
         Finished sentences that a session with an owner keeps, as for `Session`.
+    signer
+        Who signs the files of all sessions; None: nobody.
     """
 
     def __init__(
@@ -37,11 +40,13 @@ class SessionCache:
         voices: "VoicePool | None" = None,
         max_bytes: int | None = None,
         memory_mb: float = 0.0,
+        signer: "Signer | None" = None,
     ) -> None:
         self._n_sessions = n_sessions
         self._voices = voices
         self._max_bytes = max_bytes
         self._memory_mb = memory_mb
+        self._signer = signer
         self._sessions: OrderedDict[tuple[Models, str, tuple[int, ...]], Session] = OrderedDict()
 
     def get(self, models: Models, owner: str = "") -> "Session":
@@ -59,7 +64,8 @@ class SessionCache:
             while len(self._sessions) >= self._n_sessions:
                 self._sessions.popitem(last=False)
             gc.collect()  # sessions hold themselves in circles
-            self._sessions[key] = models.open_session(self._voices, memory_mb=self._memory_mb if owner else 0.0)
+            session = models.open_session(self._voices, memory_mb=self._memory_mb if owner else 0.0)
+            self._sessions[key] = session if self._signer is None else session.signed_by(self._signer)
             free_unused()  # models of the released sessions that the new one does not share
         while self._max_bytes is not None and len(self._sessions) > 1 and resident_bytes() > self._max_bytes:
             self._sessions.popitem(last=False)

@@ -24,7 +24,7 @@ NAMESPACES = {
 }  # fmt: skip
 _RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
 _JPEG_XMP, _JPEG_ALONE = b"http://ns.adobe.com/xap/1.0/\0", range(0xD0, 0xD8)
-_GIF_C2PA = b"C2PA_GIF"
+_GIF_C2PA, _ID3_C2PA = b"C2PA_GIF", b"jumdc2pa"
 
 
 @dataclass(slots=True)
@@ -305,6 +305,13 @@ def _jpeg(blocks: _Blocks, found: Found) -> None:
         found.has_signature |= marker[1] == 0xEB and b"c2pa" in content[:100]
 
 
+def _id3(blocks: _Blocks, found: Found) -> None:
+    """Tag of ID3v2, before sound of MP3, AAC or FLAC, whose own name is read elsewhere; C2PA is an object in it."""
+    head = blocks.read(10)
+    size = sum((byte & 0x7F) << shift for byte, shift in zip(head[6:], (21, 14, 7, 0), strict=True))
+    found.has_signature = _ID3_C2PA in blocks.content(size)
+
+
 def _readers() -> tuple[tuple[Callable[[bytes], bool], Callable[[_Blocks, Found], None]], ...]:
     """Tests of the first 16 bytes of a file, and who reads on."""
     return (
@@ -313,4 +320,5 @@ def _readers() -> tuple[tuple[Callable[[bytes], bool], Callable[[_Blocks, Found]
         (lambda head: head[:4] == b"RIFF" and head[8:12] in {b"WAVE", b"WEBP"}, _riff),
         (lambda head: head[4:8] in {b"ftyp", b"wide", b"mdat", b"moov", b"free"}, _mp4),
         (lambda head: head.startswith(b"\xff\xd8\xff"), _jpeg),
+        (lambda head: head.startswith(b"ID3"), _id3),
     )

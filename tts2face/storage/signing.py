@@ -62,6 +62,16 @@ class Credentials:
     password: str = field(default="", repr=False)
     authority: str = ""
 
+    def as_json(self) -> dict[str, str]:
+        """Arguments for another process of this machine; not for a log."""
+        return {"certificate": str(self.certificate), "key": str(self.key), "password": self.password,
+                "authority": self.authority}  # fmt: skip
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, str]) -> "Credentials":
+        """Credentials of `as_json`."""
+        return cls(Path(content["certificate"]), Path(content["key"]), content["password"], content["authority"])
+
     def open(self) -> "Signer":
         """Who signs, with files that are checked.
 

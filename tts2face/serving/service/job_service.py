@@ -183,7 +183,7 @@ class JobService:
         settings = self._settings
         wanted = LocalWorkers(
             settings.database_place, settings.store_place, settings.workers,
-            on_message=_log_worker, niceness=NICENESS,
+            on_message=_log_worker, niceness=NICENESS, signing=settings.signing,
         )  # fmt: skip
         while not self._stopped.is_set():
             with suppress(BackendError), local_workers(wanted) as supervise:

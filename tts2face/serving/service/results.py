@@ -28,7 +28,9 @@ from tts2face.serving.service.result_cache import CACHED_KINDS, ResultCache
 from tts2face.serving.service.scheduler import check_words
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.warm_process import work_call
+from tts2face.storage.marks import PROGRAM
 
+MARK_HEADER = "X-Synthetic"  # what made synthetic sound, pictures or motion; raw samples have no other place
 WARM_TEXT = "Hi."
 
 
@@ -187,7 +189,7 @@ async def stream_work(
                 yield chunk
 
     request.state.exchange.ending = convert.failed
-    headers = {} if convert.failed({}) else {"Trailer": ERROR_FIELD}
+    headers = {MARK_HEADER: PROGRAM} | ({} if convert.failed({}) else {"Trailer": ERROR_FIELD})
     return StreamingResponse(body(), media_type=media_type, headers=headers)
 
 

@@ -21,6 +21,7 @@ from tts2face.serving.service.page_addresses import PAGES
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
 from tts2face.sound.voice_urls import NAMES_VARIABLE
+from tts2face.storage.signing import Credentials
 from tts2face.storage.temporary import remove_held
 
 SOCKET_GRACE_S = 3.0  # between the message to the clients of WebSockets and their end
@@ -35,13 +36,17 @@ def serve(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> None:
     Raises
     ------
     InputError, DataError
-        The file of keys cannot be read, or the variables of OpenTelemetry ask for something else than OTLP over HTTP.
+        The file of keys cannot be read, the certificate or key of signatures is wrong, or the variables of
+        OpenTelemetry ask for something else than OTLP over HTTP.
     BackendError
         Traces are asked for and their libraries are missing.
     """
     configure_logs(settings.log_format, with_text=settings.log_text)
     if settings.voices:  # for the processes of the service, too
         os.environ[NAMES_VARIABLE] = " ".join(settings.voices)
+    if settings.signing is not None:
+        signer = Credentials.from_json(settings.signing).open()
+        log_event("signing", certificate_ends=signer.ends, has_time_stamps=bool(signer.authority))
     _allow_files(settings.connections)
     server = make_server(settings, mounts)
     server.exit_s = EXIT_S

@@ -16,6 +16,7 @@ from lexicon.values.files import read_text
 from lexicon.values.records import checked
 from lexicon.values.toml_text import parse_toml
 from tts2face.sound.voice_urls import parse_named_urls
+from tts2face.storage.signing import Credentials
 from tts2face.storage.user_folders import user_data
 from tts2face.targets.table import named_targets, parse_target
 
@@ -114,6 +115,12 @@ class ServiceSettings:
     upload_pixels: int = setting(40_000_000, "Largest picture that a request may send.", (1, 200_000_000))
     decode_s: float = setting(60.0, "Seconds that the decoding of an upload may take.", (1, 3600))
     drain_s: float = setting(30.0, "Seconds that running requests have to finish after SIGTERM.", (0, 3600))
+    sign_certificate: Path | None = setting(
+        None, "Certificate (PEM) with which complete files are signed (C2PA, extra c2pa)."
+    )
+    sign_key: Path | None = setting(None, "Private key (PEM) of sign_certificate.")
+    sign_password: str = setting("", "Password of sign_key; never shown.", is_secret=True)
+    sign_authority: str = setting("", "Address of a time-stamp authority, which confirms the time of signing.")
     studio: bool = setting(True, "Serve the studio at /studio, if NiceGUI is installed (extra studio).")
     photos: bool = setting(False, "Make faces of uploaded pictures of people (extra photo).")
     photos_per_day: int = setting(50, "Faces that a key may make of pictures in a day.", (0, 1_000_000))
@@ -144,6 +151,8 @@ class ServiceSettings:
                 f"NAME --file keys.toml` and give --keys keys.toml"
             )
         self._check_names()
+        if (self.sign_certificate is None) != (self.sign_key is None):
+            raise InputError("sign_certificate and sign_key belong together; give both or neither")
         if self.webhook_hosts and not _is_secret(self.webhook_secret):
             raise InputError(
                 "webhook_hosts needs webhook_secret, which signs the messages: letters, or whsec_ and base64; give "
@@ -167,6 +176,15 @@ class ServiceSettings:
                 raise InputError(
                     f"origins must be such as https://example.org, in small letters and without a path, not {origin!r}"
                 )
+
+    @property
+    def signing(self) -> dict[str, str] | None:
+        """Arguments of the credentials with which complete files are signed; None where they are not."""
+        if self.sign_certificate is None or self.sign_key is None:
+            return None
+        return Credentials(
+            self.sign_certificate.absolute(), self.sign_key.absolute(), self.sign_password, self.sign_authority
+        ).as_json()
 
     @property
     def allowed_hosts(self) -> frozenset[str]:

@@ -40,7 +40,8 @@ class ServiceState:
         self.pool = Pool(PoolSettings(
             settings.processes, settings.waiting, warm_steps(settings),
             {"n_sessions": settings.sessions, "log_format": settings.log_format, "log_text": settings.log_text,
-             "memory_mb": settings.memory_mb, "sentences_mb": settings.sentences_mb, "tasks": tasks},
+             "memory_mb": settings.memory_mb, "sentences_mb": settings.sentences_mb, "tasks": tasks,
+             "signing": settings.signing},
         ))  # fmt: skip
         self.downloads = Downloads()
         self.library, self.decoders = Library(settings), Decoders()
@@ -48,7 +49,8 @@ class ServiceState:
         self.jobs = JobService(settings, self.library, self.limits)
         self.cache: ResultCache | None = None
         if settings.cache_mb:
-            self.cache = ResultCache(settings.data_folder / "cache", settings.cache_mb * 1_000_000)
+            folder = "cache" if settings.signing is None else "cache-signed"
+            self.cache = ResultCache(settings.data_folder / folder, settings.cache_mb * 1_000_000)
         self.readiness = Readiness(self.pool, self.jobs, settings)
         self.metrics = Metrics(self.pool, self.jobs, self.readiness, self.cache)
         self.jobs.on_defect = self.note_defect

@@ -32,6 +32,7 @@ from tts2face.session import warm_up
 from tts2face.session.named_models import Models
 from tts2face.session.session_cache import SessionCache
 from tts2face.sound.voice_pool import VoicePool
+from tts2face.storage.signing import Credentials
 from tts2face.types import Chunk, Waveform
 
 if TYPE_CHECKING:
@@ -142,8 +143,15 @@ def serve(call: Call) -> Mapping[str, Any]:
     return call.more().content
 
 
-def handlers(
-    *, log_format: str, log_text: bool, n_sessions: int, memory_mb: int, sentences_mb: int, tasks: Sequence[str] = ()
+def handlers(  # noqa: PLR0913 - one parameter a setting
+    *,
+    log_format: str,
+    log_text: bool,
+    n_sessions: int,
+    memory_mb: int,
+    sentences_mb: int,
+    tasks: Sequence[str] = (),
+    signing: Mapping[str, str] | None = None,
 ) -> Mapping[str, Handler]:
     """Handlers of a process with the settings of the service.
 
@@ -151,12 +159,14 @@ def handlers(
     ----------
     tasks
         ``module:NAME`` of further tables of tasks by kind.
+    signing
+        Arguments of the `Credentials` with which complete files are signed; None: they are not.
     """
     configure_logs(log_format, with_text=log_text)
     sessions = SessionCache(
         n_sessions, voices=VoicePool(OneAtATime(), give_turn, wait_elsewhere),
         max_bytes=memory_mb * 1_000_000 or None,
-        memory_mb=sentences_mb,
+        memory_mb=sentences_mb, signer=None if signing is None else Credentials.from_json(signing).open(),
     )  # fmt: skip
     known = dict(TASKS)
     for table in tasks:

@@ -18,6 +18,7 @@ from tts2face.serving.batch.engine import Engine
 from tts2face.serving.batch.store import Store
 from tts2face.serving.work.blobs import BlobStore
 from tts2face.serving.work.queues import JOB_QUEUE, TALKER_QUEUE
+from tts2face.storage.signing import Signer
 
 # No HTML: a report that ran as a page of the service could use the key of its reader.
 MEDIA_TYPES = {
@@ -74,6 +75,8 @@ class JobTask:
         Raises `JobCancelledError` if the job is no longer wanted; to be called now and then.
     database, resources
         URL of the database, and the files of the uploaded models in the store.
+    signer
+        Who signs the results; None: nobody.
     """
 
     request: Mapping[str, Any]
@@ -85,6 +88,7 @@ class JobTask:
     check: Callable[[], None]
     database: str = ""
     resources: Callable[[], BlobStore] | None = None
+    signer: Signer | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,9 +3,9 @@
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from lexicon.errors import BackendError, Tts2faceError
 from tts2face.processes.parent import Child
@@ -31,6 +31,8 @@ class LocalWorkers:
         Called with lines for people; in other threads.
     niceness
         What is added to their niceness: 10 yields to other processes.
+    signing
+        Arguments of the `Credentials` with which they sign results; None: they do not.
     """
 
     database: str
@@ -38,6 +40,7 @@ class LocalWorkers:
     n_workers: int = 1
     on_message: OnMessage = lambda _: None
     niceness: int = 0
+    signing: Mapping[str, str] | None = field(default=None, repr=False)
 
 
 @contextmanager
@@ -72,7 +75,8 @@ class LocalWorker:
         self._child.close()
 
     def _work(self) -> None:
-        order = {"database": self._wanted.database, "store": self._wanted.store_url, "core": self._core}
+        order = {"database": self._wanted.database, "store": self._wanted.store_url, "core": self._core,
+                 "signing": self._wanted.signing}  # fmt: skip
         try:
             self._child.call(WORK, order, on_event=lambda event: self._wanted.on_message(event.content["line"]))
         except Tts2faceError as ended:

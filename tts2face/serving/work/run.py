@@ -22,6 +22,7 @@ from tts2face.serving.work.jobs import DONE, FAILED, JobFile, JobRecord
 from tts2face.serving.work.kinds import KINDS, JobCancelledError, JobTask, Product, Products
 from tts2face.sound.voice_urls import SERVER_FAILS, failure_of_server
 from tts2face.storage.bucket import StoreAwayError
+from tts2face.storage.signing import Signer
 from tts2face.storage.sql import Database, DatabaseAwayError, connection_errors
 from tts2face.storage.temporary import Temporary
 from tts2face.storage.user_folders import without_folders
@@ -64,12 +65,16 @@ class JobRunner:
         Store of segments.
     blobs
         Stores of files; the first one is that of jobs.
+    signer
+        Who signs the results; None: nobody.
     """
 
-    def __init__(self, url: str, store: Store, blobs: Callable[[], tuple[BlobStore, ...]]) -> None:
+    def __init__(
+        self, url: str, store: Store, blobs: Callable[[], tuple[BlobStore, ...]], signer: Signer | None = None
+    ) -> None:
         self._url = url
         self._store = store
-        self._blobs = blobs
+        self._blobs, self._signer = blobs, signer
 
     def run(self, job_id: str) -> str:
         """Execute a job unless it has ended; its state afterwards.
@@ -126,7 +131,7 @@ class JobRunner:
                 engine = _JobEngine(watch, self._url)
                 task = JobTask(
                     self._request(job), inputs, work, engine, self._store, watch.report, watch.check,
-                    self._url, lambda: self._blobs()[1],
+                    self._url, lambda: self._blobs()[1], self._signer,
                 )  # fmt: skip
                 products = find_runner(job.kind)(task)
                 ending = Ending(DONE, self._put(products.files), products.error)

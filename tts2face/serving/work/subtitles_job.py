@@ -29,7 +29,12 @@ def run_subtitles(task: JobTask) -> Products:
         raise DataError(f"no cue can be spoken: {reasons}")
     out = task.folder / "clips"
     result = run_batch(
-        plan, out, store=task.store, engine=task.engine, on_progress=lambda done, of: _report(task, done, of)
+        plan,
+        out,
+        store=task.store,
+        engine=task.engine,
+        on_progress=lambda done, of: _report(task, done, of),
+        signer=task.signer,
     )
     for name in (JSON_NAME, CSV_NAME):
         _remove_folders(out / name, task)

@@ -33,6 +33,7 @@ from tts2face.serving.work.queues import (
 from tts2face.serving.work.run import JobRunner, job_blobs
 from tts2face.serving.work.segment_worker import SegmentWorker, is_cancelled
 from tts2face.serving.work.workers import BEAT_S, Workers, list_running, return_work
+from tts2face.storage.signing import Credentials, Signer
 from tts2face.storage.sql import DatabaseAwayError, database_reason
 
 POLL_S = 0.2  # between two polls of the queue
@@ -62,6 +63,8 @@ class Worker:
         What renders; None: a child process.
     core
         Core to which the child process is bound; None: all.
+    signer
+        Who signs the results of jobs; None: nobody.
     """
 
     def __init__(
@@ -72,12 +75,13 @@ class Worker:
         renderer: SegmentRenderer | None = None,
         core: int | None = None,
         on_message: OnMessage = lambda _: None,
+        signer: Signer | None = None,
     ) -> None:
         self._url = database_url(database)
         self._store: Store = open_store(store)
         blobs = job_blobs(store)
         self._segments = SegmentWorker(self._store, blobs, renderer=renderer, core=core, on_message=on_message)
-        self._jobs = JobRunner(self._url, self._store, blobs)
+        self._jobs = JobRunner(self._url, self._store, blobs, signer)
         self._on_message = on_message
         self.executor_id = f"{uuid.uuid4().hex[:20]}"
         self._place = f"{socket.gethostname()}, process {os.getpid()}"
@@ -250,7 +254,9 @@ def work(call: Call) -> dict[str, Any]:
     def send(text: str) -> None:
         call.event({"line": f"{time.strftime('%H:%M:%S')} {text}"})
 
-    Worker(order["database"], order["store"], core=order["core"], on_message=send).run()
+    signing = order.get("signing")
+    signer = None if signing is None else Credentials.from_json(signing).open()
+    Worker(order["database"], order["store"], core=order["core"], on_message=send, signer=signer).run()
     return {}
 
 

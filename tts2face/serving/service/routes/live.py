@@ -25,6 +25,7 @@ from tts2face.serving.service.live_text import REFUSED_S, SAMPLE_BYTES, SAMPLE_R
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.pool import InputQueue
 from tts2face.serving.service.state import ServiceState
+from tts2face.storage.marks import LIVE_NOTICE, MOTION_NOTICE, Mark, mark_fields
 
 router = APIRouter(tags=["live"])
 
@@ -215,7 +216,9 @@ def _read_message(message: Any, *, is_sound: bool) -> tuple[dict[str, Any], byte
 
 
 async def _send(connection: WebSocket, results: AsyncIterator[Message], receiver: "LiveText | _Sound") -> None:
-    """Pass the results on: events as text, sound as binary messages."""
+    """Pass the results on: a first event that they are synthetic, events as text, sound as binary messages."""
+    mark = Mark(MOTION_NOTICE if isinstance(receiver, _Sound) else LIVE_NOTICE)
+    await connection.send_json({"type": "mark", **mark_fields(mark)})
     try:
         async with aclosing(results) as messages:  # type: ignore[type-var]
             async for message in messages:
