@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from tts2face.storage.signing import Signer
 
 NOT_IN_BATCH = frozenset(
-    {"text", "exports", "audio", "audio_map", "idle", "listen", "partner", "timeline", "expression"}
+    {"text", "spoken_mark", "exports", "audio", "audio_map", "idle", "listen", "partner", "timeline", "expression"}
 )
 MAX_WARNINGS = 40  # on the terminal; all are in the manifest
 

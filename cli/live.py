@@ -26,7 +26,7 @@ USUAL_MICROPHONE = "default"
 # Options of a request that a live face does not take.
 NOT_LIVE = frozenset({
     "text", "audio", "audio_map", "idle", "listen", "partner", "timeline", "expression", "synthesis", "context",
-    "exemplars", "pitch", "articulation", "plain_delivery",
+    "exemplars", "pitch", "articulation", "plain_delivery", "spoken_mark",
 })  # fmt: skip
 KINDS = ", ".join(f"{kind.form} ({kind.shows})" for kind in TARGETS)
 

@@ -18,7 +18,7 @@ class Exclusion(NamedTuple):
     without: str = ""
 
 
-OF_SPEECH = {"markup", "voice", "rate", "voice_pitch", "voice_range", "volume", "lead"}
+OF_SPEECH = {"markup", "voice", "rate", "voice_pitch", "voice_range", "volume", "lead", "spoken_mark"}
 # In the order in which they are found.
 EXCLUSIONS = (
     Exclusion({"articulation"}, {"idle"}, "--articulation has no effect with --idle; remove one of them"),
@@ -34,17 +34,17 @@ EXCLUSIONS = (
         "--articulation needs the phones of a recording; remove it, or --audio-map",
     ),
     Exclusion(
-        {"voice", "rate", "voice_pitch", "voice_range", "lead"},
+        {"voice", "rate", "voice_pitch", "voice_range", "lead", "spoken_mark"},
         {"audio"},
-        "--voice, --rate, --voice-pitch, --voice-range and --lead have no effect on a recording; remove them or "
-        "--audio",
+        "--voice, --rate, --voice-pitch, --voice-range, --lead and --spoken-mark have no effect on a recording; "
+        "remove them or --audio",
     ),
     Exclusion({"text", "audio"}, {"idle"}, "--idle cannot be combined with text or --audio; remove one of them"),
     Exclusion(
         OF_SPEECH,
         {"idle"},
-        "--markup, --voice, --rate, --voice-pitch, --voice-range, --volume and --lead have no effect with --idle; "
-        "remove them",
+        "--markup, --voice, --rate, --voice-pitch, --voice-range, --volume, --lead and --spoken-mark have no effect "
+        "with --idle; remove them",
     ),
     Exclusion(
         {"partner"},
@@ -56,8 +56,8 @@ EXCLUSIONS = (
     Exclusion(
         OF_SPEECH,
         {"listen"},
-        "--markup, --voice, --rate, --voice-pitch, --voice-range, --volume and --lead need a text after --listen; add "
-        "one, or remove them",
+        "--markup, --voice, --rate, --voice-pitch, --voice-range, --volume, --lead and --spoken-mark need a text after "
+        "--listen; add one, or remove them",
         "text",
     ),
     Exclusion({"pitch"}, {"gestures=noise"}, "--pitch has no effect with --gestures noise; remove one of them"),

@@ -29,8 +29,9 @@ DRAWN_FACE, REALISTIC_FACE = "ada", "head"  # the shipped face that is shown by 
 # Order of flags, of fields over HTTP and of lists in messages.
 ORDER = (
     "text", "markup", "audio", "audio_map", "language", "voice", "rate", "voice_pitch", "voice_range", "lead",
-    "plain_delivery", "volume", "seed", "dictionary", "text_marks", "synthesis", "context", "exemplars", "articulation",
-    "fps", "gestures", "style", "gain", "expression", "timeline", "pitch", "gaze", "idle", "listen", "partner",
+    "plain_delivery", "spoken_mark", "volume", "seed", "dictionary", "text_marks", "synthesis", "context", "exemplars",
+    "articulation", "fps", "gestures", "style", "gain", "expression", "timeline", "pitch", "gaze", "idle", "listen",
+    "partner",
 )  # fmt: skip
 
 
@@ -67,6 +68,7 @@ class Spoken(CheckedOptions):
     voice_pitch: float = 0.0
     voice_range: float = 1.0
     lead: float | None = LEAD_S
+    spoken_mark: str | None = None
     plain_delivery: bool = False
     volume: float = 1.0
     articulation: str | None = None

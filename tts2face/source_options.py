@@ -62,6 +62,11 @@ class SourceOptions:
         LEAD_S, "Seconds from the start of the clip to the first sound, in which the lips open, 0 to 1.",
         limits=LEAD_LIMITS_S,
     )  # fmt: skip
+    spoken_mark: str | None = option(
+        None,
+        "Words before the text that say that the voice is synthetic: auto for a sentence in the language of the text, "
+        "or one's own.",
+    )
     plain_delivery: bool = option(
         False,
         "Keep the voice's rate, pitch and loudness under every style; --rate, --voice-pitch, --voice-range and "

@@ -252,8 +252,8 @@ def test_files_without_sound_are_refused(session: Session, here: Path) -> None:
         ({"audio_map": "magic"}, "no audio map 'magic'; choose phones, voices, network or linear"),
         ({"audio_map": "linear", "audio": None, "text": "Hi."}, "--audio-map needs a recording"),
         ({"audio_map": "linear", "text": "Hi."}, "remove --audio-map or the text"),
-        ({"voice": "espeak"}, "--voice-range and --lead have no effect on a recording"),
-        ({"rate": 1.5}, "--voice-range and --lead have no effect on a recording"),
+        ({"voice": "espeak"}, "--voice-range, --lead and --spoken-mark have no effect on a recording"),
+        ({"rate": 1.5}, "--voice-range, --lead and --spoken-mark have no effect on a recording"),
     ],
 )
 def test_options_that_exclude_each_other_are_refused(options: dict, reason: str) -> None:

@@ -24,6 +24,7 @@ from tts2face.types import Clip
 LABEL_TEXT = "synthetic"
 LABEL_HEIGHT, LABEL_LEAST_PX = 0.035, 9  # of the letters, of the height of a picture
 LABEL_MARGIN = 0.5  # of the height of the letters, around the label
+SAFE_SHARE = 0.05  # of a picture's width and height between its edge and the label: the safe area of titles (EBU R 95)
 SHADE, PAPER, INK = 0.55, 0, 255  # opacity and brightness of the ground, and of the letters
 
 
@@ -223,7 +224,11 @@ def mark_picture(pixels: NDArray[np.uint8], picture: Picture) -> NDArray[np.uint
 def _with_label(pixels: NDArray[np.uint8], label: NDArray[np.float32]) -> NDArray[np.uint8]:
     height, width = label.shape
     marked = pixels.copy()
-    part = marked[-height:, -width:]
+    down, right = (
+        max(0, min(side - own, round((1 - SAFE_SHARE) * side) - own))
+        for side, own in zip(pixels.shape, label.shape, strict=False)
+    )
+    part = marked[down : down + height, right : right + width]
     brightness = PAPER + (INK - PAPER) * label[..., None]
     opacity = np.maximum(label, SHADE)[..., None]
     part[..., :3] = np.rint(part[..., :3] * (1 - opacity) + brightness * opacity).astype(np.uint8)

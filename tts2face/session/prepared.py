@@ -19,6 +19,7 @@ from lexicon.scripts import check_readable
 from lexicon.sentence_length import check_silence, marked_silence_s
 from lexicon.sentences import MAX_LAST_GESTURE_S, Sentence, split_sentences
 from lexicon.sequence import PhoneSequence
+from lexicon.spoken_mark import with_spoken_mark
 from lexicon.ssml_prosody import semitones_factor
 from lexicon.text_marks import is_ssml, parse_marks
 from lexicon.values.checks import check_limits
@@ -260,7 +261,11 @@ def read_marks(request: Request, person: Person | None = None) -> MarkedText:
 
     language, has_emphasis = request.language, spoken is not None
     table = read_marks_table(request.text_marks)
-    return parse_marks(source.text, language, request.markup, has_emphasis=has_emphasis, voice_hz=voice_hz, table=table)
+    written = parse_marks(
+        source.text, language, request.markup, has_emphasis=has_emphasis, voice_hz=voice_hz, table=table
+    )
+    notice = None if spoken is None or not source.text.strip() else spoken.spoken_mark
+    return written if notice is None else with_spoken_mark(written, notice, language)
 
 
 def recordings(source: Source) -> dict[str, Path]:

@@ -59,7 +59,7 @@ EXAMPLES: Mapping[str, Any] = MappingProxyType({
     "person": "woman 70",
     "idle": 2.5, "listen": 2.5, "gaze": "camera", "context": 3, "exemplars": 10, "audio_map": "network",
     "language": "en-us", "markup": "auto", "rate": 1.0, "voice_pitch": 0.0, "voice_range": 1.0, "lead": 0.1,
-    "plain_delivery": False, "volume": 1.0, "seed": 0, "fps": 30.0,
+    "plain_delivery": False, "spoken_mark": "auto", "volume": 1.0, "seed": 0, "fps": 30.0,
     "pitch": False, "camera": "front", "supersampling": 2, "visible_mark": False, "dictionary": None,
 })  # fmt: skip
 # Options that a door does not take, with the reason.

@@ -30,6 +30,7 @@ from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.warm_process import work_call
 from tts2face.storage.marks import PROGRAM
 
+SPOKEN_KINDS = ("file", "speech")
 MARK_HEADER = "X-Synthetic"  # what made synthetic sound, pictures or motion; raw samples have no other place
 WARM_TEXT = "Hi."
 
@@ -71,8 +72,14 @@ class Results:
         self._default = default_work(settings)
 
     def work(self, *, models: Mapping[str, Any] = MappingProxyType({}), **fields: Any) -> Work:
-        """A `Work` with the models of the settings unless it names others."""
-        return replace(self._default, models={**self._default.models, **models}, **fields)
+        """A `Work` with the models of the settings unless it names others, and the marks that the operator wants."""
+        work = replace(self._default, models={**self._default.models, **models}, **fields)
+        settings, request = self._settings, dict(work.request)
+        is_spoken = str(request.get("text", "")).strip() and request.get("audio") is None
+        if settings.spoken_mark and work.kind in SPOKEN_KINDS and is_spoken:
+            request.setdefault("spoken_mark", settings.spoken_mark)
+        picture = {**work.picture, "visible_mark": True} if settings.visible_mark else work.picture
+        return replace(work, request=request, picture=picture)
 
     def check_length(self, text: str) -> None:
         """Refuse a text of more than `text_characters`."""

@@ -115,6 +115,10 @@ class ServiceSettings:
     upload_pixels: int = setting(40_000_000, "Largest picture that a request may send.", (1, 200_000_000))
     decode_s: float = setting(60.0, "Seconds that the decoding of an upload may take.", (1, 3600))
     drain_s: float = setting(30.0, "Seconds that running requests have to finish after SIGTERM.", (0, 3600))
+    visible_mark: bool = setting(False, "Write the word synthetic into the pictures of all clips.")
+    spoken_mark: str = setting(
+        "", "Words before all texts that say that the voice is synthetic; auto: a sentence in their language."
+    )
     sign_certificate: Path | None = setting(
         None, "Certificate (PEM) with which complete files are signed (C2PA, extra c2pa)."
     )

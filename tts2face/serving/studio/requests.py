@@ -6,7 +6,7 @@ A client names models, voices and assets; no path of a client reaches the file s
 import os
 from collections.abc import AsyncIterator, Mapping
 from contextlib import aclosing
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +81,8 @@ async def project_work(
     except RefusedError as refused:
         raise InputError(refused.message) from refused
     form = str(more.pop("format", ""))
+    if state.settings.visible_mark:
+        project = replace(project, picture=replace(project.picture, visible_mark=True))
     request = {
         "text": project.request.source.text,
         "project": project_json(project, folder),

@@ -1,5 +1,6 @@
 """Jobs of kind ``clip``: their options, their files, and the checks before they are queued."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,8 @@ async def prepare_clip(order: JobOrder) -> dict[str, Any]:
     await adjustments.note_words(order.state, fields)
     order.upload.folder.notes.extend(adjustments.made)
     work = order.state.results.work(models=fields.models, request=fields.request, picture=fields.picture, format=format)
+    if has_audio and "spoken_mark" not in fields.request:  # a recording lies beside the request
+        work = replace(work, request={name: given for name, given in work.request.items() if name != "spoken_mark"})
     return work.as_json()
 
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import Field, ValidationError
 
+from lexicon.errors import InputError
+from lexicon.spoken_mark import END, mark_words
 from tts2face.processes.message import Message
 from tts2face.serving.service.clip_options import (
     MODEL_FIELDS,
@@ -45,6 +47,7 @@ INVALID = 1007  # WebSocket close code: a message is not what it should be
 NOT_IN_LIVE_TEXT: Mapping[str, str] = MappingProxyType(
     {"audio": "live sound has options of its own", "audio_map": "there is no recording"}
     | dict.fromkeys(("text", "partner"), "it comes in parts")
+    | {"spoken_mark": "a setting of the operator"}
     | dict.fromkeys(("idle", "listen", "timeline", "expression"), "the end of live text is not known")
     | dict.fromkeys(
         ("plain_delivery", "synthesis", "context", "exemplars", "articulation", "pitch"), "live text has the defaults"
@@ -86,6 +89,7 @@ async def stream(connection: WebSocket) -> None:
     try:
         options = _read_options(await _first_message(connection, state.settings.body_s))
         work = await _work(state, connection.state.key, options)
+        notice = _spoken_mark(state, options)
         if options.targets:
             state.presentations.check(connection.state.key, options.targets)
     except (ValidationError, RefusedError) as wrong:
@@ -94,6 +98,8 @@ async def stream(connection: WebSocket) -> None:
     except (WebSocketDisconnect, KeyError):
         return
     key, receiver = connection.state.key, _receiver(state, connection.state.key, options)
+    if notice:
+        await receiver.receive({"type": "text", "text": notice}, b"")
     if options.targets:
         messages = state.presentations.messages(work, key, receiver.inputs, options.targets)
     else:
@@ -111,6 +117,16 @@ async def stream(connection: WebSocket) -> None:
         await asyncio.gather(sending, receiving, return_exceptions=True)
         with suppress(RuntimeError):
             await connection.close()
+
+
+def _spoken_mark(state: ServiceState, options: TextOptions | AudioOptions) -> str:
+    """First text of a stream: the words of the operator's mark; empty without one."""
+    if not state.settings.spoken_mark or not isinstance(options, TextOptions):
+        return ""
+    try:
+        return mark_words(state.settings.spoken_mark, getattr(options, "language", "en-us")) + END
+    except InputError as unknown:
+        raise RefusedError(422, "invalid_request", str(unknown)) from unknown
 
 
 async def _work(state: ServiceState, key: ApiKey, options: TextOptions | AudioOptions) -> Work:
