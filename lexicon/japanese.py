@@ -17,7 +17,7 @@ from lexicon.errors import BackendError, import_of_extra
 
 _KANA = re.compile("[ァ-ヺー]+")
 _OF_NUMBERS = frozenset("0123456789０１２３４５６７８９.,．，")
-_NO_NUMBER_BEFORE = "(?<![一二三四五六七八九十百千万億])"
+_NUMBERS = "一二三四五六七八九十百千万億兆"
 _MINUS = str.maketrans("−", "-")
 _MARKS = "。、，．！？…!?,;:；："
 # what stands between marks and spaces, with the brackets around it
@@ -109,7 +109,7 @@ def _with_digits(text: str) -> str:
 
     locale = find_locale("ja")
     for pattern, row in locale.rows("counted").items() if locale else ():
-        text = re.sub(f"{_NO_NUMBER_BEFORE}(?:{pattern})", row.spoken, text)
+        text = re.sub(f"(?<![{_NUMBERS}])(?:{pattern})(?![{_NUMBERS}])", row.spoken, text)
     return text
 
 
@@ -185,6 +185,17 @@ def _whole_numbers(phrases: Sequence[JapanesePhrase], text: str) -> Iterator[Jap
         yield whole
 
 
+def _place_of(written: str, text: str, at: int) -> tuple[int, int]:
+    """Range of the next occurrence of a word in a text, perhaps with spaces within it (3 日); -1 if there is none."""
+    place = text.find(written, at, at + len(written) + MAX_CHARACTERS)
+    if place >= 0 and not any(map(str.isalnum, text[at:place])):
+        return place, place + len(written)
+    spaced = re.compile(r"\s?".join(map(re.escape, written))).search(text, at, at + 2 * len(written) + MAX_CHARACTERS)
+    if spaced is not None and " " in spaced.group() and not any(map(str.isalnum, text[at : spaced.start()])):
+        return spaced.span()
+    return place, place + len(written)
+
+
 def _spans(words: Sequence[Mapping[str, Any]], letters: tuple[str, list[int]]) -> list[tuple[int, int]]:
     """Range of each word in the text; the words of a number (十, 四) share the range of its digits."""
     text, places = letters
@@ -192,7 +203,7 @@ def _spans(words: Sequence[Mapping[str, Any]], letters: tuple[str, list[int]]) -
     at = n_waiting = 0
     for word in words:
         written = unicodedata.normalize("NFKC", str(word["string"])).translate(_MINUS)
-        place = text.find(written, at, at + len(written) + MAX_CHARACTERS)
+        place, end = _place_of(written, text, at)
         gap = text[at:place]
         is_number = n_waiting > 0 and any(map(str.isdigit, gap))
         if place < 0 or not (is_number or not any(map(str.isalnum, gap))):
@@ -201,7 +212,7 @@ def _spans(words: Sequence[Mapping[str, Any]], letters: tuple[str, list[int]]) -
             continue
         first = _after_space(text, at, place)
         spans[len(spans) - n_waiting :] = [(first, place)] * n_waiting
-        at, n_waiting = place + len(written), 0
+        at, n_waiting = end, 0
         spans.append((place, at))
     first = _after_space(text, at, len(text))
     spans[len(spans) - n_waiting :] = [(first, len(text.rstrip()))] * n_waiting
