@@ -61,14 +61,16 @@ class TextMark:
 
 @dataclass(frozen=True, slots=True)
 class MarkTable:
-    """Marks by kind and spelling; actions and stage directions by the verb's forms; styles of a user's own rows.
+    """Marks by kind and spelling; actions and stage directions by the verb's forms.
 
-    `plain_faces` are the emoticons of letters and signs of ordinary sentences (XD, o/).
+    `own_styles` and `n_own` are the styles and the number of a user's own rows; `plain_faces` are the emoticons of
+    letters and signs of ordinary sentences (XD).
     """
 
     marks: Mapping[str, Mapping[str, TextMark]]
     verbs: Mapping[str, tuple[TextMark, ...]] = field(default_factory=dict)
     own_styles: frozenset[str] = frozenset()
+    n_own: int = 0
     plain_faces: tuple[str, ...] = ()
 
     def emoji(self, written: str) -> TextMark | None:
@@ -114,7 +116,8 @@ def _marks_of(path: Path, _: tuple[int, int]) -> MarkTable:
         raise DataError(f"{path} cannot be read ({refused.strerror}); check the file") from refused
     rows = [line.split("\t") for line in lines]
     own = _checked_rows(rows, str(path))
-    return replace(_table([*_shipped_rows(), *own]), own_styles=frozenset(row.style for row in own if row.style))
+    styles = frozenset(row.style for row in own if row.style)
+    return replace(_table([*_shipped_rows(), *own]), own_styles=styles, n_own=len(own))
 
 
 def read_marks_table(path: Path | None) -> MarkTable:

@@ -33,7 +33,7 @@ from tts2face.source_options import AUTO, AUTO_MARKUP
 
 ADJUSTED = "X-Tts2face-Adjusted"
 FEMALE, MALE = "female", "male"
-READING_OPTIONS = {"text", "language", "markup", "style", "gestures"}  # that decide how a text is read
+READING_OPTIONS = {"text", "language", "markup", "style", "gestures", "text_marks"}  # that decide how a text is read
 VOICE_NAMES = {"markup", "voice_pitch", "voice_range"}  # options of clips beside the fields of OpenAI
 OPENAI_VOICES: Mapping[str, str] = MappingProxyType({
     "alloy": FEMALE, "ash": MALE, "ballad": MALE, "cedar": MALE, "coral": FEMALE, "echo": MALE, "fable": MALE,

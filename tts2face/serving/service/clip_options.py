@@ -22,7 +22,7 @@ from tts2face.request import OWN_FACE, Request, option_fields
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.library import Library, shipped_names
-from tts2face.serving.work.resource_check import DICTIONARY, FACE
+from tts2face.serving.work.resource_check import FACE, TEXT_KINDS
 from tts2face.session import catalogue
 from tts2face.session.encoded_stream import media_types
 from tts2face.session.named_models import Models
@@ -40,6 +40,7 @@ DESCRIPTIONS: Mapping[str, str] = MappingProxyType({
     "voice": "A voice of GET /v1/voices, or auto: the one that fits the face.",
     "plain_delivery": "The style leaves rate, pitch and loudness of the voice unchanged.",
     "dictionary": "A dictionary of GET /v1/dictionaries.",
+    "text_marks": "A table of marks of GET /v1/text_marks.",
     "talker": "A talker of GET /v1/talkers.",
     "face": "A face of GET /v1/faces, or self.",
     "identity": "Identity preset of the face.",
@@ -61,11 +62,12 @@ EXAMPLES: Mapping[str, Any] = MappingProxyType({
     "language": "en-us", "markup": "auto", "rate": 1.0, "voice_pitch": 0.0, "voice_range": 1.0, "lead": 0.1,
     "plain_delivery": False, "spoken_mark": "auto", "volume": 1.0, "seed": 0, "fps": 30.0,
     "pitch": False, "camera": "front", "supersampling": 2, "visible_mark": False, "dictionary": None,
+    "text_marks": None,
 })  # fmt: skip
 # Options that a door does not take, with the reason.
 NOT_IN_CLIPS: Mapping[str, str] = MappingProxyType({
     "audio": "a part of the form", "partner": "a part of the form", "timeline": "a part of the form",
-    "renderer": "the operator's machine draws", "text_marks": "a file of the operator's",
+    "renderer": "the operator's machine draws",
 })  # fmt: skip
 COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
 MODEL_KINDS = ("talker", "face", "palette")
@@ -138,7 +140,7 @@ async def divide_options(state: "ServiceState", key: ApiKey, given: dict[str, An
     picture = {name: value for name, value in given.items() if name in PICTURE_FIELDS}
     request = {name: value for name, value in given.items() if name not in {*models, *picture}}
     models = await resolve_models(state.library, key, models)
-    request = await resolve_dictionary(state.library, key, request)
+    request = await resolve_texts(state.library, key, request)
     check_voice(request.get("voice"))
     check_background(picture.get("background", "studio"))
     _check_size(picture.get("size", AUTO_SIZE), state.settings.pixels)
@@ -192,12 +194,12 @@ def _check_hair(models: Mapping[str, Any]) -> None:
         parse_hair_colour(colour[:60])
 
 
-async def resolve_dictionary(library: Library, key: ApiKey, fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Fields of a request with the path of their dictionary in place of its name; errors as `resolve_models`."""
-    if fields.get(DICTIONARY) is None:
-        return dict(fields)
-    path, _ = await asyncio.to_thread(library.resolve, key, DICTIONARY, str(fields[DICTIONARY]))
-    return {**fields, DICTIONARY: path}
+async def resolve_texts(library: Library, key: ApiKey, fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Fields of a request with the paths of its dictionary and its marks, not names; errors as `resolve_models`."""
+    resolved = dict(fields)
+    for kind in TEXT_KINDS & {name for name, value in fields.items() if value is not None}:
+        resolved[kind], _ = await asyncio.to_thread(library.resolve, key, kind, str(fields[kind]))
+    return resolved
 
 
 def check_voice(voice: str | None) -> None:

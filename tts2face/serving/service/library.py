@@ -1,4 +1,4 @@
-"""Talkers, faces, palettes and dictionaries of the service: the shipped ones, and those that keys have uploaded.
+"""Talkers, faces, palettes, dictionaries and tables of marks of the service: shipped ones, and uploads of keys.
 
 All methods block; routes call them in threads.
 """
@@ -16,7 +16,7 @@ from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.work.blobs import BlobStore, open_blobs
 from tts2face.serving.work.database import database_url
-from tts2face.serving.work.resource_check import CONTENT, DICTIONARY, FACE, PICTURE, TALKER
+from tts2face.serving.work.resource_check import CONTENT, DICTIONARY, FACE, PICTURE, TALKER, TEXT_KINDS, TEXT_MARKS
 from tts2face.serving.work.resources import (
     MB,
     ResourceTable,
@@ -40,7 +40,7 @@ RESERVED = {FACE: (OWN_FACE,), TALKER: CLIENT_MODELS}
 
 def shipped_names(kind: str) -> tuple[str, ...]:
     """Names of the shipped talkers, faces, palettes or dictionaries."""
-    return () if kind == DICTIONARY else catalogue.shipped_names(kind)
+    return () if kind in TEXT_KINDS else catalogue.shipped_names(kind)
 
 
 def check_new_name(kind: str, name: str) -> None:
@@ -228,4 +228,4 @@ def _state_of(path: Path) -> tuple[int, int] | None:
 
 def plural(kind: str) -> str:
     """The word of a kind in addresses."""
-    return "dictionaries" if kind == DICTIONARY else f"{kind}s"
+    return {DICTIONARY: "dictionaries", TEXT_MARKS: TEXT_MARKS}.get(kind, f"{kind}s")

@@ -5,12 +5,14 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, make_dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError, InputError
 from lexicon.gesture_marks import parse_gesture
 from lexicon.gesture_names import GESTURES
 from lexicon.growing_text import GrowingText
+from lexicon.mark_table import read_marks_table
 from lexicon.values.checks import format_value
 from lexicon.values.json_text import parse_json
 from lexicon.values.records import checked
@@ -91,8 +93,8 @@ class LiveText:
         Characters of the whole stream, and of each minute.
     count
         Counts a sentence.
-    markup
-        How it is read.
+    markup, text_marks
+        How it is read, and the table of its marks.
 
     Attributes
     ----------
@@ -100,9 +102,16 @@ class LiveText:
         Of the task: ``say`` with one sentence, ``listen``, ``heard`` with sound of the partner, ``cancel`` and ``end``.
     """
 
-    def __init__(self, language: str, limits: tuple[int, int], count: Count, markup: str = "auto") -> None:
+    def __init__(
+        self,
+        language: str,
+        limits: tuple[int, int],
+        count: Count,
+        markup: str = "auto",
+        text_marks: Path | None = None,
+    ) -> None:
         self.inputs: InputQueue = asyncio.Queue()
-        self._growing, self._count = GrowingText(language, markup), count
+        self._growing, self._count = GrowingText(language, markup, read_marks_table(text_marks)), count
         self._most, self._most_a_minute = limits
         self._n_characters, self._minute = 0, Bucket()
         self._sentences: deque[str] = deque()

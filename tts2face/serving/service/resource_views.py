@@ -5,7 +5,7 @@ from typing import Annotated, Generic, TypeVar
 
 from pydantic import BaseModel, Field
 
-from tts2face.serving.work.resource_check import DICTIONARY, FACE, PALETTE, TALKER
+from tts2face.serving.work.resource_check import DICTIONARY, FACE, PALETTE, TALKER, TEXT_MARKS
 from tts2face.serving.work.resources import StoredResource
 
 
@@ -57,17 +57,24 @@ class DictionaryFacts(BaseModel):
     n_words: Annotated[int, Field(description="Number of its words.", examples=[12])]
 
 
+class TextMarksFacts(BaseModel):
+    """What is known about a table of marks."""
+
+    n_marks: Annotated[int, Field(description="Number of its marks.", examples=[12])]
+
+
 Facts = TypeVar("Facts", bound=BaseModel)
 FACTS: dict[str, type[BaseModel]] = {
     TALKER: TalkerFacts, FACE: FaceFacts, PALETTE: PaletteFacts, DICTIONARY: DictionaryFacts,
+    TEXT_MARKS: TextMarksFacts,
 }  # fmt: skip
 
 
 class Resource(BaseModel, Generic[Facts]):
-    """A talker, face, palette or dictionary."""
+    """A talker, face, palette, dictionary or table of marks."""
 
     name: Annotated[str, Field(description="Its name in requests.", examples=["anna"])]
-    kind: Annotated[str, Field(description="talker, face, palette or dictionary.", examples=["face"])]
+    kind: Annotated[str, Field(description="talker, face, palette, dictionary or text_marks.", examples=["face"])]
     owner: Annotated[
         str | None, Field(description="Key that uploaded it; null: it is the service's own.", examples=["studio"])
     ] = None

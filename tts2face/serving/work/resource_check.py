@@ -33,7 +33,9 @@ FACE = "face"
 PALETTE = "palette"
 DICTIONARY = "dictionary"
 CHARACTER, PHOTO = "character", "photo"  # files that become faces
-RESOURCE_KINDS = (TALKER, FACE, PALETTE, DICTIONARY)
+TEXT_MARKS = "text_marks"
+RESOURCE_KINDS = (TALKER, FACE, PALETTE, DICTIONARY, TEXT_MARKS)
+TEXT_KINDS = frozenset((DICTIONARY, TEXT_MARKS))  # without a picture
 # files of a checked resource
 CONTENT = "content"
 DESCRIPTION = "description.json"
@@ -88,10 +90,10 @@ def check_resource(kind: str, source: Path, folder: Path, max_bytes: float) -> N
     if kind == FACE:
         kind = kind_of_face(head)
     try:
-        if kind not in {DICTIONARY, CHARACTER, PHOTO}:
+        if kind not in {*TEXT_KINDS, CHARACTER, PHOTO}:
             _check_type(kind, source)
         _describe(_CHECKS[kind](source, folder / CONTENT), folder)
-        if kind != DICTIONARY:
+        if kind not in TEXT_KINDS:
             draw_resource(FACE if kind in {CHARACTER, PHOTO} else kind, folder / CONTENT, folder / PICTURE)
     except (DataError, InputError) as error:
         raise RefusedFileError(refusal(error, source, folder, folder / CONTENT)) from error
@@ -294,6 +296,17 @@ def _check_dictionary(source: Path, out: Path) -> dict[str, Any]:
     return {"n_words": len(entries)}
 
 
+def _check_text_marks(source: Path, out: Path) -> dict[str, Any]:
+    from lexicon.mark_table import read_marks_table
+    from lexicon.values.files import LARGEST_TEXT_BYTES, read_text
+
+    n_marks = read_marks_table(source).n_own
+    if not n_marks:
+        raise DataError("it has no mark; write one on each line below the names of the columns")
+    out.write_text(read_text(source, LARGEST_TEXT_BYTES), encoding="utf-8")
+    return {"n_marks": n_marks}
+
+
 def _rewrite(source: Path, out: Path, kind: str, version: int, character: bytes | None = None) -> None:
     """Write arrays and metadata again, without links to files of the machine that made them.
 
@@ -379,6 +392,7 @@ _CHECKS: Mapping[str, Callable[[Path, Path], dict[str, Any]]] = {
     FACE: _check_face,
     PALETTE: _check_palette,
     DICTIONARY: _check_dictionary,
+    TEXT_MARKS: _check_text_marks,
     CHARACTER: _check_character,
     PHOTO: _check_photo,
 }

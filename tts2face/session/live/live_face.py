@@ -91,7 +91,7 @@ class LiveFace:
         """Speak more of a text that is still being written, sentence by sentence."""
         found = self._find(number)
         if not isinstance(found, _Text):
-            found = _Text(number, GrowingText(self.speech.language, self.speech.markup))
+            found = _Text(number, GrowingText(self.speech.language, self.speech.markup, self.speech.marks))
             self._utterances.append(found)
         if found.growing is not None:
             found.sentences += found.growing.add(part)

@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import partial
 
 from lexicon.errors import InputError
+from lexicon.mark_table import MarkTable, read_marks_table
 from lexicon.marked_text import GestureMark
 from lexicon.pauses import pause_behind
 from lexicon.sequence import PhoneSequence
@@ -83,6 +84,11 @@ class LiveSpeech:
     def markup(self) -> str:
         """How the text is read."""
         return self._request.markup
+
+    @property
+    def marks(self) -> MarkTable:
+        """Marks of people and language models in the text."""
+        return read_marks_table(self._request.text_marks)
 
     @property
     def fps(self) -> float:

@@ -43,6 +43,15 @@ def test_a_dictionary_is_uploaded_shown_and_deleted(ask: Ask, settings: ServiceS
     assert not stored[0].exists()
 
 
+def test_a_table_of_marks_is_uploaded_and_read(ask: Ask) -> None:
+    made = ask("ann", "POST", "/v1/text_marks", **form("mine", b"mark\tkind\tgesture\nboing\ttag\tshake\n"))
+    assert (made.status_code, made.json()["about"]) == (201, {"n_marks": 1}), made.text
+    assert names(ask("ann", "GET", "/v1/text_marks")) == [("mine", "ann")]
+    refused = ask("ann", "POST", "/v1/text_marks", **form("wrong", b"mark\tkind\nboing\tsound\n"))
+    assert refused.status_code == 422
+    assert "line 2: there is no kind 'sound' of marks" in refused.text
+
+
 def test_a_face_has_a_picture(ask: Ask, tmp_path: Path) -> None:
     write_made_face(tmp_path / "a.face")
     made = ask("ann", "POST", "/v1/faces", **form("ball", (tmp_path / "a.face").read_bytes()))

@@ -26,8 +26,8 @@ from tts2face.serving.service.clip_options import (
     check_voice,
     divide_options,
     options_model,
-    resolve_dictionary,
     resolve_models,
+    resolve_texts,
 )
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.job_kinds.clip import add_background
@@ -215,7 +215,7 @@ async def _resolve_role(order: JobOrder, settings: Mapping[str, Any]) -> dict[st
     named = {name: settings[name] for name in MODEL_NAMES if name in settings}
     models = await resolve_models(order.state.library, order.key, named)
     check_voice(settings.get("voice"))
-    return {**await resolve_dictionary(order.state.library, order.key, settings), **models}
+    return {**await resolve_texts(order.state.library, order.key, settings), **models}
 
 
 SUBTITLES_KIND = JobKind(

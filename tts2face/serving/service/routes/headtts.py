@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from tts2face.interchange.exports.labels import Label
 from tts2face.picture.sound_stream import PCM_RATE
 from tts2face.serving.service.client_names import Adjustments, choose_voice, limited_rate
-from tts2face.serving.service.clip_options import OptionValues, described, resolve_dictionary
+from tts2face.serving.service.clip_options import OptionValues, described, resolve_texts
 from tts2face.serving.service.errors import ErrorBody, RefusedError
 from tts2face.serving.service.live_text import REFUSED_S, parse_message
 from tts2face.serving.service.results import timed_speech
@@ -169,7 +169,7 @@ async def _speak(
     fields["voice"], _ = await asyncio.to_thread(choose_voice, body.voice, body.language, text, adjustments)
     state = service_state(request)
     await adjustments.note_words(state, OptionValues({}, fields, {}))
-    fields = await resolve_dictionary(state.library, request.state.key, fields)
+    fields = await resolve_texts(state.library, request.state.key, fields)
     events, pcm = await timed_speech(request, state.results.work(kind="speech", request=fields))
     sound = pcm if body.audioEncoding == "pcm" else wave_head(PCM_RATE, len(pcm), sound_mark(UNKNOWN)) + pcm
     return audio_fields(events, subtitles) | {"audioEncoding": body.audioEncoding}, sound

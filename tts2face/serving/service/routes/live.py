@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Mapping
 from contextlib import aclosing, suppress
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -18,8 +19,8 @@ from tts2face.serving.service.clip_options import (
     StrictModel,
     check_voice,
     options_model,
-    resolve_dictionary,
     resolve_models,
+    resolve_texts,
 )
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
@@ -97,7 +98,7 @@ async def stream(connection: WebSocket) -> None:
         return
     except (WebSocketDisconnect, KeyError):
         return
-    key, receiver = connection.state.key, _receiver(state, connection.state.key, options)
+    key, receiver = connection.state.key, _receiver(state, connection.state.key, options, work)
     if notice:
         await receiver.receive({"type": "text", "text": notice}, b"")
     if options.targets:
@@ -136,19 +137,20 @@ async def _work(state: ServiceState, key: ApiKey, options: TextOptions | AudioOp
     )
     models = {name: given.pop(name) for name in MODEL_FIELDS if name in given}
     models = await resolve_models(state.library, key, models)
-    given = await resolve_dictionary(state.library, key, given)
+    given = await resolve_texts(state.library, key, given)
     check_voice(given.get("voice"))
     kind = "listen" if isinstance(options, AudioOptions) else "live"
     return state.results.work(kind=kind, models=models, request=given)
 
 
-def _receiver(state: ServiceState, key: ApiKey, options: TextOptions | AudioOptions) -> "LiveText | _Sound":
+def _receiver(state: ServiceState, key: ApiKey, options: TextOptions | AudioOptions, work: Work) -> "LiveText | _Sound":
     """Reader of the client's messages."""
     if isinstance(options, AudioOptions):
         return _Sound(options.rate)
     limits = state.settings.live_characters, state.settings.live_characters_per_minute
     language, markup = getattr(options, "language", "en-us"), getattr(options, "markup", "auto")
-    return LiveText(language, limits, lambda: state.permissions.count(key), markup)
+    table = work.request.get("text_marks")
+    return LiveText(language, limits, lambda: state.permissions.count(key), markup, table and Path(table))
 
 
 async def _first_message(connection: WebSocket, seconds: float) -> str:

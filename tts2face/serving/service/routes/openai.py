@@ -35,7 +35,7 @@ from tts2face.session.encoded_stream import media_types
 router = APIRouter(prefix="/v1", tags=["speech"])
 
 DOWNLOAD = "X-Download-Path"  # relative to /v1, as Kokoro-FastAPI has it
-SAME_NAMES = {"face", "palette", "dictionary"}  # of fields and of options of clips
+SAME_NAMES = {"face", "palette", "dictionary", "text_marks"}  # of fields and of options of clips
 FORMATS = {"jsonl": "curves"}  # further names of formats
 SoundFormat = Literal["mp3", "opus", "aac", "flac", "wav", "pcm", "weba"]
 Format = Literal[
@@ -119,6 +119,9 @@ class Speech(SpokenText):
     palette: Annotated[str | None, described("palette", "A palette of GET /v1/palettes; not part of it.")] = None
     dictionary: Annotated[
         str | None, described("dictionary", "A dictionary of GET /v1/dictionaries; not part of it.")
+    ] = None
+    text_marks: Annotated[
+        str | None, described("text_marks", "A table of marks of GET /v1/text_marks; not part of it.")
     ] = None
 
 

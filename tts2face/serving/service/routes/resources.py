@@ -44,7 +44,7 @@ from tts2face.serving.service.sent_resources import (
 from tts2face.serving.service.shipped_pictures import shipped_picture
 from tts2face.serving.service.state import service_state
 from tts2face.serving.service.uploads import save_upload
-from tts2face.serving.work.resource_check import DICTIONARY, FACE, RESOURCE_KINDS
+from tts2face.serving.work.resource_check import FACE, RESOURCE_KINDS, TEXT_KINDS
 from tts2face.serving.work.resources import StoredResource
 
 router = APIRouter(prefix="/v1", tags=["resources"])
@@ -60,6 +60,7 @@ CONTENTS = {
     "talker": "A .talker file.",
     "face": "A .face file, a character (.glb, .vrm, .zip), or a photo where it is allowed.",
     "palette": "A .palette file.", "dictionary": "A pronunciation dictionary, UTF-8 text.",
+    "text_marks": "A table of emoji, tags and actions, UTF-8 text with tabs.",
 }  # fmt: skip
 
 
@@ -171,7 +172,7 @@ def _form(kind: str) -> dict[str, Any]:
 for _kind in RESOURCE_KINDS:
     _add_reading(_kind)
     _add_writing(_kind)
-    if _kind != DICTIONARY:
+    if _kind not in TEXT_KINDS:
         _add_picture(_kind)
 
 
