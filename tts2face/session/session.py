@@ -14,7 +14,7 @@ from tts2face.picture.options import Picture
 from tts2face.picture.pace import Pace
 from tts2face.request import Request
 from tts2face.session.animated_face import AnimatedFace
-from tts2face.session.asynchronous import AsyncCalls
+from tts2face.session.async_calls import AsyncCalls
 from tts2face.session.encoded_stream import StreamFormat, encode_stream
 from tts2face.session.fixed_length import Length, clips_of_length
 from tts2face.session.live.calls import LiveCalls

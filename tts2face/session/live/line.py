@@ -112,9 +112,9 @@ class Line:
             self._notes.append(LiveEvent("note", item.message, 0.0, 0.0))
             return
         if isinstance(item, Block):
-            self._n_waiting += len(item.motion)
             if item.utterance:
                 self._give_way()
+            self._n_waiting += len(item.motion)
         self._blocks.append(item)
         self.fill()
 
@@ -294,8 +294,11 @@ class Line:
             self._speaks = 0
 
     def next_to_draw(self) -> Place | None:
-        """The first frame without a picture that can be drawn before it is read."""
-        first = min(math.ceil(self._draw_s * self.fps), self.length - 1)
+        """The first frame without a picture that can be drawn before it is read, or else the last one.
+
+        A picture that comes late is shown in place of the next one that is missing.
+        """
+        first = min(math.ceil(self._draw_s * self.fps), len(self._places) - 1)
         waiting = (place for at, place in enumerate(self._places) if at >= first and place.pixels is None)
         self._drawing = next(waiting, None)
         return self._drawing
