@@ -18,6 +18,7 @@ NOT_EXECUTED = {  # beginning of a command line: why it is parsed only
     "mimic --camera": WINDOW,
     "worker": "runs until it is interrupted",
     "serve --port": "runs until it is interrupted",
+    "live": "sends to a receiver; tests/targets/test_live_command.py runs the command",
     "keys list": "needs a file of keys",
     "keys remove": "needs a file of keys",
     "jobs show": "needs the name of a job",
