@@ -26,6 +26,13 @@ def test_features_reach_beyond_the_sentence() -> None:
     assert len(names) == len(set(names))
 
 
+def test_a_finite_verb_of_the_clause_is_a_feature() -> None:
+    lower, tags = ["they", "left", ",", "and", "rules", "conflict", "."], ["PRP", "VBD", ",", "CC", "NNS", "NN", "."]
+    assert "v=" in features(lower, tags, 5)
+    assert "v=<" in features([*lower[:2], "conflict"], [*tags[:2], "NN"], 2)
+    assert "v=>" in features(["conflict", "is"], ["NN", "VBZ"], 0)
+
+
 @pytest.mark.parametrize(
     ("text", "word", "name"),
     [
