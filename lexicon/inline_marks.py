@@ -19,6 +19,7 @@ from lexicon.emphasis import SPACED
 from lexicon.function_words import is_function_word
 from lexicon.gesture_marks import FIRST_WORDS, is_gesture
 from lexicon.informal_words import tag_words
+from lexicon.latex import ENVIRONMENTS, formula_words, is_formula
 from lexicon.mark_table import PLAIN, MarkTable, TextMark
 from lexicon.markdown import PARAGRAPH_END, SENTENCE_END, Block, split_blocks
 
@@ -40,6 +41,15 @@ _FOREIGN_MARK = (
 _URL = r"\([^()\s]{0,2000}(?:\([^()\s]{0,200}\)[^()\s]{0,200})?(?:\s+\"[^\"\n]{0,200}\")?\)"
 _ATTRIBUTES = r"(?P<attributes>(?:\s[^<>]{0,400})?)"
 _KINDS: Mapping[str, str] = MappingProxyType({
+    "formula": r"(?<![\w$\\])\$(?=[^\s$])(?P<inline>[^$\n]{1,300})(?<=\S)\$(?![0-9])|\$\$(?P<display>[^$]{1,500})\$\$"
+    r"|\\\((?P<parenthesized>(?:[^\\\n]++|\\(?!\))){1,80}+)\\\)|\\\[(?P<bracketed>(?:[^\\]++|\\(?!\])){1,80}+)\\\]"
+    rf"|\\begin\{{{ENVIRONMENTS}\}}(?P<environment>(?:[^\\]++|\\(?!end\{{)){{1,80}}+)\\end\{{{ENVIRONMENTS}\}}",
+    "token": r"<\|[\w ./:-]{1,40}\|>(?:(?<=start\|>)(?:assistant|user|system)\b)?|\[/?INST\]"
+    r"|【[0-9:]{1,9}†[^【】\n]{0,80}】",
+    "marked": r"(?<![=+\w])(?P<marker>==|\+\+)(?=[^\s=+][^=+\n]{0,200}(?<!\s)(?P=marker)(?![=+\w]))"
+    r"|(?<=[^\s=+])(?:==|\+\+)(?![=+\w])",
+    "reference": r"(?<![\w\]])!?\[(?=[^\[\]\n]{0,150}[^\W\d_][^\[\]\n]{0,150}\]\[[0-9]{0,3}\])"
+    r"|(?<=[^\s\[])\]\[[0-9]{0,3}\]",
     "escape": r"\\[*_#\[\]()~`>|!{}<-]",
     "code": r"(?P<ticks>`{1,2})(?P<source>[^`\n]{1,500})(?P=ticks)|`+",
     "foreign": _FOREIGN_MARK,
@@ -56,6 +66,7 @@ _KINDS: Mapping[str, str] = MappingProxyType({
     "emoji": EMOJI,
     "hashtag": r"(?<![\w&#/])#(?=[^\W\d_])\w{1,100}",
 })  # fmt: skip
+_FORMULAS = ("inline", "display", "parenthesized", "bracketed", "environment")
 _READ_BY_XML = frozenset(("escape", "code", "link", "entity", "tag", "struck", "hashtag"))
 # Tags of HTML and SSML whose content is spoken; those of the last two lines wrap what models say.
 _BREAKS: Mapping[str, str] = MappingProxyType({
@@ -87,6 +98,9 @@ _NEW_SENTENCE = re.compile(r"\s*[\"“‘]?(?!I\b)[^\W\d_a-zß-ÿ]")
 _LAST_WORD = re.compile(r"([^\W\d_]+)[\"'”’)]?\s*\Z")
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Za-z])(?=[0-9])|_")
 _MATHS = re.compile(r"(?:[0-9]|(?<![^\W_])(?!I\b)[A-Za-z])\s*\Z")
+# m<sup>2</sup>, 10<sup>-3</sup>, not the sign of a note
+_POWER = re.compile(r"(?<![^\W_])(?:[A-Za-z]|[kcm]m|ft|10|2)\Z")
+_EXPONENT = re.compile(r"-?[0-9]{1,3}</sup>", re.IGNORECASE)
 _GLUED = re.compile(r"[:;=]-?[()]")
 
 
@@ -211,7 +225,12 @@ class _Scanner:
         self._left_out = left_out
         self._has_marks = not PLAIN.fullmatch(text) or any(face in text for face in rules.table.plain_faces)
         self.tail = "\n"  # of what is spoken
+        self._closing = -1  # of the delimiter that is open
         self._readers: Mapping[str, Callable[[re.Match[str]], Part | None]] = {
+            "formula": self._formula,
+            "token": lambda match: Silent(*match.span()),
+            "marked": lambda match: self._delimited(match, match["marker"]),
+            "reference": lambda match: self._delimited(match, None if match[0][0] == "]" else "]["),
             "escape": lambda match: Text(*match.span(), match[0][1]),
             "code": self._code,
             "foreign": self._foreign,
@@ -305,6 +324,20 @@ class _Scanner:
         if ended and ended.casefold() not in _PASSED:
             return None  # [/tmp]
         return Silent(*match.span(), f"the mark {match[0][:MAX_QUOTED_CHARACTERS]} is not followed; its text is spoken")
+
+    def _formula(self, match: "re.Match[str]") -> Part | None:
+        written = next(found for name in _FORMULAS if (found := match[name]) is not None)
+        if match["inline"] is not None and not is_formula(written):
+            return None
+        said = formula_words(written, self._rules.language)
+        return Text(*match.span(), f"{' ' * self.tail[-1:].isalnum()}{said}")
+
+    def _delimited(self, match: "re.Match[str]", closing: str | None) -> Part | None:
+        """A delimiter that is silent: one that opens, with the place of its end, or that end."""
+        if closing is None:
+            return Silent(*match.span()) if match.start() == self._closing else None
+        self._closing = self._text.find(closing, match.end())
+        return Silent(*match.span())
 
     def _code(self, match: "re.Match[str]") -> Part:
         return Text(*match.span(), match["source"].strip()) if match["source"] else Silent(*match.span())
@@ -400,6 +433,8 @@ class _Scanner:
         span, closing = match.span(), bool(match["closing"])
         attributes = match["attributes"]
         shown = " ".join(match[0][:MAX_QUOTED_CHARACTERS].split())
+        if name == "sup" and _POWER.search(self.tail) and _EXPONENT.match(self._after(match.end())):
+            return Text(*span, "^")
         if name in _PASSED:
             is_noted = name in _UNFOLLOWED and not closing
             return Silent(*span, f"{shown} is followed within <speak> alone; its text is spoken" if is_noted else "")

@@ -32,7 +32,8 @@ from lexicon.values.files import LARGEST_TEXT_BYTES, read_text
 COLUMNS = ("mark", "kind", "style", "gesture", "strength", "seconds", "word")
 KINDS = ("emoji", "emoticon", "tag", "action", "stage")
 MAX_MARK_CHARACTERS = 40
-PLAIN = re.compile(r"[A-Za-z0-9\s.,!?'\"$%/-]*")  # signs of ordinary sentences, of which no mark consists but emoticons
+# signs of ordinary sentences, of which no mark consists but emoticons; a dollar before a number is an amount
+PLAIN = re.compile(r"(?:[A-Za-z0-9\s.,!?'\"%/-]++|\$(?=[0-9]))*")
 _SAID = frozenset(("emoji", "emoticon"))  # kinds of marks that may stand for a word
 _WORD = r"[^\W\d_]+(?:['’-][^\W\d_]+)*"
 # How a mark of each kind is spelled; others are never found in a text.

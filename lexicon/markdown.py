@@ -9,17 +9,23 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from lexicon.latex import ENVIRONMENTS, MAX_FORMULA_CHARACTERS
+
 SENTENCE_END, PARAGRAPH_END = "\u2028", "\n\n"  # as those of `lexicon.ssml.STRETCH_ENDS`
 MAX_TABLE_ROWS = 12  # that are spoken, with the heading
 MAX_RULE_CHARACTERS = 200
-# What a model thinks before it answers, and comments; without an end, up to the end of the text.
+# What a model thinks before it answers, or writes for tools, and comments; without an end, up to the end of the text.
 _HIDDEN = re.compile(
-    r"<(?P<name>think|thinking|thoughts?|reasoning|reflection|scratchpad)(?:\s[^<>\n]{0,100})?>|<!--", re.IGNORECASE
+    r"<(?P<name>think|thinking|thoughts?|reasoning|reflection|scratchpad|tool_calls?|tool_use|"
+    r"tool_results?|tool_response|function_calls?|function_results?)(?:\s[^<>\n]{0,100})?>|<!--",
+    re.IGNORECASE,
 )
 _FENCE = re.compile(r"[ \t]{0,12}(?P<fence>`{3,}|~{3,})[^`\n]*(?:\n|\Z)")
 _QUOTE = re.compile(r"[ ]{0,3}(?:>(?=[ \t>\n]|\Z|[^\W_]|[\"'“*_])[ \t]?){1,8}")
 _HEADING = re.compile(r"[ ]{0,3}#{1,6}[ \t]+(?=\S)")
 _HEADING_END = re.compile(r"[ \t]+#+[ \t]*\Z")
+# A formula that goes on in the next lines; a blank line ends it
+_FORMULA = re.compile(rf"[ \t]{{0,12}}(?:(\$\$)|(\\\[)|\\begin\{{{ENVIRONMENTS}\}})")
 _RULE = re.compile(r"[ ]{0,3}(?:(?:-[ \t]*){3,}|(?:\*[ \t]*){3,}|(?:_[ \t]*){3,}|={3,}[ \t]*)\Z")
 _ITEM = re.compile(r"[ \t]{0,16}(?:[-*•‣●○▪◦][ \t]+(?=\S)|\+[ \t]+(?=[^\W\d_]))(?:\[[ xX]\][ \t]+)?")
 _NUMBERED = re.compile(r"[ \t]{0,16}\(?[0-9]{1,3}[.)][ \t]+(?=\S)(?:\[[ xX]\][ \t]+)?")
@@ -118,8 +124,9 @@ class _BlockReader:
         first = quote.end() if quote else at
         line = text[first:end].rstrip("\n")
         lead = (Run(at, first, "silent"),) if quote else ()
-        if "|" in line and (table := self._table(at, end)) is not None:
-            return table
+        block = self._formula(at, end) or (self._table(at, end) if "|" in line else None)
+        if block is not None:
+            return block
         is_rule = _RULE.match(line) is not None and len(line) <= MAX_RULE_CHARACTERS
         if is_rule or _DEFINITION.match(line):
             return self._block(at, end, [Run(at, end, "end" if is_rule else "silent", PARAGRAPH_END * is_rule)])
@@ -138,6 +145,24 @@ class _BlockReader:
             self._goes_on = bool(line.strip())
             return Block(at, end, (*lead, Run(first, end, "words")))
         return None
+
+    def _formula(self, at: int, end: int) -> Block | None:
+        """A formula of several lines, which are read as one; None if it ends in its line, or not at all."""
+        text = self._text
+        formula = _FORMULA.match(text, at, end)
+        if formula is None:
+            return None
+        closing = formula[1] or (formula[2] and r"\]") or r"\end{"
+        start = formula.end()
+        limit = min(len(text), start + MAX_FORMULA_CHARACTERS)
+        blank = text.find("\n\n", start, limit)
+        found = text.find(closing, start, limit if blank < 0 else blank)
+        is_open = found < 0 and blank < 0 and limit == len(text)
+        if 0 <= found < end or (found < 0 and not is_open):
+            return None
+        stop = len(text) if is_open else _line_end(text, found)
+        self._goes_on = True
+        return Block(at, stop, (Run(at, stop, "words"),), is_whole=True, is_open=is_open)
 
     def _block(self, at: int, end: int, runs: Sequence[Run]) -> Block:
         """A block that no paragraph goes on behind."""

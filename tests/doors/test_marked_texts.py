@@ -30,7 +30,7 @@ from tts2face.session.named_models import Models
 from tts2face.session.prepared import prepare
 from tts2face.types import concatenate_clips
 
-TEXTS = [row["text"] for row in rows()][::4]  # twenty of all kinds
+TEXTS = [row["text"] for row in rows()][::7]  # twenty of all kinds
 
 # twenty texts of a line, whose brackets a subtitle file does not have as annotations, and its tags not as its own
 CUES = [

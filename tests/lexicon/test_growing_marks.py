@@ -18,12 +18,16 @@ SENTENCES = (
     "No way :O that is big ^_^", "Great XD", "<smile> Sure.", "<happy>We won.</happy> Then we left.", "Tom &amp; Ann.",
     "Wait [pause 1] here.", "It is ~~old~~ new.", "2 < 3 and 3 * 4.", "Dr. Smith came.", "[shake] Never.", "👋🏽 Hi!",
     "[sighs] Fine. *rolls eyes* You win.", "I ❤️ pizza.", "<think>He asks. Say no.</think>No.", "Press 1️⃣ now.",
+    "So $x^2 + 1$ is it.", "It costs $5 or $10.", "Let \\(a < b\\) hold.", "We ==mark== it.", "See [the docs][1] now.",
+    "Area: 5 m<sup>2</sup>.", "Pay $3.50. Then go.", "<|im_end|>", "a == b or a++ here.", "$$E = mc^2$$",
 )  # fmt: skip
 LINES = ("## A title", "- an item", "* second item 🧘", "1. First.", "2. Second one", "> Quoted words.", "---", "")
 BLOCKS = (
     "```py\nprint('x. Y')\n```",
     "| a | b |\n|---|---|\n| one | two |",
     "<think>\nThe user waits.\n\nGo.\n</think>",
+    "$$\n\\frac{1}{2}.\n$$",
+    "\\[\nx = 1\n\\]\nThen.",
 )
 TEXTS = st.lists(
     st.one_of(

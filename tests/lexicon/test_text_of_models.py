@@ -124,7 +124,8 @@ def test_a_sentence_does_not_wait_for_the_end_of_code() -> None:
 @pytest.mark.parametrize(
     "unit",
     ["[", "(", "*", "_", "~", "`", "<", "&", "#", "😀", ":)", "*a ", "<a>", "<think>", "```\n", "- a\n", "|a|\n|-|\n",
-     "> ", "[a](b", "~~a", "[happy] ", "(laughs) ", "**[a", "Hi. 😢 ", "\u200d", "- a\n  b\n", "[happy]\n\n"],
+     "> ", "[a](b", "~~a", "[happy] ", "(laughs) ", "**[a", "Hi. 😢 ", "\u200d", "- a\n  b\n", "[happy]\n\n",
+     "$", "$$", "\\(", "\\[", "\\begin{equation}", "==", "[a][1]", "<|", "$\\frac{", "- a\n  - b\n"],
 )  # fmt: skip
 def test_long_texts_of_marks_are_read_at_once(unit: str) -> None:
     begin = time.perf_counter()

@@ -25,6 +25,21 @@ UNITS = (
     ),
     *("\n", "\n\n", " ", "\t", "\n\t", "a ", "A ", "x, ", "! A", "Dr. ", "St. ", "Mr. A. ", "3rd ", "1-", "&amp;"),
     *("It cost $5.20 (e.g. 10 pm). ", "JO: ", "#\n", "- x\n", "[style:x]a[/style]", "<v a ", "'s "),
+    *(
+        r"\(",
+        r"\[",
+        r"$\frac{",
+        "$x^2$ ",
+        "$$\n",
+        "==a ",
+        "[a][1] ",
+        "<|a|>",
+        "- a\n  - b\n",
+        "1'000 ",
+        "John 5:3 ",
+        "112 or ",
+        "-1/",
+    ),
 )
 WORDS = ("#", "1", "a", "A", "😀", " .", "½", "the ", "read ", "multiply ", "I read it. ", "'s ")  # slow to pronounce
 MOST_GROWTH = 8.0  # of CPU time from n to 4 n; 4 where the time is linear, 16 where it is quadratic
