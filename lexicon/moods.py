@@ -164,7 +164,8 @@ def _weighted(words: Sequence[str], sentence: str) -> Iterator[_Found]:
             at += 1
             continue
         mood, strength = entry
-        weight = strength * of_sentence * (LEFT_BEHIND if at < last_but else 1.0) * _supposed(small, at)
+        asked = 1.0 if mood == "surprised" and of_sentence == ASKED else of_sentence  # What on earth is that?
+        weight = strength * asked * (LEFT_BEHIND if at < last_but else 1.0) * _supposed(small, at)
         weight *= _degree(small, at)
         if n_words == 1 and _is_negated(small, at):
             mood, weight = ("sad", OPPOSITE * weight) if mood == "happy" else ("none", 0.0)
