@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from lexicon.code_forms import is_color
-from lexicon.dictionary import word_set
 from lexicon.directions import Direction, find_direction
 from lexicon.emoji import EMOJI, emoji_word
 from lexicon.emphasis import SPACED
@@ -21,7 +20,8 @@ from lexicon.gesture_marks import FIRST_WORDS, is_gesture
 from lexicon.informal_words import tag_words
 from lexicon.latex import ENVIRONMENTS, formula_words, is_formula
 from lexicon.mark_table import PLAIN, MarkTable, TextMark
-from lexicon.markdown import PARAGRAPH_END, SENTENCE_END, Block, split_blocks
+from lexicon.markdown import Block, split_blocks
+from lexicon.tag_names import BREAKS, FOREIGN_MARK, MOOD_TAGS, PASSED, PAUSE_TAGS, UNFOLLOWED
 
 MAX_TAIL = 40  # characters of what is spoken before a mark, and of what follows it
 MAX_QUOTED_CHARACTERS = 40
@@ -31,12 +31,6 @@ OWN_MARK = (
     r"\[phoneme:(?P<phones>[^\[\]]*)\](?P<words>[^\[\]]*)\[/phoneme\]"
     r"|\[(?P<name>/?(?:style|pause)\b|/nod\b|phoneme(?=:)|/phoneme(?=\]))(?P<rest>[^\[\]]*)(?P<end>\]?)"
     rf"|\[(?P<gesture>(?i:{'|'.join(FIRST_WORDS)})(?![^\W_])[^\[\]]*)(?P<gesture_end>\]?)"
-)
-# Marks of SSML in square brackets, and of bulletin boards; a level of emphasis stands behind a space.
-_FOREIGN_MARK = (
-    r"\[(?:/(?P<ended>[A-Za-z][\w-]{0,30})|(?:emphasis|prosody)(?:\s(?:strong|moderate|none|reduced))?"
-    r"|(?:emphasis|prosody|say-as|lang|express-as|url|color|font|quote)[:=]\S[^\[\]\n]{0,80})\]"
-    r"|\[(?P<board>[bius])\](?=[^\[\n]{1,200}\[/(?P=board)\])"
 )
 _URL = r"\([^()\s]{0,2000}(?:\([^()\s]{0,200}\)[^()\s]{0,200})?(?:\s+\"[^\"\n]{0,200}\")?\)"
 _ATTRIBUTES = r"(?P<attributes>(?:\s[^<>]{0,400})?)"
@@ -52,7 +46,7 @@ _KINDS: Mapping[str, str] = MappingProxyType({
     r"|(?<=[^\s\[])\]\[[0-9]{0,3}\]",
     "escape": r"\\[*_#\[\]()~`>|!{}<-]",
     "code": r"(?P<ticks>`{1,2})(?P<source>[^`\n]{1,500})(?P=ticks)|`+",
-    "foreign": _FOREIGN_MARK,
+    "foreign": FOREIGN_MARK,
     "link": rf"!?\[(?=[^\[\]\n]{{0,300}}\]{_URL})|(?<=[^\s\[])\]{_URL}|\[\^[\w-]{{1,20}}\]:?|<(?=https?://[^<>\s]{{1,500}}>)",
     "entity": r"&(?:[A-Za-z][A-Za-z0-9]{1,31}|#[0-9]{1,7}|#[xX][0-9A-Fa-f]{1,6});",
     "tag": rf"<(?P<closing>/?)(?P<element>[A-Za-z][\w:.-]{{0,40}}){_ATTRIBUTES}\s?/?>",
@@ -68,26 +62,8 @@ _KINDS: Mapping[str, str] = MappingProxyType({
 })  # fmt: skip
 _FORMULAS = ("inline", "display", "parenthesized", "bracketed", "environment")
 _READ_BY_XML = frozenset(("escape", "code", "link", "entity", "tag", "struck", "hashtag"))
-# Tags of HTML and SSML whose content is spoken; those of the last two lines wrap what models say.
-_BREAKS: Mapping[str, str] = MappingProxyType({
-    **dict.fromkeys(("br", "li", "tr", "s", "sentence", "dt", "dd"), SENTENCE_END),
-    **dict.fromkeys(
-        ("p", "div", "ul", "ol", "table", "h1", "h2", "h3", "h4", "h5", "h6", "blockquote", "hr", "paragraph"),
-        PARAGRAPH_END,
-    ),
-})  # fmt: skip
-_PASSED = word_set(
-    "b i u s em strong small big sub sup mark del ins span font a abbr cite code pre kbd samp var q html body head "
-    "title section article header footer main nav img th td tbody thead details summary center strike tt label w token "
-    "speak voice lang audio phoneme say-as prosody emphasis express-as bookmark desc meta metadata lexicon lookup "
-    "answer response output final result message speech say text reply assistant user system content dialogue dialog "
-    "script narration url color quote "
-)
-_UNFOLLOWED = frozenset(["voice", "lang", "audio", "phoneme", "say-as", "prosody"])
-_MOOD_TAGS = word_set("emotion mood expression style tone feeling gesture action express-as")
 _VALUE = re.compile(r"(?:name|value|type|style|mood|emotion|kind)\s*=\s*[\"']?([\w -]{1,40})", re.IGNORECASE)
 _LENGTH = re.compile(r"(?:time|duration|seconds|length|value)\s*=\s*[\"']?([0-9]{1,3}(?:\.[0-9]{1,3})?)\s*(ms|s)?")
-_PAUSE_TAGS: Mapping[str, float] = MappingProxyType({"break": 0.4, "pause": 0.7, "silence": 0.7})
 _SENTENCE_START = re.compile(r"(?:\A|\n|\u2028|[.!?:…]['\"”’)]{0,3}\s)\s*\Z")
 _CLAUSE_START = re.compile(r"[.!?:…,;—–-]['\"”’)]{0,3}\s*\Z")
 _RIGHT_END = re.compile(rf"[ \t]*(?:\Z|[\n.!?…]|[\"“‘(\[*]?[^\W\d_a-zß-ÿ]|[\"“‘*_~\[<]|{EMOJI})")
@@ -321,7 +297,7 @@ class _Scanner:
         ended = match["ended"]
         if ended and self._direction(ended, is_strict=False) is not None:
             return Cue(*match.span(), (), ends_style=True)
-        if ended and ended.casefold() not in _PASSED:
+        if ended and ended.casefold() not in PASSED:
             return None  # [/tmp]
         return Silent(*match.span(), f"the mark {match[0][:MAX_QUOTED_CHARACTERS]} is not followed; its text is spoken")
 
@@ -415,11 +391,11 @@ class _Scanner:
     def _tag(self, match: "re.Match[str]") -> Part | None:
         name, attributes = match["element"].casefold().rpartition(":")[2], match["attributes"]
         span, closing = match.span(), bool(match["closing"])
-        if name in _BREAKS:
-            return End(*span, _BREAKS[name])
-        if name in _PAUSE_TAGS:
-            return Silent(*span) if closing else Cue(*span, (_pause(attributes, _PAUSE_TAGS[name]),))
-        if name in _MOOD_TAGS:
+        if name in BREAKS:
+            return End(*span, BREAKS[name])
+        if name in PAUSE_TAGS:
+            return Silent(*span) if closing else Cue(*span, (_pause(attributes, PAUSE_TAGS[name]),))
+        if name in MOOD_TAGS:
             value = _VALUE.search(attributes)
             found = self._direction(f"emotion: {value[1]}", is_strict=False) if value else Direction()
             return Cue(*span, found.marks if found and not closing else (), ends_style=closing)
@@ -435,8 +411,8 @@ class _Scanner:
         shown = " ".join(match[0][:MAX_QUOTED_CHARACTERS].split())
         if name == "sup" and _POWER.search(self.tail) and _EXPONENT.match(self._after(match.end())):
             return Text(*span, "^")
-        if name in _PASSED:
-            is_noted = name in _UNFOLLOWED and not closing
+        if name in PASSED:
+            is_noted = name in UNFOLLOWED and not closing
             return Silent(*span, f"{shown} is followed within <speak> alone; its text is spoken" if is_noted else "")
         before, after = self.tail[-1:], self._after(match.end())[:1]
         words = attributes.strip(" /")

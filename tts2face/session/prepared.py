@@ -91,7 +91,7 @@ class PreparedRequest:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is spoken or shown otherwise than a reader may expect, each a sentence without its stop."""
+        """Sentences without their stops on words that are spoken or shown otherwise than a reader may expect."""
         return (*self.text.notes, *self.notes_on_sound)
 
     @property

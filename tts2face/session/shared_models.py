@@ -173,13 +173,7 @@ class SessionModels:
             return self._renderers[key]
 
     def with_own_styles(self, prepared: PreparedRequest) -> PreparedRequest:
-        """A request whose marks name styles of the palette, with notes on those that it lacks.
-
-        Raises
-        ------
-        InputError
-            The user's table of marks names a style that the palette lacks.
-        """
+        """A request whose marks name styles of the palette, with notes on others; those of a table are refused."""
         table = prepared.request.text_marks
         palette = self.palette if prepared.request.has_gestures and (table or marked_styles(prepared.text)) else None
         if palette is None:

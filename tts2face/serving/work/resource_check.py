@@ -298,13 +298,9 @@ def _check_dictionary(source: Path, out: Path) -> dict[str, Any]:
 
 def _check_text_marks(source: Path, out: Path) -> dict[str, Any]:
     from lexicon.mark_table import read_marks_table
-    from lexicon.values.files import LARGEST_TEXT_BYTES, read_text
 
-    n_marks = read_marks_table(source).n_own
-    if not n_marks:
-        raise DataError("it has no mark; write one on each line below the names of the columns")
-    out.write_text(read_text(source, LARGEST_TEXT_BYTES), encoding="utf-8")
-    return {"n_marks": n_marks}
+    out.write_bytes(source.read_bytes())
+    return {"n_marks": read_marks_table(out).n_own}
 
 
 def _rewrite(source: Path, out: Path, kind: str, version: int, character: bytes | None = None) -> None:
