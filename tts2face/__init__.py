@@ -64,6 +64,8 @@ if TYPE_CHECKING:
     from tts2face.session.clip_files import export as export
     from tts2face.session.clip_files import load_clip as load_clip
     from tts2face.session.clip_files import write_clip as write_clip
+    from tts2face.session.inspection import FileMarks as FileMarks
+    from tts2face.session.inspection import inspect_file as inspect_file
     from tts2face.session.outputs import WrittenClip as WrittenClip
     from tts2face.session.performance import Performance as Performance
     from tts2face.session.project import Project as Project
@@ -71,6 +73,7 @@ if TYPE_CHECKING:
     from tts2face.session.project_file import save_project as save_project
     from tts2face.session.session import Session as Session
     from tts2face.session.speech_stream import Piece as Piece
+    from tts2face.storage.signing import Credentials as Credentials
     from tts2face.types import Chunk as Chunk
     from tts2face.types import Clip as Clip
     from tts2face.types import Speech as Speech
@@ -88,9 +91,11 @@ __all__ = [
     "Cast",
     "Chunk",
     "Clip",
+    "Credentials",
     "Cue",
     "DataError",
     "Face",
+    "FileMarks",
     "FromPhones",
     "FromSound",
     "Idle",
@@ -128,6 +133,7 @@ __all__ = [
     "haircuts",
     "identities",
     "import_face",
+    "inspect_file",
     "languages",
     "load_clip",
     "load_face",
@@ -183,7 +189,9 @@ _MODULES = {
     "tts2face.session.project_file": ("load_project", "save_project"),
     "tts2face.picture.options": ("Picture",),
     "tts2face.request": ("FromPhones", "FromSound", "Idle", "Listening", "Recorded", "Request", "Spoken"),
+    "tts2face.session.inspection": ("FileMarks", "inspect_file"),
     "tts2face.session.session": ("Session",),
+    "tts2face.storage.signing": ("Credentials",),
     "tts2face.session.animated_face": ("AnimatedFace",),
     "tts2face.interchange.subtitles.cues": ("Cue", "Subtitles"),
     "tts2face.interchange.subtitles.options": ("SubtitleOptions",),
