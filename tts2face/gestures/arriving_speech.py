@@ -112,7 +112,11 @@ class ArrivingSpeech:
     def _follow(self, features: SoundFeatures, *, is_ended: bool) -> SpokenSentence | None:
         """The open sentence, or the one that ends now; None in a pause."""
         known = self._n_analysed / self._rate
-        spans = [span for span in heard_spans(features, END_PAUSE_S, LEAST_SPEECH_S) if span.end > self._closed]
+        spans = [
+            span
+            for span in heard_spans(features, END_PAUSE_S, LEAST_SPEECH_S)
+            if span.end > self._closed + LEAST_SPEECH_S
+        ]
         if self._sentence is None:
             if not spans:
                 return None

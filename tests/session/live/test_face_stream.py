@@ -16,6 +16,7 @@ from tests.tones import WorldVoices
 from tests.world import World
 from tts2face.session.live.frames import Frame
 from tts2face.session.live.stream import THREAD, FaceStream
+from tts2face.session.speech_stream import Piece
 from tts2face.types import SOUND_RATE, concatenate_clips, exact_rate, first_sample
 
 TEXT = "We were away. Bob may move."
@@ -286,3 +287,40 @@ def test_an_event_loop_reads_frames_and_goes_on_meanwhile(session: tts2face.Sess
     frames = asyncio.run(both())
     assert [frame.number for frame in frames] == list(range(len(frames)))
     assert turns > len(frames)
+
+
+def test_the_face_lives_while_a_sentence_is_synthesised(session: tts2face.Session) -> None:
+    goes_on = threading.Event()
+    with session.face_stream(draws=False) as stream:
+        say = stream._face.speech.say
+
+        def wait_and_say(text: str) -> Iterator[Piece]:
+            goes_on.wait(PATIENCE_S)
+            return say(text)
+
+        stream._face.speech.say = wait_and_say  # type: ignore[method-assign]
+        number = stream.say("Yes.")
+        idle = [stream.read(PATIENCE_S) for _ in range(200)]  # longer than what is made of the idle motion
+        goes_on.set()
+        until_end(stream, number)
+    steps = np.abs(np.diff([frame.head[:3] for frame in idle], axis=0))
+    assert steps.max() < np.radians(2.0)
+    assert (steps.max(axis=1) > 0.0).mean() > 0.9
+
+
+def test_without_idle_motion_nothing_comes_between_two_utterances(session: tts2face.Session) -> None:
+    with session.face_stream(draws=False, idle=False) as stream:
+        numbers = [stream.say("One.")]
+        found = []
+        for frame in stream.frames():
+            found.append(frame.utterance)
+            if frame.ends and len(numbers) == 2:
+                break
+            if frame.ends:
+                numbers.append(stream.say("Two."))
+    assert set(found) == set(numbers)
+
+
+def test_the_first_frame_has_a_picture(session: tts2face.Session) -> None:
+    with session.face_stream(size="16x16") as stream:
+        assert stream.read(PATIENCE_S).pixels is not None

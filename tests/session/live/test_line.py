@@ -148,7 +148,7 @@ def test_nothing_moves_between_utterances_without_idle_motion() -> None:
     line.add(End(1))
     assert [frame.ends for frame in take(line, 9)] == [False, True]
     assert line.take(fills_gaps=True) is None
-    assert line.hold().number == 2  # type: ignore[union-attr]
+    assert line.hold() is None
 
 
 def test_the_line_stays_short() -> None:
@@ -209,3 +209,15 @@ def test_motion_that_repeats_is_joined_to_its_end() -> None:
     line.interrupt()
     line.add(moved)
     assert np.diff([frame.weights[0] for frame in take(line, 20)]).max() < 0.4
+
+
+def test_the_last_pose_stands_where_a_sentence_is_not_made_in_time() -> None:
+    line = line_of(has_idle=False)
+    line.idle = None
+    line.add(block(2, 1))
+    frames = take(line, 2)
+    held = line.hold()
+    assert held is not None
+    assert (held.number, held.utterance, held.pixels) == (2, 1, None)
+    assert not held.sound.any()
+    assert held.weights is frames[-1].weights

@@ -86,9 +86,15 @@ class Line:
         self._ended = 0  # utterance whose last frame has been read before its end was known
         self._notes: list[LiveEvent] = []
         self._heard: OrderedDict[int, int] = OrderedDict()  # frames that have been read of utterances
-        self._draw_s = 0.5 / fps  # mean time of drawing
+        self._draw_s = 0.0  # mean time of drawing
         self._drawing: Place | None = None  # frame that is being drawn
         self._late_pixels: NDArray[np.uint8] | None = None
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether frames may be read: the first one is drawn."""
+        is_drawn = bool(self._places) and self._places[0].pixels is not None
+        return not self._draws or self._last is not None or is_drawn
 
     @property
     def seconds_waiting(self) -> float:
@@ -148,8 +154,8 @@ class Line:
         return frame
 
     def hold(self) -> Frame | None:
-        """A frame with the pose of the last one, in silence; None before the first one."""
-        if self._last is None:
+        """A frame with the pose of the last one, in silence; None where nothing is said and the face is not idle."""
+        if self._last is None or not (self._has_idle or self._speaks):
             return None
         self._number += 1
         last, number = self._last, self._number - 1

@@ -34,7 +34,7 @@ MOST_AHEAD_S = 2.0  # frames of 512 x 512 are 0.8 MB each
 READY_S = 2.0  # of motion and sound that are made before the line has room: the next sentences
 IDLE_AHEAD_S = 2.0  # of idle motion that is made before it is needed
 SHARED_WAIT_S = 0.02  # until it is seen whether another stream has made more of the idle motion
-FIRST_WAIT_S = 0.005  # after which an asynchronous reader asks for the first frame again
+FIRST_WAIT_S = 0.005  # after which an asynchronous reader asks for a first frame again
 THREAD = "live face"
 CLOSED = "the stream is closed; open another one"
 
@@ -87,7 +87,7 @@ class FaceStream:
         self._inbox: deque[tuple[int, Callable[[], None]]] = deque()  # each with its utterance; 0: none
         self._errors: deque[BaseException] = deque()
         self._failure: BaseException | None = None  # that ended a thread
-        self._is_closed, self._can_draw = False, renderer is None
+        self._is_closed = False
         self._numbers = UtteranceNumbers()
         tasks = [self._make, *([] if renderer is None else [partial(self._draw, renderer)])]
         self._threads = [
@@ -228,7 +228,7 @@ class FaceStream:
                 self._raise_errors()
                 left = None if until is None else until - time.monotonic()
                 is_late = left is not None and left <= 0.0
-                frame = self._line.take(fills_gaps=is_late) if self._can_draw else None
+                frame = self._line.take(fills_gaps=is_late) if self._line.has_begun else None
                 if frame is not None:
                     self._changed.notify_all()
                 if frame is not None or is_late:
@@ -246,7 +246,11 @@ class FaceStream:
             no motion is made in time, the last pose stands. Otherwise as soon as each is made.
         """
         clock = FrameClock(self.fps)
-        while (frame := self.read(None if clock.is_new or not paced else 0.0) or self._held()) is not None:
+        while not self._is_closed:
+            frame = self.read(None if clock.is_new or not paced else 0.0) or self._held()
+            if frame is None:  # nothing is said, and the face is not idle
+                clock = FrameClock(self.fps)
+                continue
             yield frame
             if paced:
                 time.sleep(clock.wait_s())
@@ -256,9 +260,12 @@ class FaceStream:
         clock = FrameClock(self.fps)
         while not self._is_closed:
             frame = self.read(0.0) or (None if clock.is_new else self._held())
-            if frame is not None:
-                yield frame
-            await asyncio.sleep(FIRST_WAIT_S if frame is None else clock.wait_s())
+            if frame is None:
+                clock = FrameClock(self.fps)
+                await asyncio.sleep(FIRST_WAIT_S)
+                continue
+            yield frame
+            await asyncio.sleep(clock.wait_s())
 
     def _held(self) -> Frame | None:
         with self._lock:
@@ -375,14 +382,12 @@ class FaceStream:
         """Draw frames of the line until the stream is closed."""
         drawer = PoseDrawer(load(), self.channels, self.fps)
         drawer.prepare()
-        with self._lock:
-            self._can_draw = True
-            self._changed.notify_all()
         while (place := self._next_place()) is not None:
             started = time.monotonic()
             pixels = drawer.draw(place.weights, place.head, place.number)
             with self._lock:
                 self._line.drawn(place, pixels, time.monotonic() - started)
+                self._changed.notify_all()
 
     def _next_place(self) -> Place | None:
         """The next frame to draw; None when the stream is closed."""
