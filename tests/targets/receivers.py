@@ -128,6 +128,9 @@ class StudioServer:
         tell("opened", authorization=socket.request.headers.get("Authorization", ""))
         async for text in socket:
             given = json.loads(text)
+            if given.get("type") == "mark":
+                tell("mark", notice=given["notice"])
+                continue
             if given.get("type") == "curves":
                 self.count(given)
                 continue

@@ -124,6 +124,10 @@ class Broadcast:
         has_curves = any(target.has_curves for target in self._targets)
         mesh = session.mesh if has_curves or window is not None else None
         draws = any(target.draws for target in self._targets)
+        if draws:
+            mark = session.renderer(plan.picture, has_gestures=plan.options.get("gestures") != "none").mark
+            for target in self._targets:
+                target.mark = mark
         with (
             LiveTargets(self._targets, plan.shown_names, self._note) as live,
             session.face_stream(plan.picture, fps=plan.fps, draws=draws, **plan.options) as stream,

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from json import dumps
 
 from tts2face.interchange.exports.arkit import ARKIT_SHAPES
+from tts2face.storage.marks import mark_fields
 from tts2face.targets.address import TOKEN_VARIABLE, Address
 from tts2face.targets.sockets import connected
 from tts2face.targets.target import ConnectedTarget
@@ -14,7 +15,7 @@ TOKEN = "token"  # option: file of a Bearer token
 
 
 class CurveSocketTarget(ConnectedTarget):
-    """Events ``curves``: the first one names weights and head channels."""
+    """An event ``mark``, then ``curves``, of which the first one names weights and head channels."""
 
     has_curves = True
     package = "websockets"
@@ -27,6 +28,7 @@ class CurveSocketTarget(ConnectedTarget):
         """Connect, and send the newest frame whenever the one before has been taken."""
         headers = {"Authorization": f"Bearer {self._token}"} if self._token else None
         async with connected(self.address.url, headers) as socket:
+            await socket.send(dumps({"type": "mark", **mark_fields(self.mark)}))
             on_connected()
             names: dict[str, object] = {"names": ARKIT_SHAPES, "head_names": HEAD_CHANNELS}
             while ticks := await self.outbox.take():

@@ -74,8 +74,7 @@ def _open(content: Mapping[str, Any], format: LiveFormat) -> MovieWriter:
     kind = live_kind(content["container"], content["audio"], format)
     kind = replace(kind, container_options=content["options"], video_bits=1000 * content["kbps"])
     shape = format.height, format.width, 3
-    mark = Mark(**content["mark"]) if content["mark"] else None
-    writer = MovieWriter(content["url"], kind, shape, (format.fps, SOUND_RATE), mark)
+    writer = MovieWriter(content["url"], kind, shape, (format.fps, SOUND_RATE), Mark(**content["mark"]))
     writer.start()
     if hasattr(signal, "setitimer"):
         signal.setitimer(signal.ITIMER_REAL, 0.0)

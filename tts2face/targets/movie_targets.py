@@ -11,7 +11,6 @@ import numpy as np
 from lexicon.errors import BackendError
 from tts2face.processes.async_parent import AsyncChild, Inputs
 from tts2face.processes.message import EVENT
-from tts2face.storage.marks import Mark
 from tts2face.targets.address import TOKEN_VARIABLE, Address
 from tts2face.targets.certificate import own_certificate
 from tts2face.targets.movie_sender import CONNECT_S, END, SEND, SENDER_PROGRAM, TAKEN
@@ -37,9 +36,9 @@ class MovieTarget(ConnectedTarget):
     audio: ClassVar[str] = "aac"
     options: ClassVar[Mapping[str, str]] = {}
 
-    def __init__(self, address: Address, format: LiveFormat, mark: Mark | None = None) -> None:
+    def __init__(self, address: Address, format: LiveFormat) -> None:
         super().__init__(address, format, max(1, round(SOUND_S * format.fps)))
-        self._secret, self._mark = self.read_secret(), mark
+        self._secret = self.read_secret()
 
     def read_secret(self) -> str:
         """Key or token of the server; raises as `Address.secret`."""
@@ -64,7 +63,7 @@ class MovieTarget(ConnectedTarget):
             content = {
                 "url": url, "options": options, "container": self.container, "audio": self.audio,
                 "fps": str(self.format.fps), "width": self.format.width, "height": self.format.height,
-                "kbps": self.kbps, "mark": self._mark and self._mark.parts(),
+                "kbps": self.kbps, "mark": self.mark.parts(),
             }  # fmt: skip
             try:
                 async with asyncio.timeout(CONNECT_S) as limit:

@@ -16,6 +16,7 @@ from threading import Lock
 from typing import ClassVar
 
 from lexicon.errors import BackendError
+from tts2face.storage.marks import LIVE_NOTICE, Mark
 from tts2face.targets.address import Address
 from tts2face.targets.tick import LiveFormat, Tick
 
@@ -31,6 +32,8 @@ class Target(ABC):
     ----------
     draws, has_curves
         Whether it needs pictures, and ARKit's weights.
+    mark
+        Statement that the face is synthetic, sent where the protocol has a place for it.
 
     Raises
     ------
@@ -44,6 +47,7 @@ class Target(ABC):
 
     def __init__(self, address: Address, format: LiveFormat) -> None:
         self.address, self.format = address, format
+        self.mark = Mark(LIVE_NOTICE)
         if self.package and find_spec(self.package) is None:
             raise BackendError(f"{address.shown} needs the package {self.package}; run: pip install 'tts2face[live]'")
 

@@ -11,6 +11,7 @@ from tests.packages import needs
 from tests.running import eventually, free_port
 from tests.targets.made import FORMAT, sending
 from tests.targets.receivers import TOKEN, receiver
+from tts2face.storage.marks import LIVE_NOTICE
 from tts2face.targets import live_targets, movie_targets
 from tts2face.targets.certificate import own_certificate
 
@@ -38,6 +39,8 @@ def test_ffmpeg_gets_pictures_and_sound_at_the_same_times(kind: str) -> None:
     assert last_picture == pytest.approx(last_sound, abs=0.15)
     assert last_picture - first_picture == pytest.approx((n_pictures - 1) / 30, abs=0.5)
     assert 0.2 < received["loudest"] < 0.45
+    if kind == "rtmp":  # RTSP has no place for it
+        assert received["comment"] == LIVE_NOTICE
     assert received["levels"] > 20
 
 
@@ -123,6 +126,7 @@ def test_curves_have_the_form_of_the_services_live_streams(tmp_path: Path) -> No
     token.write_text(TOKEN)
     with receiver("sockets", port := free_port()) as server, sending([f"ws://127.0.0.1:{port}/x#token={token}"]):
         assert server.wait_for_event("opened")["authorization"] == f"Bearer {TOKEN}"
+        assert server.wait_for_event("mark")["notice"] == LIVE_NOTICE
         first = server.wait_for_event("first")["content"]
         later = server.wait_for_event("sixty")["content"]
     assert first.keys() == {"type", "begin", "fps", "names", "head_names", "weights", "head"}
