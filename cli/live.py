@@ -12,6 +12,7 @@ from cli.process import WhatRemains, write_message
 from cli.progress import compilation_messages
 from cli.speak import open_session
 from lexicon.errors import InputError, Tts2faceError
+from lexicon.spoken_mark import mark_words
 from tts2face.picture.options import Picture
 from tts2face.processes.collection import resume_collection
 from tts2face.request import Request, option_fields
@@ -26,7 +27,7 @@ USUAL_MICROPHONE = "default"
 # Options of a request that a live face does not take.
 NOT_LIVE = frozenset({
     "text", "audio", "audio_map", "idle", "listen", "partner", "timeline", "expression", "synthesis", "context",
-    "exemplars", "pitch", "articulation", "plain_delivery", "spoken_mark",
+    "exemplars", "pitch", "articulation", "plain_delivery",
 })  # fmt: skip
 KINDS = ", ".join(f"{kind.form} ({kind.shows})" for kind in TARGETS)
 
@@ -68,16 +69,19 @@ def live(  # noqa: PLR0913 - one parameter a flag
 ) -> None:
     """Send a face that speaks live to other programs (docs/live.md)."""
     from tts2face.targets.broadcast import Broadcast, Listener, LivePlan
+    from tts2face.targets.feeds import with_notice
 
     addresses = parse_targets(to or ())
     if not addresses:
         raise InputError(f"there is no target; add --to with one of {', '.join(kind.form for kind in TARGETS)}")
     fps = options_from_flags(Request, options, text="").fps  # a wrong option is refused before anything is loaded
-    names = {option.name for option in option_fields(Request)} - {"fps"}
+    names = {option.name for option in option_fields(Request)} - {"fps", "spoken_mark"}
     spoken = {name: value for name, value in options.items() if name in names}
     picture = options_from_flags(Picture, options)
     plan = LivePlan(addresses, picture, spoken, fps, stays=stay or microphone is not None)
     targets, feed = plan.make_targets(), _feed(text, file, microphone, stay=stay)
+    if (words := options.get("spoken_mark")) is not None:
+        feed = with_notice(mark_words(words, options.get("language", "en-us")), feed)
     if photo is None:
         refuse_without({"--consent": consent})
     else:

@@ -19,7 +19,7 @@ from tts2face.picture.options import Picture
 from tts2face.targets import broadcast as broadcast_module
 from tts2face.targets import live_targets
 from tts2face.targets.broadcast import Broadcast, Listener, LivePlan
-from tts2face.targets.feeds import AHEAD_S, growing_feed, microphone_feed, recording_feed, text_feed
+from tts2face.targets.feeds import AHEAD_S, growing_feed, microphone_feed, recording_feed, text_feed, with_notice
 from tts2face.targets.table import parse_target
 
 FPS = 100.0
@@ -193,6 +193,15 @@ def test_a_recording_is_given_little_ahead(tmp_path: Path) -> None:
     assert {given_rate for _, given_rate in blocks} == {48_000}
     assert sum(n for n, _ in blocks) == pytest.approx(48_000 * (AHEAD_S + 0.5), abs=50)
     assert session.stream.given[-2:] == ["end", "closed"]
+
+
+def test_a_notice_is_said_before_all_else() -> None:
+    broadcast, session, *_ = made(MadeTarget("take"))
+    broadcast.run(session, with_notice("This is synthetic.", text_feed("Hello.")))  # type: ignore[arg-type]
+    assert session.stream.given == ["This is synthetic.", "end", "Hello.", "end", "closed"]
+    broadcast, session, *_ = made(MadeTarget("take"))
+    broadcast.run(session, with_notice("This is synthetic.", None))  # type: ignore[arg-type]
+    assert session.stream.given == ["This is synthetic.", "end", "closed"]
 
 
 def test_what_cannot_be_said_is_refused_at_once(tmp_path: Path) -> None:

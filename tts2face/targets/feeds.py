@@ -45,6 +45,17 @@ def text_feed(text: str) -> Feed:
     return feed
 
 
+def with_notice(words: str, then: Feed | None) -> Feed:
+    """Says that the voice is synthetic, then what another feed says."""
+    notice = text_feed(words)
+
+    def feed(speaker: Speaker, has_ended: Callable[[], bool]) -> int:
+        number = notice(speaker, has_ended)
+        return number if then is None else then(speaker, has_ended) or number
+
+    return feed
+
+
 def growing_feed(descriptor: int) -> Feed:
     """Says the text of a file descriptor as it is written, each sentence when it is complete."""
 
