@@ -32,6 +32,7 @@ from tts2face.serving.service.state import ServiceState
 from tts2face.serving.service.synthesis import TASKS, Synthesis
 from tts2face.serving.service.warm_process import InputItem
 from tts2face.session.session_cache import SessionCache
+from tts2face.storage.signing import Signer
 
 START_S = 60.0
 SECONDS = 1.0  # of speech of an answer of a table
@@ -153,12 +154,12 @@ def with_key(client: TestClient, secret: str) -> TestClient:
 
 
 @contextmanager
-def working(settings: ServiceSettings) -> Iterator[None]:
+def working(settings: ServiceSettings, signer: Signer | None = None) -> Iterator[None]:
     """A worker of the jobs of a service in a thread of this process."""
     from tts2face.serving.batch.render import SegmentRenderer
     from tts2face.serving.work.worker import Worker
 
-    worker = Worker(settings.database_place, settings.store_place, renderer=SegmentRenderer())
+    worker = Worker(settings.database_place, settings.store_place, renderer=SegmentRenderer(), signer=signer)
     running = threading.Thread(target=worker.run)
     running.start()
     try:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import BackendError, InputError
+from tests.packages import package
 from tests.picture.tiny_talker import own_talker
 from tests.serving.batch.build.test_run import AAC_SMEAR_S, decoded, manifest, spans
 from tests.serving.batch.conftest import FPS, SMALL, SRT, Planner
@@ -26,7 +27,10 @@ from tts2face.serving.batch.plan import plan_batch
 from tts2face.serving.batch.render import _writer
 from tts2face.serving.batch.run import run_batch
 from tts2face.serving.batch.segment import Segment
+from tts2face.session.inspection import inspect_file
 from tts2face.session.named_models import Models
+from tts2face.session.prepared import prepare
+from tts2face.storage.marks import Making
 
 CUES = ((0.5, "Hello there"), (2.5, "Good morning to you all"), (10.0, "Bob may move"))
 
@@ -207,6 +211,28 @@ def test_a_talkers_video_returns_to_its_first_frame_at_joins(tmp_path: Path) -> 
         def renderer(self, *_: object, **__: object) -> OwnFaceRenderer:
             return renderer
 
+        def making(self, _: object) -> Making:
+            return Making()
+
     segment = Segment({"text": "Hello."}, {}, Models(face="self"), 15)
-    writer = _writer(OwnSession(), segment, Request(), (tmp_path / "x.mov", 15))
+    writer = _writer(OwnSession(), segment, prepare(Request(text="Hello.")), (tmp_path / "x.mov", 15))
     assert writer._renderer.n_returning == 15
+
+
+def test_outputs_are_signed_and_made_again_for_another_signer(
+    plan_of: Planner, voices: list[LetterVoice], tmp_path: Path
+) -> None:
+    package("c2pa")
+    signer = package("tests.storage.authority").issue(tmp_path).open()
+    plan = plan_of(per="file", exports=("wav",))
+    assert run_batch(plan, tmp_path / "out", signer=signer).n_made == 1
+    assert run_batch(plan, tmp_path / "out", signer=signer).n_made == 0
+    for name in ("one.mp4", "one.wav"):
+        found = inspect_file(tmp_path / "out" / name)
+        assert found.signature is not None
+        assert (found.signature.state, found.signature.signer) == ("Valid", "Ann")
+        assert "Hello there" in found.text
+    (entry,) = manifest(tmp_path / "out")["outputs"]
+    assert entry["signed_by"] == signer.fingerprint
+    assert run_batch(plan, tmp_path / "out").n_made == 1
+    assert inspect_file(tmp_path / "out" / "one.mp4").signature is None
