@@ -176,7 +176,7 @@ class Line:
             utterance, self._ended = self._ended, 0
             place.ends = True
         events = tuple(replace(event, start=event.start + start, end=event.end + start) for event in place.events)
-        state: State = "speaking" if place.utterance else place.block.state
+        state: State = "speaking" if utterance else place.block.state
         return Frame(self._number, pixels, place.sound, place.weights, place.head, state, utterance, place.ends, events)
 
     def _next_block(self) -> bool:
