@@ -11,7 +11,7 @@ from tts2face.storage.files import translate_disk_errors
 from tts2face.storage.shipped import find_file
 from tts2face.storage.temporary import Temporary
 
-PICTURE_FORMAT = 1  # increased when the same file gives another picture
+PICTURE_FORMAT = 2  # increased when the same file gives another picture
 _drawing = asyncio.Lock()  # one at a time
 
 

@@ -45,7 +45,7 @@ def swatch(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
         sheet.paste(Image.fromarray(renderer.frame(clip, frame)), (tile * TILE_PX, 0))
         yield Chunk(b"")
     content = io.BytesIO()
-    sheet.save(content, "WEBP", quality=QUALITY)
+    sheet.save(content, "WEBP", quality=QUALITY, xmp=renderer.mark.packet.encode())
     yield Chunk(content.getvalue())
 
 

@@ -27,6 +27,7 @@ from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.corrections import StaleEdgesError
 from tts2face.session.project import Project, cut_timeline, without_edges
 from tts2face.session.project_file import parse_project
+from tts2face.storage.marks import png_labels
 from tts2face.storage.wave_files import pcm_bytes
 from tts2face.types import Chunk
 
@@ -135,7 +136,8 @@ def picture(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
 
     project, time = read_project(work), float(work.request["time"])
     last = None
-    for last in session.stream(project.prepare()):
+    prepared = session.prepare(project.prepare())
+    for last in session.stream(prepared):
         if time < last.begin + last.clip.speech.waveform.duration:
             break
         yield Chunk(b"")
@@ -143,7 +145,8 @@ def picture(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
     number = min(max(round((time - last.begin) * last.clip.fps), 0), len(last.clip.motion) - 1)
     renderer = session.renderer(project.picture, has_gestures=project.request.has_gestures)
     content = io.BytesIO()
-    Image.fromarray(renderer.frame(last.clip, number)).save(content, "PNG", compress_level=3)
+    labels = png_labels(renderer.mark.of(session.making(prepared), is_recorded=last.clip.speech.is_recorded))
+    Image.fromarray(renderer.frame(last.clip, number)).save(content, "PNG", compress_level=3, pnginfo=labels)
     yield Chunk(content.getvalue())
 
 

@@ -17,6 +17,7 @@ from tts2face.photo.photograph import HEIC_BRANDS
 from tts2face.serving.work.character_archive import MAGIC as ARCHIVE_MAGIC
 from tts2face.serving.work.character_archive import unpack_character
 from tts2face.serving.work.resource_texts import UNPACKED, bounded, of_command, refusal, without_name
+from tts2face.storage.marks import Mark, png_labels
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -125,7 +126,8 @@ def is_picture(head: bytes) -> bool:
 
 def draw_resource(kind: str, source: Path, picture: Path) -> None:
     """Write the picture of a talker, face or palette that is known to be valid."""
-    _DRAW[kind](source).save(picture, "PNG")
+    drawn, mark = _DRAW[kind](source)
+    drawn.save(picture, "PNG", pnginfo=png_labels(mark))
 
 
 def _check_type(kind: str, source: Path) -> None:
@@ -324,7 +326,7 @@ def _rewrite(source: Path, out: Path, kind: str, version: int, character: bytes 
     write_tensors(out, kind, version, arrays, metadata, is_packed=kind == FACE)
 
 
-def _draw_talker(content: Path) -> "Image":
+def _draw_talker(content: Path) -> "tuple[Image, Mark]":
     from tts2face.request import OWN_FACE
     from tts2face.session.catalogue import describe_talker
     from tts2face.session.session import Session
@@ -333,13 +335,13 @@ def _draw_talker(content: Path) -> "Image":
     return _rest_picture(Session(str(content), face, palette=None))
 
 
-def _draw_face(content: Path) -> "Image":
+def _draw_face(content: Path) -> "tuple[Image, Mark]":
     from tts2face.session.session import Session
 
     return _rest_picture(Session(face=str(content), palette=None))
 
 
-def _draw_palette(content: Path) -> "Image":
+def _draw_palette(content: Path) -> "tuple[Image, Mark]":
     """For each style the head in its typical pose: the frame of idle motion that is nearest to the mean."""
     import numpy as np
     from PIL import Image, ImageDraw
@@ -364,10 +366,10 @@ def _draw_palette(content: Path) -> "Image":
         place = TILE_SIDE_PX * (number % TILE_COLUMNS), TILE_SIDE_PX * (number // TILE_COLUMNS)
         sheet.paste(tile, place)
         pen.text((place[0] + 6, place[1] + 4), name[:24].encode("ascii", "replace").decode(), fill="white")
-    return sheet
+    return sheet, session.renderer(size).mark
 
 
-def _rest_picture(session: "Session") -> "Image":
+def _rest_picture(session: "Session") -> "tuple[Image, Mark]":
     from PIL import Image
 
     from tts2face.picture.options import Picture
@@ -380,7 +382,7 @@ def _rest_picture(session: "Session") -> "Image":
     picture = Image.fromarray(renderer.frame(clip, 1))
     if time.process_time() - began > MAX_FRAME_CPU_S:
         raise RefusedFileError(f"a picture of it takes more than {MAX_FRAME_CPU_S:g} s to draw; simplify it")
-    return picture
+    return picture, renderer.mark
 
 
 _CHECKS: Mapping[str, Callable[[Path, Path], dict[str, Any]]] = {
@@ -392,7 +394,11 @@ _CHECKS: Mapping[str, Callable[[Path, Path], dict[str, Any]]] = {
     CHARACTER: _check_character,
     PHOTO: _check_photo,
 }
-_DRAW: Mapping[str, Callable[[Path], "Image"]] = {TALKER: _draw_talker, FACE: _draw_face, PALETTE: _draw_palette}
+_DRAW: Mapping[str, Callable[[Path], "tuple[Image, Mark]"]] = {
+    TALKER: _draw_talker,
+    FACE: _draw_face,
+    PALETTE: _draw_palette,
+}
 
 
 def _describe(description: dict[str, Any], folder: Path) -> None:
