@@ -66,6 +66,9 @@ if TYPE_CHECKING:
     from tts2face.session.clip_files import write_clip as write_clip
     from tts2face.session.inspection import FileMarks as FileMarks
     from tts2face.session.inspection import inspect_file as inspect_file
+    from tts2face.session.live.frames import Frame as Frame
+    from tts2face.session.live.frames import LiveEvent as LiveEvent
+    from tts2face.session.live.stream import FaceStream as FaceStream
     from tts2face.session.outputs import WrittenClip as WrittenClip
     from tts2face.session.performance import Performance as Performance
     from tts2face.session.project import Project as Project
@@ -95,7 +98,9 @@ __all__ = [
     "Cue",
     "DataError",
     "Face",
+    "FaceStream",
     "FileMarks",
+    "Frame",
     "FromPhones",
     "FromSound",
     "Idle",
@@ -103,6 +108,7 @@ __all__ = [
     "ImportedFace",
     "InputError",
     "Listening",
+    "LiveEvent",
     "Palette",
     "Performance",
     "PhoneSequence",
@@ -197,6 +203,8 @@ _MODULES = {
     "tts2face.interchange.subtitles.options": ("SubtitleOptions",),
     "tts2face.interchange.subtitles.reader": ("read_subtitles",),
     "tts2face.session.speech_stream": ("Piece",),
+    "tts2face.session.live.frames": ("Frame", "LiveEvent"),
+    "tts2face.session.live.stream": ("FaceStream",),
     "tts2face.session.performance": ("Performance",),
     "tts2face.session.outputs": ("WrittenClip",),
     "tts2face.types": ("Chunk", "Clip", "Speech", "Trajectory", "Waveform"),

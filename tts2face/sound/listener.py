@@ -22,6 +22,14 @@ from tts2face.types import frame_count
 SampleBlock = NDArray[np.floating]
 
 
+def checked_block(samples: SampleBlock) -> NDArray[np.float32]:
+    """A copy of samples (m,), which are finite; errors as of `StreamingFeatures.add_samples`."""
+    found = np.array(samples, np.float32)
+    if found.ndim != 1 or not np.isfinite(found).all():
+        raise InputError(f"a block of sound must be a vector of finite samples; its shape is {found.shape}")
+    return found
+
+
 class StreamingFeatures:
     """Converts blocks of sound at `FEATURE_RATE` to features of frames; frame i belongs to the time i / fps."""
 
@@ -47,9 +55,7 @@ class StreamingFeatures:
         InputError
             The block is not a vector of finite samples.
         """
-        if samples.ndim != 1 or not np.isfinite(samples).all():
-            raise InputError(f"a block of sound must be a vector of finite samples; its shape is {samples.shape}")
-        self._buffer = np.concatenate([self._buffer, samples.astype(np.float32)])
+        self._buffer = np.concatenate([self._buffer, checked_block(samples)])
         last = max(int((self.n_samples - HALF_WINDOW_SAMPLES - 2) * self._fps / FEATURE_RATE), -1)
         return self._features_until(last + 1)
 

@@ -200,6 +200,14 @@ def test_a_listening_face_nods_at_what_it_hears_until_it_speaks(session: tts2fac
     assert frames[-1].state == "speaking"
 
 
+def test_a_listening_face_is_not_idle_in_between(session: tts2face.Session) -> None:
+    with session.face_stream(draws=False) as stream:
+        stream.listen()
+        states = [stream.read(PATIENCE_S).state for _ in range(90)]
+    begun = states.index("listening")
+    assert set(states[begun:]) == {"listening"}
+
+
 def test_errors_of_a_text_are_raised_by_the_next_read_and_the_stream_goes_on(session: tts2face.Session) -> None:
     with session.face_stream(draws=False, idle=False) as stream:
         stream.style("purple")

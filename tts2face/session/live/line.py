@@ -61,11 +61,13 @@ class Line:
         Idle motion; None until there is some.
     late
         Pictures that were not drawn when their frames were read.
+    is_moved
+        Whether the face listens or makes gestures, so that more blocks come before it is idle again.
     """
 
     def __init__(self, fps: float, length: int, *, has_idle: bool, draws: bool) -> None:
         self.fps, self.length = fps, length
-        self.late = 0
+        self.late, self.is_moved = 0, False
         self.idle: IdlePlayer | None = None
         self._has_idle, self._draws = has_idle, draws
         self._rate = exact_rate(fps)
@@ -140,12 +142,13 @@ class Line:
             Whether idle motion goes on where more of an utterance is not made in time.
         """
         if not self._places:
-            if self.idle is None or not (self._ended or (self._speaks and fills_gaps)):
+            has_gap = fills_gaps and (self._speaks or self.is_moved)
+            if self.idle is None or not (self._ended or has_gap):
                 return None
             self._begin(self.idle.next(1))
             self._enter()
             # a gap of sound that arrives in real time lasts single frames
-            self._is_gap = not self._is_pushed
+            self._is_gap = not (self._speaks and self._is_pushed)
         place = self._places.popleft()
         place.is_read, self._last = True, place
         frame = self._frame(place)
@@ -188,7 +191,8 @@ class Line:
                 self._begin(item)
                 return True
             self._end(item)
-        if self.idle is None or not (self._is_gap if self._speaks else self._has_idle):
+        is_awaited = bool(self._speaks) or self.is_moved
+        if self.idle is None or not (self._is_gap if is_awaited else self._has_idle):
             return False
         self._begin(self.idle.next(1))
         return True
@@ -197,9 +201,9 @@ class Line:
         self._now, self._n_entered = block, 0
         self._joined = self._joins.add(block)
         self._events = events_of(block)
+        self._is_gap = self._is_gap and block.source == "idle"
         if block.utterance:
-            self._speaks, self._is_gap = block.utterance, False
-            self._is_pushed = block.source == "sound"
+            self._speaks, self._is_pushed = block.utterance, block.source == "sound"
         if block.sound is not None:
             self._sound = np.concatenate([self._sound, block.sound.samples])
         elif len(self._sound):

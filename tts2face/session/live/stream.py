@@ -29,6 +29,7 @@ from tts2face.session.live.live_face import LiveFace
 from tts2face.session.live.numbers import UtteranceNumbers
 from tts2face.session.live.speech import LiveSpeech
 from tts2face.sound.features import FEATURE_RATE
+from tts2face.sound.listener import checked_block
 
 MOST_AHEAD_S = 2.0  # frames of 512 x 512 are 0.8 MB each
 READY_S = 2.0  # of motion and sound that are made before the line has room: the next sentences
@@ -77,7 +78,7 @@ class FaceStream:
         if not 0.0 < ahead_s <= MOST_AHEAD_S:
             raise InputError(f"ahead_s must be above 0 and at most {MOST_AHEAD_S:g} s, not {ahead_s:g}")
         self.fps, self.channels = speech.fps, channels
-        self._lips, self._renderer = lips, renderer
+        self._lips = lips
         length = max(round(ahead_s * self.fps), 2)
         self._n_idle = round(IDLE_AHEAD_S * self.fps)
         self._line = Line(self.fps, length, has_idle=idle, draws=renderer is not None)
@@ -127,7 +128,7 @@ class FaceStream:
         rate
             Sample rate in Hz, the same until `end_sound`.
         """
-        samples, (low, high) = _checked(samples), RATE_LIMITS
+        samples, (low, high) = checked_block(samples), RATE_LIMITS
         if not low <= rate <= high:
             raise InputError(f"the sample rate must lie between {low} and {high} Hz, not {rate}; convert the sound")
         with self._lock:
@@ -147,7 +148,7 @@ class FaceStream:
 
     def listen(self, samples: NDArray[np.floating] | None = None, rate: int | None = None) -> None:
         """Listen until the next speech; `samples` are what the other one says, at whose pauses the face nods."""
-        heard = None if samples is None else _checked(samples)
+        heard = None if samples is None else checked_block(samples)
         if (heard is None) != (rate is None):
             raise InputError("samples that are heard need their rate, and a rate its samples; give both, or neither")
         with self._lock:
@@ -209,18 +210,14 @@ class FaceStream:
     def read(self, timeout: float | None = None) -> Frame | None:
         """The next frame, for a reader with a clock of its own: each call is one tick.
 
-        It is None, and uses no number, if there is none in time or the stream is closed.
+        It is None, and uses no number, if there is none in time or the stream is closed. A text or a sound that could
+        not be spoken raises its error, and what waits behind it follows.
 
         Parameters
         ----------
         timeout
             Seconds to wait for it, after which idle motion fills a gap of an utterance that is not made in time; None:
             until there is one, or the stream is closed.
-
-        Raises
-        ------
-        InputError, DataError, BackendError
-            A text or a sound could not be spoken; the rest of what waits follows.
         """
         until = None if timeout is None else time.monotonic() + timeout
         with self._lock:
@@ -328,6 +325,7 @@ class FaceStream:
                         follow()
             if face.has_speech and not is_speaking:
                 face.rest()
+            self._line.is_moved = face.is_moved and not face.has_speech
             with self._reported():
                 self._make_more()
             with self._lock:
@@ -396,10 +394,3 @@ class FaceStream:
             while not self._is_closed and (place := self._line.next_to_draw()) is None:
                 self._changed.wait()
             return None if self._is_closed else place
-
-
-def _checked(samples: NDArray[np.floating]) -> NDArray[np.float32]:
-    found = np.array(samples, np.float32)  # a copy: the caller may write to its block again
-    if found.ndim != 1 or not np.isfinite(found).all():
-        raise InputError(f"a block of sound must be a vector of finite samples; its shape is {found.shape}")
-    return found
