@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import BackendError, InputError
-from tts2face.targets import target as target_module
+from tts2face.targets import table
 from tts2face.targets.address import TOKEN_VARIABLE
 from tts2face.targets.table import TARGETS, make_target, parse_target, parse_targets
 from tts2face.targets.tick import LiveFormat
@@ -90,7 +90,7 @@ def test_tokens_come_from_a_file_or_the_environment(tmp_path: Path, monkeypatch:
 
 
 def test_a_missing_package_is_named_before_anything_connects(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(target_module, "find_spec", lambda _: None)
+    monkeypatch.setattr(table, "find_spec", lambda _: None)
     with pytest.raises(BackendError, match=r"ws:a:80 needs the package websockets; run: pip install 'tts2face\[live\]"):
         make_target(parse_target("ws://a/b"), FORMAT)
 

@@ -128,23 +128,22 @@ class Broadcast:
             mark = session.renderer(plan.picture, has_gestures=plan.options.get("gestures") != "none").mark
             for target in self._targets:
                 target.mark = mark
-        with (
-            LiveTargets(self._targets, plan.shown_names, self._note) as live,
-            session.face_stream(plan.picture, fps=plan.fps, draws=draws, **plan.options) as stream,
-        ):
+        with session.face_stream(plan.picture, fps=plan.fps, draws=draws, **plan.options) as stream:
             maker = TickMaker(plan.format, stream.channels, mesh if has_curves else None)
-            threading.Thread(target=self._feed, args=(stream, feed), name="feed", daemon=True).start()
-            clock = threading.Thread(target=self._send_all, args=(stream, maker, live), name="clock", daemon=True)
-            try:
-                if window is not None and mesh is not None:
-                    clock.start()
-                    window.show(mesh, plan.picture)
-                else:
-                    self._send_all(stream, maker, live)
-            finally:
-                self.end()
-                if clock.ident is not None:
-                    clock.join()
+            # nothing is connected before it is known that the face can be shown
+            with LiveTargets(self._targets, plan.shown_names, self._note) as live:
+                threading.Thread(target=self._feed, args=(stream, feed), name="feed", daemon=True).start()
+                clock = threading.Thread(target=self._send_all, args=(stream, maker, live), name="clock", daemon=True)
+                try:
+                    if window is not None and mesh is not None:
+                        clock.start()
+                        window.show(mesh, plan.picture)
+                    else:
+                        self._send_all(stream, maker, live)
+                finally:
+                    self.end()
+                    if clock.ident is not None:
+                        clock.join()
             self.n_late = stream.late
         if self._error is not None:
             raise self._error

@@ -18,7 +18,6 @@ class CurveSocketTarget(ConnectedTarget):
     """An event ``mark``, then ``curves``, of which the first one names weights and head channels."""
 
     has_curves = True
-    package = "websockets"
 
     def __init__(self, address: Address, format: LiveFormat) -> None:
         super().__init__(address, format)

@@ -115,7 +115,6 @@ class WhipTarget(MovieTarget):
     """WebRTC: H.264 and Opus in stereo, as the muxer's offer says; the token is a Bearer's."""
 
     container, audio = "whip", "libopus"
-    package = "cryptography"
 
     def read_secret(self) -> str:
         """Token of the file that the address names, or of `TOKEN_VARIABLE`."""

@@ -4,17 +4,19 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
+from importlib.util import find_spec
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 from urllib.parse import urlunsplit
 
-from lexicon.errors import InputError
+from lexicon.errors import BackendError, InputError
 from tts2face.targets.address import Address, parse_options, split_place
 
 if TYPE_CHECKING:  # `--help` and settings need no numeric library
     from tts2face.targets.target import Target
     from tts2face.targets.tick import LiveFormat
 
+SECRETS = {"token", "key"}  # options that name a file
 KBPS_LIMITS = (50, 100_000)  # thousands of bits in a second
 # options of several kinds
 _MOVIE = {"kbps": True}
@@ -41,6 +43,8 @@ class TargetKind:
         Where an address names none; 0: it must, or the scheme's own.
     options
         Names of the options behind ``#``, and whether each has a value.
+    package
+        Of the extra `live`, without which it cannot be reached.
     """
 
     scheme: str
@@ -50,6 +54,7 @@ class TargetKind:
     parse: Parse
     port: int = 0
     options: Mapping[str, bool] = field(default_factory=dict)
+    package: str = ""
 
     def load(self) -> "type[Target]":
         """The class of the kind."""
@@ -90,7 +95,7 @@ def _of_nothing(kind: TargetKind, place: str) -> Address:
 
 TARGETS = (
     TargetKind("whip", "whip:https://HOST/PATH", "pictures and sound by WebRTC (WHIP)", "movie_targets:WhipTarget",
-               _of_web, 0, _MOVIE | _TOKEN),
+               _of_web, 0, _MOVIE | _TOKEN, "cryptography"),
     TargetKind("rtmp", "rtmp://HOST/APP/KEY", "pictures and sound by RTMP", "movie_targets:RtmpTarget",
                _of_url, 1935, _KEYED),
     TargetKind("rtmps", "rtmps://HOST/APP/KEY", _ENCRYPTED, "movie_targets:RtmpTarget", _of_url, 443, _KEYED),
@@ -100,10 +105,12 @@ TARGETS = (
                _of_place, 39_539, {"vowels": False}),
     TargetKind("livelink", "livelink:HOST:11111", "52 weights, head and eyes as Live Link Face",
                "livelink:LiveLinkTarget", _of_place, 11_111, {"subject": True}),
-    TargetKind("vts", "vts:HOST:8001", "parameters of VTube Studio", "vts:VtsTarget", _of_place, 8001, {"keep": False}),
+    TargetKind("vts", "vts:HOST:8001", "parameters of VTube Studio", "vts:VtsTarget", _of_place, 8001, {"keep": False},
+               "websockets"),
     TargetKind("ws", "ws://HOST/PATH", "curves as JSON over a WebSocket", "curve_socket:CurveSocketTarget",
-               _of_url, 80, _TOKEN),
-    TargetKind("wss", "wss://HOST/PATH", _ENCRYPTED, "curve_socket:CurveSocketTarget", _of_url, 443, _TOKEN),
+               _of_url, 80, _TOKEN, "websockets"),
+    TargetKind("wss", "wss://HOST/PATH", _ENCRYPTED, "curve_socket:CurveSocketTarget", _of_url, 443, _TOKEN,
+               "websockets"),
     TargetKind("window", "window", "a window on this machine", "window:WindowTarget", _of_nothing),
 )  # fmt: skip
 KINDS: Mapping[str, TargetKind] = MappingProxyType({kind.scheme: kind for kind in TARGETS})
@@ -135,6 +142,15 @@ def parse_targets(texts: Sequence[str]) -> tuple[Address, ...]:
     return found
 
 
+def check_target(address: Address) -> None:
+    """Refuse a target whose package is missing (`BackendError`), or a file with its token or key (`InputError`)."""
+    package = KINDS[address.kind].package
+    if package and find_spec(package) is None:
+        raise BackendError(f"{address.shown} needs the package {package}; run: pip install 'tts2face[live]'")
+    for name in SECRETS & address.options.keys():
+        address.secret(name)
+
+
 def named_targets(written: Sequence[str]) -> Mapping[str, str]:
     """Targets by the names that an operator gives them, of pairs ``NAME=TARGET``.
 
@@ -157,11 +173,6 @@ def named_targets(written: Sequence[str]) -> Mapping[str, str]:
 
 
 def make_target(address: Address, format: "LiveFormat") -> "Target":
-    """The target of an address.
-
-    Raises
-    ------
-    InputError
-        A file with its token or key cannot be read.
-    """
+    """The target of an address; errors as `check_target`."""
+    check_target(address)
     return KINDS[address.kind].load()(address, format)

@@ -11,7 +11,6 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
-from importlib.util import find_spec
 from threading import Lock
 from typing import ClassVar
 
@@ -34,22 +33,14 @@ class Target(ABC):
         Whether it needs pictures, and ARKit's weights.
     mark
         Statement that the face is synthetic, sent where the protocol has a place for it.
-
-    Raises
-    ------
-    BackendError
-        A package is missing.
     """
 
     draws: ClassVar[bool] = False
     has_curves: ClassVar[bool] = False
-    package: ClassVar[str] = ""  # of the extra [live], without which it cannot be reached
 
     def __init__(self, address: Address, format: LiveFormat) -> None:
         self.address, self.format = address, format
         self.mark = Mark(LIVE_NOTICE)
-        if self.package and find_spec(self.package) is None:
-            raise BackendError(f"{address.shown} needs the package {self.package}; run: pip install 'tts2face[live]'")
 
     @abstractmethod
     def send(self, tick: Tick) -> None:

@@ -39,7 +39,6 @@ class VtsTarget(ConnectedTarget):
     """Parameters of the face, mouth, eyes and brows, which a model's own settings connect with its drawing."""
 
     has_curves = True
-    package = "websockets"
 
     async def deliver(self, on_connected: Callable[[], None]) -> None:
         """Connect with a token that is kept or granted, and send frames."""

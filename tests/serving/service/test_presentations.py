@@ -1,20 +1,23 @@
 """Live streams on targets of the operator: who may choose which, and that no address of a client is followed."""
 
 from collections.abc import AsyncIterator, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 from starlette.testclient import TestClient, WebSocketTestSession
 
-from lexicon.errors import InputError
+from lexicon.errors import BackendError, InputError
 from tests.serving.service.in_process import SessionProcess, service_client
 from tts2face.processes.message import EVENT, RESULT, Message
 from tts2face.serving.service import presentations
 from tts2face.serving.service.access import RateLimits
 from tts2face.serving.service.keys import add_key
+from tts2face.serving.service.presentations import Presentations
 from tts2face.serving.service.settings import ServiceSettings, read_settings
 from tts2face.session.session_cache import SessionCache
+from tts2face.targets import table
 
 TARGETS = ("stage=rtmp://a.example/app/stream-key", "puppet=vmc:127.0.0.1:39539")
 
@@ -69,29 +72,35 @@ def client(tmp_path: Path, keys: dict[str, str], monkeypatch: pytest.MonkeyPatch
         yield client
 
 
-def opened(client: TestClient, key: str, *targets: str, **options: Any) -> WebSocketTestSession:
-    socket = client.websocket_connect("ws://localhost/v1/stream", headers={"Authorization": f"Bearer {key}"})
-    socket.__enter__()
-    socket.send_json({"type": "start", "targets": targets, **options})
-    return socket
+@contextmanager
+def opened(client: TestClient, key: str, *targets: str, **options: Any) -> Iterator[WebSocketTestSession]:
+    headers = {"Authorization": f"Bearer {key}"}
+    with client.websocket_connect("ws://localhost/v1/stream", headers=headers) as socket:
+        socket.send_json({"type": "start", "targets": targets, **options})
+        yield socket
+
+
+def received(socket: WebSocketTestSession) -> dict[str, Any]:
+    """The next message that is not the mark of synthesis."""
+    while (message := socket.receive_json())["type"] == "mark":
+        pass
+    return dict(message)
 
 
 def refusal(client: TestClient, key: str, *targets: str) -> str:
-    socket = opened(client, key, *targets)
-    message = socket.receive_json()
-    socket.__exit__(None, None, None)
+    with opened(client, key, *targets) as socket:
+        message = received(socket)
     assert message["type"] == "error"
     return str(message["message"])
 
 
 def test_a_stream_is_shown_on_the_targets_that_the_operator_names(client: TestClient, keys: dict[str, str]) -> None:
-    socket = opened(client, keys["ann"], "stage", "puppet", style="happy", fps=60)
-    shown = [socket.receive_json() for _ in range(2)]
-    assert shown == [{"type": "target", "name": name, "state": "connected"} for name in ("stage", "puppet")]
-    socket.send_json({"type": "text", "text": "Hello there. "})
-    socket.send_json({"type": "end"})
-    assert socket.receive_json() == {"type": "done"}
-    socket.__exit__(None, None, None)
+    with opened(client, keys["ann"], "stage", "puppet", style="happy", fps=60) as socket:
+        shown = [received(socket) for _ in range(2)]
+        assert shown == [{"type": "target", "name": name, "state": "connected"} for name in ("stage", "puppet")]
+        socket.send_json({"type": "text", "text": "Hello there. "})
+        socket.send_json({"type": "end"})
+        assert received(socket) == {"type": "done"}
     (child,) = MadeChild.made
     assert child.content["targets"] == dict(pair.split("=", 1) for pair in TARGETS)
     assert child.content["request"] == {"style": "happy", "fps": 60}
@@ -100,12 +109,11 @@ def test_a_stream_is_shown_on_the_targets_that_the_operator_names(client: TestCl
 
 
 def test_sound_is_shown_on_targets_too(client: TestClient, keys: dict[str, str]) -> None:
-    socket = opened(client, keys["ann"], "stage", input="audio", rate=24_000)
-    socket.receive_json()
-    socket.send_bytes(b"\0\0" * 10)
-    socket.send_json({"type": "end"})
-    assert socket.receive_json()["type"] in {"said", "done"}
-    socket.__exit__(None, None, None)
+    with opened(client, keys["ann"], "stage", input="audio", rate=24_000) as socket:
+        received(socket)
+        socket.send_bytes(b"\0\0" * 10)
+        socket.send_json({"type": "end"})
+        assert received(socket)["type"] in {"said", "done"}
     (child,) = MadeChild.made
     assert (child.content["rate"], child.content["request"]) == (24_000, {})
     assert [given["type"] for given in child.inputs] == ["audio", "end"]
@@ -126,15 +134,13 @@ def test_no_address_of_a_client_is_followed(
 
 
 def test_a_target_shows_one_stream_at_a_time(client: TestClient, keys: dict[str, str]) -> None:
-    first = opened(client, keys["ann"], "stage")
-    first.receive_json()
-    assert refusal(client, keys["ann"], "puppet", "stage").startswith("the target stage shows another stream")
-    first.send_json({"type": "end"})
-    first.receive_json()
-    first.__exit__(None, None, None)
-    again = opened(client, keys["ann"], "stage")
-    assert again.receive_json()["name"] == "stage"
-    again.__exit__(None, None, None)
+    with opened(client, keys["ann"], "stage") as first:
+        received(first)
+        assert refusal(client, keys["ann"], "puppet", "stage").startswith("the target stage shows another stream")
+        first.send_json({"type": "end"})
+        assert received(first)["type"] == "done"
+    with opened(client, keys["ann"], "stage") as again:
+        assert received(again)["name"] == "stage"
 
 
 def test_seconds_of_speech_are_counted(
@@ -142,13 +148,19 @@ def test_seconds_of_speech_are_counted(
 ) -> None:
     added: list[float] = []
     monkeypatch.setattr(RateLimits, "add_speech", lambda _self, _key, seconds: added.append(seconds))
-    socket = opened(client, keys["ann"], "puppet")
-    socket.receive_json()
-    socket.send_json({"type": "text", "text": "Hello there. "})
-    socket.send_json({"type": "end"})
-    socket.receive_json()
-    socket.__exit__(None, None, None)
+    with opened(client, keys["ann"], "puppet") as socket:
+        received(socket)
+        socket.send_json({"type": "text", "text": "Hello there. "})
+        socket.send_json({"type": "end"})
+        assert received(socket)["type"] == "done"
     assert sum(added) == pytest.approx(1.5)
+
+
+def test_a_client_that_leaves_frees_its_target(client: TestClient, keys: dict[str, str]) -> None:
+    for _ in range(2):
+        with opened(client, keys["ann"], "stage") as socket:
+            assert received(socket)["type"] == "target"
+    assert all(child.is_closed for child in MadeChild.made)
 
 
 def test_targets_of_settings_are_checked_at_the_start(subtests: pytest.Subtests) -> None:
@@ -166,19 +178,18 @@ def test_targets_of_settings_are_checked_at_the_start(subtests: pytest.Subtests)
             assert sentence in str(refused.value)
 
 
+def test_what_targets_need_is_there_at_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    permissions: Any = None
+    with pytest.raises(InputError, match=r"the file .*none with the key of rtmp:a:1935 cannot be read"):
+        Presentations([f"stage=rtmp://a/b#key={tmp_path}/none"], permissions)
+    monkeypatch.setattr(table, "find_spec", lambda _: None)
+    with pytest.raises(BackendError, match="whip:a:443 needs the package cryptography"):
+        Presentations(["stage=whip:https://a/b"], permissions)
+
+
 def test_settings_are_shown_without_stream_keys() -> None:
     settings = read_settings(None, {}, {"TTS2FACE_SERVE_LIVE_TARGETS": ",".join(TARGETS)})
     assert settings.live_targets == TARGETS
     shown = settings.as_toml()
     assert "stage=rtmp:a.example:1935" in shown
     assert "stream-key" not in shown
-
-
-def test_a_client_that_leaves_frees_its_target(client: TestClient, keys: dict[str, str]) -> None:
-    socket = opened(client, keys["ann"], "stage")
-    socket.receive_json()
-    socket.__exit__(None, None, None)
-    again = opened(client, keys["ann"], "stage")
-    assert again.receive_json()["type"] == "target"
-    again.__exit__(None, None, None)
-    assert all(child.is_closed for child in MadeChild.made)

@@ -20,7 +20,7 @@ from tts2face.serving.service.messages import Work
 from tts2face.serving.service.pool import InputQueue, each_input
 from tts2face.targets.live_process import LIVE_PROGRAM, PRESENT
 from tts2face.targets.states import LOST
-from tts2face.targets.table import named_targets
+from tts2face.targets.table import check_target, named_targets, parse_target
 
 SCOPE = "live"  # of keys that may choose a target
 USUAL_RATE = 16_000  # Hz, of a stream of sound that names none
@@ -33,11 +33,13 @@ class Presentations:
     Parameters
     ----------
     written
-        ``NAME=TARGET`` of the settings.
+        ``NAME=TARGET`` of the settings; errors as of `tts2face.targets.table.check_target`.
     """
 
     def __init__(self, written: Sequence[str], permissions: Permissions) -> None:
         self._targets: Mapping[str, str] = named_targets(written)
+        for target in self._targets.values():
+            check_target(parse_target(target))
         self._permissions = permissions
         self._taken: set[str] = set()
 
