@@ -54,6 +54,7 @@ from tts2face.session.named_models import Models
 from tts2face.session.performance import Performance
 from tts2face.session.project import Project
 from tts2face.source_options import SourceOptions
+from tts2face.storage.signing import Credentials
 from tts2face.types import Clip, Speech, Trajectory, Waveform, resting_head
 
 SPEECH = Speech(Waveform(np.zeros(800), 8000), PhoneSequence(["a"], [0.0, 0.1]), (WordSpan("a", 0, 1),))
@@ -68,13 +69,13 @@ MADE: tuple[Any, ...] = (
     ChannelEdit("jawOpen", ((0.0, 1.0),)), Gains(),
     WordSpan("a", 0, 1), SPEECH, Clip(Trajectory(["a"], np.zeros((3, 1)), 30.0), resting_head(3, 30.0), SPEECH),
     RunOptions(), MarkerOptions(), StyleSource(recordings=Path("a")), LookChoices(), StudyOptions(), MoodOptions(),
-    SimilarityOptions(), NetworkMapOptions(),
+    SimilarityOptions(), NetworkMapOptions(), Credentials(Path("a.pem"), Path("b.pem")),
 )  # fmt: skip
 OF_READERS = "made by the package, which reads or computes it"
 ARRAYS = "arrays, which a constructor or a table of their types and ranges checks"
 LEFT_OUT = {
     "BatchResult": OF_READERS, "Chunk": OF_READERS, "Cue": OF_READERS, "ImportReport": OF_READERS,
-    "Frame": OF_READERS, "ImportedFace": OF_READERS, "LiveEvent": OF_READERS, "Piece": OF_READERS,
+    "FileMarks": OF_READERS, "Frame": OF_READERS, "ImportedFace": OF_READERS, "LiveEvent": OF_READERS, "Piece": OF_READERS,
     "Plan": OF_READERS, "Subtitles": OF_READERS,
     "WrittenCharacter": OF_READERS, "WrittenClip": OF_READERS,
     "Face": ARRAYS, "Palette": ARRAYS, "PhoneSequence": ARRAYS, "Talker": ARRAYS, "Trajectory": ARRAYS,

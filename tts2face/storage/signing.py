@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import BackendError, DataError, InputError, import_of_extra
+from lexicon.values.fields import check_fields
 from lexicon.values.json_text import parse_json
 from tts2face.storage.marks import COMPOSITE, SOURCE_TYPES, TRAINED, VERSION, Mark
 
@@ -61,6 +62,10 @@ class Credentials:
     key: Path
     password: str = field(default="", repr=False)
     authority: str = ""
+
+    def __post_init__(self) -> None:
+        """Reject values of other types."""
+        check_fields(self)
 
     def as_json(self) -> dict[str, str]:
         """Arguments for another process of this machine; not for a log."""

@@ -26,7 +26,7 @@ from tests.docs.blocks import (
 from tests.interchange.characters.made import write_character_file, write_landmarks
 from tests.interchange.transcripts.grids import textgrid
 from tests.photo.pictures import SMILE, still
-from tts2face import Picture, Project, Request, export, import_face, save_face, save_project
+from tts2face import Picture, Project, Request, export, import_face, save_face, save_project, write_clip
 from tts2face.models.palette import Palette
 from tts2face.models.palette_file import load_palette, write_palette
 from tts2face.photo import face_from_photo
@@ -55,7 +55,7 @@ LISTS = {
 }
 
 
-TOOLS = {"corpus", "report", "convert", "render", "face"}
+TOOLS = {"corpus", "report", "convert", "render", "face", "inspect"}
 
 MODULES = {  # parts of command lines, and the modules of extras without which these end in an error
     "report similarity": ("matplotlib", "sklearn"),
@@ -109,6 +109,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     spoken = session.Session("grid_s1", "ada", identity=None, palette="starter")
     clip = spoken.clip("Hello there.", fps=5)
     export(clip, folder / "hello.track.json")
+    write_clip(clip, spoken.face, folder / "hello.mp4", picture=Picture(size="64x64"))
     sound = clip.speech.waveform
     with wave.open(str(folder / "speech.wav"), "wb") as file:
         file.setparams((1, 2, sound.rate, 0, "NONE", ""))

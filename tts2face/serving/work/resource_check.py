@@ -100,14 +100,8 @@ def check_resource(kind: str, source: Path, folder: Path, max_bytes: float) -> N
         raise RefusedFileError(refusal(error, source, folder, folder / CONTENT)) from error
     except MemoryError as error:
         raise RefusedFileError("it needs too much memory") from error
-    except (
-        ValueError,
-        TypeError,
-        KeyError,
-        IndexError,
-        ArithmeticError,
-        EOFError,
-    ) as error:  # valid in form, but not usable
+    # valid in form, but not usable
+    except (ValueError, TypeError, KeyError, IndexError, ArithmeticError, EOFError) as error:
         raise RefusedFileError(f"it is no {kind} that works ({type(error).__name__})") from error
     if (folder / CONTENT).stat().st_size > max_bytes:
         raise RefusedFileError(f"it has more than {max_bytes / 1e6:g} MB as a {kind}")
