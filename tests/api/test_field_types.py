@@ -75,7 +75,8 @@ OF_READERS = "made by the package, which reads or computes it"
 ARRAYS = "arrays, which a constructor or a table of their types and ranges checks"
 LEFT_OUT = {
     "BatchResult": OF_READERS, "Chunk": OF_READERS, "Cue": OF_READERS, "ImportReport": OF_READERS,
-    "FileMarks": OF_READERS, "Frame": OF_READERS, "ImportedFace": OF_READERS, "LiveEvent": OF_READERS, "Piece": OF_READERS,
+    "FileMarks": OF_READERS, "Frame": OF_READERS, "ImportedFace": OF_READERS, "LiveEvent": OF_READERS,
+    "Piece": OF_READERS,
     "Plan": OF_READERS, "Subtitles": OF_READERS,
     "WrittenCharacter": OF_READERS, "WrittenClip": OF_READERS,
     "Face": ARRAYS, "Palette": ARRAYS, "PhoneSequence": ARRAYS, "Talker": ARRAYS, "Trajectory": ARRAYS,

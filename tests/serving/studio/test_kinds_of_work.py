@@ -270,7 +270,7 @@ def test_the_order_of_an_earlier_version_is_a_file_of_its_project(tmp_path, monk
     async def check() -> None:
         host = Host(tmp_path)
         host.state.results = SimpleNamespace(messages=messages)
-        host.state.settings = SimpleNamespace(data_folder=tmp_path.parent)
+        host.state.settings = SimpleNamespace(data_folder=tmp_path.parent, visible_mark=False)
         monkeypatch.setattr("tts2face.serving.studio.requests.resolve_models", resolve)
         renders = Renders(host.state, host.work)
         await host.work.resume()
