@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tts2face.gestures.prosody import AUDIBLE_DB, speech_intensity
+from tts2face.gestures.prosody import with_speech_level
 from tts2face.gestures.speech_plan import (
     LEAST_PHRASE_S,
     MOST_PROMINENT,
@@ -24,7 +24,7 @@ from tts2face.gestures.speech_plan import (
     heard_spans,
 )
 from tts2face.numeric.arrays import Float32Array
-from tts2face.sound.praat import IntensityTrack
+from tts2face.sound.praat import IntensityTrack, intensity_track
 from tts2face.types import Waveform
 
 WINDOW_S = 1.6  # of sound from which level, pitch and accents are taken
@@ -35,6 +35,7 @@ END_PAUSE_S = 0.3  # of silence that ends a sentence: commas are shorter, and fu
 LEAST_SPEECH_S = 0.12  # of sound with which a sentence begins
 # Prominence of an accent above that of its peak: those of texts are of content words, .87 in the mean; peaks have .40.
 MORE_PROMINENCE = 0.47
+TAIL_S = 0.1  # of sound before new sound, of which the intensity is measured with it
 LEVEL_SHARE = 0.3  # of the level of the window in the level of speech, where there was speech before
 
 
@@ -50,7 +51,8 @@ class ArrivingSpeech:
     def __init__(self, rate: int) -> None:
         self._rate = rate
         self._sound: Float32Array = np.zeros(0, np.float32)  # the last `WINDOW_S`
-        self._first = self._n_analysed = 0  # samples before it, and up to the end of the analysed ones
+        # samples before it, and up to the ends of the last two analyses
+        self._first = self._n_analysed = self._n_tracked = 0
         self._level: float | None = None  # dB of speech
         self._features: SoundFeatures | None = None
         self._sentence: SpokenSentence | None = None
@@ -95,19 +97,33 @@ class ArrivingSpeech:
 
     def _analyse(self) -> None:
         """Level and pitch of the window, in seconds of the sound."""
-        self._n_analysed = self._first + len(self._sound)
-        window = Waveform(self._sound, self._rate)
-        intensity = speech_intensity(window)
-        if intensity is None:
+        if len(self._sound) < TAIL_S * self._rate:
             return
-        if intensity.level is not None and intensity.track.levels.max() >= AUDIBLE_DB:
+        self._n_tracked, self._n_analysed = self._n_analysed, self._first + len(self._sound)
+        start = self._first / self._rate
+        track = self._extended(start)
+        intensity = with_speech_level(track, start, self.seconds)
+        if intensity.level is not None:
             before = intensity.level if self._level is None else self._level
             self._level = before + LEVEL_SHARE * (intensity.level - before)
-        start = self._first / self._rate
-        intensity = replace(intensity, level=self._level)
-        found = SoundFeatures.of(window, intensity)
-        track = IntensityTrack(intensity.track.centres + start, intensity.track.levels)
-        self._features = replace(found, times=found.times + start, intensity=replace(intensity, track=track))
+        # features of the window are in seconds of it
+        here = replace(intensity, track=IntensityTrack(track.centres - start, track.levels), level=self._level)
+        found = SoundFeatures.of(Waveform(self._sound, self._rate), here)
+        self._features = replace(found, times=found.times + start, intensity=replace(here, track=track))
+
+    def _extended(self, start: float) -> IntensityTrack:
+        """Intensity of the window, in seconds of the sound, of which only the end is measured."""
+        first = max(self._n_tracked - round(TAIL_S * self._rate), self._first)
+        tail = intensity_track(Waveform(self._sound[first - self._first :], self._rate))
+        centres = tail.centres + first / self._rate
+        known = None if self._features is None or self._features.intensity is None else self._features.intensity.track
+        if known is None or first == self._first:
+            return IntensityTrack(centres, tail.levels)
+        old = (known.centres >= start) & (known.centres < centres[0] + TAIL_S / 2)
+        new = centres >= centres[0] + TAIL_S / 2
+        return IntensityTrack(
+            np.concatenate([known.centres[old], centres[new]]), np.concatenate([known.levels[old], tail.levels[new]])
+        )
 
     def _follow(self, features: SoundFeatures, *, is_ended: bool) -> SpokenSentence | None:
         """The open sentence, or the one that ends now; None in a pause."""

@@ -32,8 +32,12 @@ def speech_intensity(sound: Waveform) -> SpeechIntensity | None:
     """Intensity of a sound for `prosody_features`; None for a sound too short to have a pitch."""
     if sound.duration < MIN_PITCH_SOUND_S:
         return None
-    track = intensity_track(sound)
-    levels = track.at(np.arange(0.0, sound.duration, LEVEL_STEP_S))
+    return with_speech_level(intensity_track(sound), 0.0, sound.duration)
+
+
+def with_speech_level(track: IntensityTrack, start: float, end: float) -> SpeechIntensity:
+    """Intensity, and the mean level of speech from and to seconds of it."""
+    levels = track.at(np.arange(start, end, LEVEL_STEP_S))
     is_audible = levels.max() >= AUDIBLE_DB
     return SpeechIntensity(track, speech_level(levels[:, None], LEVEL_STEP_S) if is_audible else None)
 
