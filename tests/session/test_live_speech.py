@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 import tts2face
-from tests.tones import WorldVoices
+from tests.tones import RATE_HZ, WorldVoices
 from tests.world import World
 from tts2face.session.live.speech import LiveSpeech
 from tts2face.session.speech_stream import Piece
 from tts2face.sound.voice_pool import VoicePool
+from tts2face.types import SOUND_RATE, concatenate_clips
 
 LONG = "the garden behind the old house near the river had been green for years and nobody knew it " * 3
 MAX_SHARE = 0.3  # of the time after the voice in one step; 0.48 before gestures gave way between features
@@ -118,3 +119,16 @@ def test_options_of_speech_hold_in_live_speech_and_not_in_its_silence(session: t
     (plain,) = session.live(rate=1.5, volume=0.5).say("We may.")
     assert len(spoken.clip.motion) == len(plain.clip.motion)
     assert not np.array_equal(spoken.clip.motion.values, plain.clip.motion.values)
+
+
+def test_pieces_have_one_sound_rate_and_idle_time_may_be_one_frame(session: tts2face.Session, turns: Turns) -> None:
+    """So they are one clip; without a rate of their own, speech has that of its voice."""
+    turns.restart()
+    live = session.live()
+    pieces = [*live.idle(1 / 30), *live.say("We may."), *live.idle(1 / 30)]
+    assert [len(piece.clip.motion) for piece in pieces[::2]] == [1, 1]
+    whole = concatenate_clips([piece.clip for piece in pieces])
+    assert whole.speech.waveform.rate == SOUND_RATE
+    (plain,) = session.live(sound_rate=None).say("We may.")
+    assert plain.clip.speech.waveform.rate == RATE_HZ
+    assert len(plain.clip.motion) == len(pieces[1].clip.motion)
