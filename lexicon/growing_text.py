@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from lexicon.chunks import split_chunks
 from lexicon.errors import InputError
-from lexicon.inline_marks import Rules
+from lexicon.mark_parts import Rules
 from lexicon.mark_table import MarkTable, shipped_marks
 from lexicon.markdown import BLOCK_START
 from lexicon.sentence_cuts import SentenceCuts

@@ -8,7 +8,7 @@ import functools
 import html
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 
 from lexicon.code_forms import is_color
@@ -19,7 +19,8 @@ from lexicon.function_words import is_function_word
 from lexicon.gesture_marks import FIRST_WORDS, is_gesture
 from lexicon.informal_words import tag_words
 from lexicon.latex import ENVIRONMENTS, formula_words, is_formula
-from lexicon.mark_table import PLAIN, MarkTable, TextMark
+from lexicon.mark_parts import Cue, End, Own, Part, Rules, Silent, Text
+from lexicon.mark_table import PLAIN, TextMark
 from lexicon.markdown import Block, split_blocks
 from lexicon.tag_names import BREAKS, FOREIGN_MARK, MOOD_TAGS, PASSED, PAUSE_TAGS, UNFOLLOWED
 
@@ -78,76 +79,6 @@ _MATHS = re.compile(r"(?:[0-9]|(?<![^\W_])(?!I\b)[A-Za-z])\s*\Z")
 _POWER = re.compile(r"(?<![^\W_])(?:[A-Za-z]|[kcm]m|ft|10|2)\Z")
 _EXPONENT = re.compile(r"-?[0-9]{1,3}</sup>", re.IGNORECASE)
 _GLUED = re.compile(r"[:;=]-?[()]")
-
-
-@dataclass(frozen=True, slots=True)
-class Text:
-    """Characters that are spoken, as written or others in their place (`said`)."""
-
-    start: int
-    end: int
-    said: str
-
-
-@dataclass(frozen=True, slots=True)
-class Silent:
-    """Characters that are not spoken, with a note on them or without."""
-
-    start: int
-    end: int
-    note: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class End:
-    """Characters in whose place a sentence or a paragraph ends."""
-
-    start: int
-    end: int
-    said: str
-
-
-@dataclass(frozen=True, slots=True)
-class Own:
-    """A mark of this project in square brackets, matched by `OWN_MARK`."""
-
-    start: int
-    end: int
-    match: "re.Match[str]"
-
-
-@dataclass(frozen=True, slots=True)
-class Cue:
-    """A mark of the table, which shows something.
-
-    Parameters
-    ----------
-    is_within
-        It belongs to the sentence in which it stands or that it ends (emoji), not to what follows (tags).
-    ends_style
-        It is the end of a tag: what follows is said without its style.
-    said
-        What stands in its place: a space between two words, or a full stop where it ends a sentence.
-    """
-
-    start: int
-    end: int
-    marks: tuple[TextMark, ...]
-    is_within: bool = False
-    ends_style: bool = False
-    said: str = ""
-
-
-Part = Text | Silent | End | Own | Cue
-
-
-@dataclass(frozen=True, slots=True)
-class Rules:
-    """How marks are found: the language, the table, and whether the text is known to be a language model's."""
-
-    language: str
-    table: MarkTable
-    is_model: bool = False
 
 
 @functools.lru_cache(maxsize=8)

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from lexicon.chunks import split_chunks
-from lexicon.inline_marks import Cue
+from lexicon.mark_parts import Cue
 from lexicon.marked_text import Mark, MarkedText, StyleRun
 
 _WORD = re.compile(r"\S*\w\S*")

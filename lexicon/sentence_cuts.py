@@ -3,8 +3,9 @@
 from bisect import bisect_left
 from dataclasses import dataclass
 
-from lexicon.inline_marks import Cue, End, Own, Part, Rules, Silent, Text, read_blocks
+from lexicon.inline_marks import read_blocks
 from lexicon.mark_cues import PlacedCue
+from lexicon.mark_parts import Cue, End, Own, Part, Rules, Silent, Text
 from lexicon.markdown import BLOCK_START, PARAGRAPH_END, Block
 from lexicon.marked_text_builder import MarkedTextBuilder
 from lexicon.sentence_length import n_letters

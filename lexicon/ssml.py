@@ -22,8 +22,9 @@ from xml.parsers import expat
 from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.gesture_marks import parse_gesture
-from lexicon.inline_marks import Cue, Rules, Text, read_words
+from lexicon.inline_marks import read_words
 from lexicon.mark_cues import PlacedCue, with_cues
+from lexicon.mark_parts import Cue, Rules, Text
 from lexicon.mark_table import MarkTable, shipped_marks
 from lexicon.marked_text import MAX_NESTING, GestureMark, MarkedText, NameMark
 from lexicon.marked_text_builder import MarkedTextBuilder

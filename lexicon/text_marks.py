@@ -16,8 +16,9 @@ from lexicon.emphasis import EmphasisedWords, find_emphases
 from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.gesture_marks import parse_gesture
-from lexicon.inline_marks import MAX_QUOTED_CHARACTERS, Cue, End, Own, Part, Rules, Silent, Text, read_parts
+from lexicon.inline_marks import MAX_QUOTED_CHARACTERS, read_parts
 from lexicon.mark_cues import PlacedCue, with_cues
+from lexicon.mark_parts import Cue, End, Own, Part, Rules, Silent, Text
 from lexicon.mark_table import MarkTable, shipped_marks
 from lexicon.markdown import PARAGRAPH_END
 from lexicon.marked_text import GestureMark, MarkedText

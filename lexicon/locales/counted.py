@@ -116,8 +116,8 @@ def read_number(place: Place) -> str:
     own = gender_of(locale, noun, plural=several) if agrees else ""
     gender = grammar.gender or own or (locale.setting("default_gender") if agrees else "")
     grammar = Grammar(gender, case_of(locale, noun, plural=several) or grammar.case)
-    if written == "1" and noun and (one := one_before(locale, gender, noun)):
-        said = one
+    if written == "1" and noun and (numeral := one_before(locale, gender, noun)):
+        said = numeral
     elif amount.sign or amount.decimals or not written.isdigit():
         said = number(locale, amount, grammar)
     else:

@@ -110,7 +110,7 @@ def gender_of(locale: Locale, word: str, *, plural: bool = False) -> str:
 
 
 def case_of(locale: Locale, noun: str, *, plural: bool) -> str:
-    """Case that the ending of a noun tells (z dwoma kotami, в двух случаях); empty where it does not."""
+    """Case that the ending of a noun shows (z dwoma kotami, в двух случаях); empty where it does not."""
     row = _by_ending(locale.rows("case"), noun.lower(), "+")
     return row.spoken if row and ("one" in row.details) != plural else ""
 

@@ -41,66 +41,6 @@ _ADDRESS = (
 _ROMAN = rf"(?P<roman>[IVXLCDM]{{1,15}})(?P<suffix>{{suffix}}\.?)?(?!{LETTER}|['’-]{LETTER})"
 _POWER = r"(?<=[\w)])(?:\^(?P<digits>-?[0-9]{1,4})(?!\w)|(?P<raised>⁻?[⁰¹²³⁴⁵⁶⁷⁸⁹]{1,4})(?![⁰¹²³⁴⁵⁶⁷⁸⁹⁻]))"
 _PART = re.compile("‹([a-z ]+)›")
-
-
-@dataclass(frozen=True, slots=True)
-class Form:
-    """A written form; its pattern is compiled when it is tried, because most texts have few of some hundred forms."""
-
-    source: str
-    reader: Reader
-    flags: int = 0
-
-    @property
-    def pattern(self) -> re.Pattern[str]:
-        """Pattern of the form."""
-        return _compiled(self.source, self.flags)
-
-
-@functools.cache
-def _compiled(source: str, flags: int) -> re.Pattern[str]:
-    return re.compile(source, flags)
-
-
-@dataclass(frozen=True, slots=True)
-class Scanner:
-    """Forms of a language by what they begin with."""
-
-    numbers: tuple[Form, ...]
-    by_word: Mapping[str, tuple[Form, ...]]
-    by_sign: Mapping[str, tuple[Form, ...]]
-    address: Form
-    capitals: tuple[Form, ...]
-    ending: Form
-
-    def at(self, found: re.Match[str], text: str) -> Iterable[Form]:
-        """Forms that may begin at a place, in their order."""
-        sign = found.group()
-        if found["number"]:
-            return self.numbers
-        if found["word"]:
-            return self._of_word(sign, text, found.end())
-        is_before_digit = text[found.end() : found.end() + 2].lstrip(" ")[:1].isdigit()
-        before = text[max(found.start() - 1, 0) : found.start()]
-        is_behind_word = before.isalnum() and before < _UNSPACED  # 是-5
-        if sign in "+-±" and is_before_digit and not is_behind_word:
-            return (*self.numbers, *self.by_sign.get(sign, ()))
-        return self.by_sign.get(sign, ())
-
-    def _of_word(self, word: str, text: str, end: int) -> Iterator[Form]:
-        following = text[end : end + 1]
-        if following in {"@", ".", ":", "-", "_"} or following.isdigit():
-            yield self.address
-        if following == ".":
-            yield self.ending
-        yield from self.by_word.get(word, ())
-        small = word.lower()
-        if small != word:
-            yield from self.by_word.get(small, ())
-        if word.isupper() or word.rstrip("abcdefghijklmnopqrstuvwxyz").isupper():
-            yield from self.capitals
-
-
 _VULGAR = r"[\u00bc-\u00be\u2150-\u215e]"
 _FRACTION = rf"(?: ?(?P<vulgar>{_VULGAR})| (?P<top>[0-9]{{1,3}})/(?P<bottom>[0-9]{{1,3}})(?![\w/]))"
 _ALONE = rf"(?P<sign>{_VULGAR})|(?P<first>[0-9]{{1,3}})/(?P<second>[0-9]{{1,3}})(?![\w/])"
@@ -169,6 +109,64 @@ _NUMBER_FORMS: tuple[tuple[str, Reader], ...] = (
     (r"(?P<first>[0-9]{1,3}):(?P<second>[0-9]{1,7})(?![0-9:])", digit_groups.read_score),
     (r"‹signed›‹tail›", counted.read_number),
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """A written form; its pattern is compiled when it is tried, because most texts have few of some hundred forms."""
+
+    source: str
+    reader: Reader
+    flags: int = 0
+
+    @property
+    def pattern(self) -> re.Pattern[str]:
+        """Pattern of the form."""
+        return _compiled(self.source, self.flags)
+
+
+@functools.cache
+def _compiled(source: str, flags: int) -> re.Pattern[str]:
+    return re.compile(source, flags)
+
+
+@dataclass(frozen=True, slots=True)
+class Scanner:
+    """Forms of a language by what they begin with."""
+
+    numbers: tuple[Form, ...]
+    by_word: Mapping[str, tuple[Form, ...]]
+    by_sign: Mapping[str, tuple[Form, ...]]
+    address: Form
+    capitals: tuple[Form, ...]
+    ending: Form
+
+    def at(self, found: re.Match[str], text: str) -> Iterable[Form]:
+        """Forms that may begin at a place, in their order."""
+        sign = found.group()
+        if found["number"]:
+            return self.numbers
+        if found["word"]:
+            return self._of_word(sign, text, found.end())
+        is_before_digit = text[found.end() : found.end() + 2].lstrip(" ")[:1].isdigit()
+        before = text[max(found.start() - 1, 0) : found.start()]
+        is_behind_word = before.isalnum() and before < _UNSPACED  # 是-5
+        if sign in "+-±" and is_before_digit and not is_behind_word:
+            return (*self.numbers, *self.by_sign.get(sign, ()))
+        return self.by_sign.get(sign, ())
+
+    def _of_word(self, word: str, text: str, end: int) -> Iterator[Form]:
+        following = text[end : end + 1]
+        if following in {"@", ".", ":", "-", "_"} or following.isdigit():
+            yield self.address
+        if following == ".":
+            yield self.ending
+        yield from self.by_word.get(word, ())
+        small = word.lower()
+        if small != word:
+            yield from self.by_word.get(small, ())
+        if word.isupper() or word.rstrip("abcdefghijklmnopqrstuvwxyz").isupper():
+            yield from self.capitals
 
 
 def _letter(locale: Locale) -> str:

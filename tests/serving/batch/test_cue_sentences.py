@@ -2,8 +2,9 @@
 
 import pytest
 
+from lexicon.sentence_length import n_letters
 from tests.serving.batch.conftest import Planner
-from tts2face.serving.batch.cue_sentences import continues, spoken_part
+from tts2face.serving.batch.cue_sentences import continues, spoken_part, words_of_cue
 
 FIRST, SECOND, THIRD = "When I was a boy", "my father told me", "a story. It was long."
 CUE = "{n}\n00:00:0{n},000 --> 00:00:0{n},900\n{text}\n"
@@ -126,5 +127,33 @@ def test_a_changed_cue_changes_the_segments_of_its_sentence_alone(plan_of: Plann
 
 def test_a_file_in_capitals_is_read_as_ordinary_writing(plan_of: Planner) -> None:
     plan = plan_of(srt("MR. SMITH IS IN", "THE HOUSE OF", "DAN.", "DAN!"))
-    assert [line.segment.request["text"] for line in plan.lines] == ["Mr. Smith is in the house of dan."] * 3 + ["Dan!"]
+    assert [line.segment.request["text"] for line in plan.lines] == ["Mr. Smith is in the house of Dan."] * 3 + ["Dan!"]
     assert [line.text for line in plan.lines] == ["MR. SMITH IS IN", "THE HOUSE OF", "DAN.", "DAN!"]
+
+
+MARKED = [
+    ("When I was a boy (sighs)", "my father told me"),
+    ("When I was a boy, [nod]", "my father told me"),
+    ("[nod] When I was a boy,", "*nods* my father told me"),
+    ("When I was a [happy] boy", "(laughs) my father [pause 1] told me"),
+    ("When I was a boy", "[smile] my father told me 😊"),
+]
+
+
+@pytest.mark.parametrize("texts", MARKED)
+def test_marks_divide_no_sentence(texts: tuple[str, str], plan_of: Planner) -> None:
+    first, second = (line.segment for line in plan_of(srt(*texts)).lines)
+    assert [part.n_letters for part in first.parts] == [n_letters(words_of_cue(text, {})) for text in texts]
+    assert first.parts == second.parts
+    assert first.request["text"] == second.request["text"] == " ".join(texts)
+
+
+@pytest.mark.parametrize(
+    "texts", [("We left. (sighs)", "That was all."), ("We left. [nod]", "and that was all."), ("We left", "[nod] They")]
+)
+def test_marks_join_no_sentences(texts: tuple[str, str], plan_of: Planner) -> None:
+    assert [line.segment.parts for line in plan_of(srt(*texts)).lines] == [(), ()]
+
+
+def test_a_mark_over_two_cues_leaves_them_apart(plan_of: Planner) -> None:
+    assert [line.segment.parts for line in plan_of(srt("I was *very", "sad* there then.")).lines] == [(), ()]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE
-from lexicon.inline_marks import Rules
+from lexicon.mark_parts import Rules
 from lexicon.mark_table import read_marks_table
 from lexicon.values.checks import check_limits
 from lexicon.values.fields import check_fields

@@ -4,7 +4,8 @@ import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from lexicon.inline_marks import Cue, Own, Rules, read_parts
+from lexicon.inline_marks import read_parts
+from lexicon.mark_parts import Cue, Own, Rules
 from lexicon.text_marks import has_words, is_ssml
 from tts2face.interchange.subtitles.cues import CuePart
 from tts2face.interchange.subtitles.labels import divided_at_labels, split_label, without_manners

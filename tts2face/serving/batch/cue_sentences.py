@@ -1,13 +1,18 @@
 """Sentences that run over several cues, which are spoken as one and cut back at their words."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 from lexicon.dictionary import word_set
+from lexicon.errors import DataError, InputError
 from lexicon.sentence_ends import ends_sentence
-from lexicon.sentence_length import MAX_SENTENCE_CHARACTERS
+from lexicon.sentence_length import MAX_SENTENCE_CHARACTERS, n_letters
 from lexicon.text_marks import is_ssml
+from tts2face.request import Request
 from tts2face.serving.batch.windows import Window
+from tts2face.session.prepared import prepare, read_marks, read_text
 
 MAX_GAP_S = 1.0  # between the cues of a sentence
 PUNCTUATED_SHARE = 0.4  # of the cues of a file that end a sentence: then a missing end mark means something
@@ -20,6 +25,43 @@ _OPEN_WORDS = word_set(
     "a an the and or but nor of to from with for at as by if than because into onto my your our their its every"
 )
 _LAST_WORD = re.compile(r"[^\W\d_]+(?:['’][^\W\d_]+)*$")
+
+
+@dataclass(frozen=True, slots=True)
+class CueSentence:
+    """Windows of a sentence, in order, the letters of each without marks, and the words of all with their marks."""
+
+    windows: tuple[Window, ...]
+    n_letters: tuple[int, ...]
+    text: str
+
+
+def words_of_cue(text: str, settings: Mapping[str, Any]) -> str:
+    """Words of a cue without its marks; an SSML document, or a text that cannot be read, as it is written.
+
+    `settings` are those of the request of its speaker.
+    """
+    if is_ssml(text):
+        return text
+    try:
+        return read_marks(Request(**settings, text=text)).text.strip()
+    except (InputError, DataError):
+        return text
+
+
+def letters_of_cues(texts: Sequence[str], whole: str, settings: Mapping[str, Any]) -> tuple[int, ...] | None:
+    """Numbers of the letters of each cue of a sentence without marks; None if a voice cannot speak them as one.
+
+    It can if the cues have the marks that the whole sentence has, and each of them a letter or digit.
+    """
+    try:
+        spoken = prepare(Request(**settings, text=whole)).text.text
+        words = [read_text(Request(**settings, text=text))[1].text for text in texts]
+    except (InputError, DataError):
+        return None
+    counts = tuple(map(n_letters, words))
+    has_words = all(any(map(str.isalnum, text)) for text in words)
+    return counts if has_words and sum(counts) == n_letters(spoken) else None
 
 
 def continues(text: str, following: str, language: str = "en-us", *, is_in_capitals: bool = False) -> bool:
@@ -72,6 +114,7 @@ def spoken_part(text: str, *, is_first: bool, is_last: bool) -> str:
 
 def sentence_groups(
     windows: Sequence[Window],
+    words: Sequence[str],
     keys: Sequence[object],
     max_gap: int,
     languages: Sequence[str],
@@ -82,6 +125,8 @@ def sentence_groups(
 
     Parameters
     ----------
+    words
+        Words of each window, without marks.
     keys
         For each window what must be equal for its words to be spoken as one with the next ones; None: nothing is.
     max_gap
@@ -96,8 +141,11 @@ def sentence_groups(
             n_characters = sum(len(windows[number].cue.text) + 1 for number in groups[-1])
             is_one = keys[at] is not None and keys[at] == keys[before] and window.begin - windows[before].end <= max_gap
             is_short = n_characters + len(window.cue.text) <= MAX_SENTENCE_CHARACTERS
-            texts = windows[before].cue.text, window.cue.text
-            if is_one and is_short and continues(*texts, languages[at], is_in_capitals=is_in_capitals):
+            if (
+                is_one
+                and is_short
+                and continues(words[before], words[at], languages[at], is_in_capitals=is_in_capitals)
+            ):
                 groups[-1].append(at)
                 continue
         groups.append([at])

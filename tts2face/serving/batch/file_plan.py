@@ -8,7 +8,6 @@ from typing import Any
 
 from lexicon.capitals import is_in_capitals, sentence_case
 from lexicon.errors import DataError, InputError
-from lexicon.sentence_length import n_letters
 from tts2face.interchange.exports.table import batch_format
 from tts2face.interchange.subtitles.cues import Cue
 from tts2face.request import ONLY_SPOKEN, Request
@@ -16,7 +15,15 @@ from tts2face.serving.batch.cast import Cast
 from tts2face.serving.batch.cast_checks import check_names
 from tts2face.serving.batch.content_address import file_hash
 from tts2face.serving.batch.cue_file import left_out_cues, read_cue_file
-from tts2face.serving.batch.cue_sentences import MAX_GAP_S, is_punctuated, sentence_groups, spoken_part
+from tts2face.serving.batch.cue_sentences import (
+    MAX_GAP_S,
+    CueSentence,
+    is_punctuated,
+    letters_of_cues,
+    sentence_groups,
+    spoken_part,
+    words_of_cue,
+)
 from tts2face.serving.batch.export import check_faces
 from tts2face.serving.batch.lines import Lines
 from tts2face.serving.batch.options import REPORT, BatchOptions, non_defaults
@@ -58,14 +65,6 @@ class PlanBase:
         return self.options.per != "cue"
 
 
-@dataclass(frozen=True, slots=True)
-class _Sentence:
-    """Windows of a sentence, in order, and the words of each."""
-
-    windows: tuple[Window, ...]
-    texts: tuple[str, ...]
-
-
 @dataclass(slots=True)
 class FilePlan:
     """Plan of one subtitle file."""
@@ -83,7 +82,7 @@ class FilePlan:
     _is_in_capitals: bool = False
     _lines: list[tuple[Cue, int]] = field(default_factory=list)
     _windows: dict[tuple[int, int], Window] = field(default_factory=dict)
-    _sentences: dict[tuple[int, int], _Sentence] = field(default_factory=dict)
+    _sentences: dict[tuple[int, int], CueSentence] = field(default_factory=dict)
     _following: dict[tuple[int, int], Window] = field(default_factory=dict)
     _hashes: dict[str, Mapping[str, str]] = field(default_factory=dict)
 
@@ -198,17 +197,22 @@ class FilePlan:
     def _find_sentences(self, windows: Sequence[Window]) -> None:
         """Note the sentences that run over several cues."""
         gap = round(MAX_GAP_S * float(exact_rate(self.base.request.fps)))
-        is_open = self._is_in_capitals and is_punctuated([window.cue.text for window in windows])
+        words = [words_of_cue(window.cue.text, self._settings(window)) for window in windows]
+        is_open = self._is_in_capitals and is_punctuated(words)
         keys = [None if window.part else self._who(window) for window in windows]
         languages = [self._language(window) for window in windows]
-        for group in sentence_groups(windows, keys, gap, languages, is_in_capitals=is_open):
+        for group in sentence_groups(windows, words, keys, gap, languages, is_in_capitals=is_open):
             inside, last = tuple(windows[at] for at in group), len(group) - 1
             texts = [
                 spoken_part(window.cue.text, is_first=at == 0, is_last=at == last) for at, window in enumerate(inside)
             ]
-            sentence = _Sentence(inside, tuple(texts))
-            if last and self._is_spoken_as_one(sentence):
+            whole = self._written(" ".join(texts), inside[0])
+            if last and (letters := letters_of_cues(texts, whole, self._settings(inside[0]))) is not None:
+                sentence = CueSentence(inside, letters, whole)
                 self._sentences |= {window.numbers: sentence for window in inside}
+
+    def _settings(self, window: Window) -> Mapping[str, Any]:
+        return self.speakers.casting(window.cue, window.part).request
 
     def _who(self, window: Window) -> object:
         """Equal for lines of one speaker with equal settings."""
@@ -224,26 +228,12 @@ class FilePlan:
         ]
         return following.begin <= window.slot_end and same[0] == same[1]
 
-    def _is_spoken_as_one(self, sentence: _Sentence) -> bool:
-        """Whether a voice can speak the words of all cues together, of which each begins with a letter."""
-        request = Request(**self.speakers.casting(sentence.windows[0].cue, 0).request, text=self._joined(sentence))
-        try:
-            prepared = prepare(request)
-        except (InputError, DataError):
-            return False
-        return n_letters(prepared.text.text) == sum(map(n_letters, sentence.texts)) and all(
-            any(map(str.isalnum, text)) for text in sentence.texts
-        )
-
-    def _joined(self, sentence: _Sentence) -> str:
-        return self._written(" ".join(sentence.texts), sentence.windows[0])
-
     def _written(self, text: str, window: Window) -> str:
         """Words of a line, in small letters where the file has only capitals."""
         return sentence_case(text, self._language(window), is_shouted=True) if self._is_in_capitals else text
 
     def _language(self, window: Window) -> str:
-        return str(self.speakers.casting(window.cue, window.part).request.get("language", Request().language))
+        return str(self._settings(window).get("language", Request().language))
 
     def _joined_output(self, name: str, windows: Sequence[Window], begin: int) -> Output:
         """Clip of consecutive windows with the silences between them."""
@@ -291,7 +281,7 @@ class FilePlan:
         """Segment of a cue, which may be the last one of its output; None with a warning if it cannot be spoken."""
         casting = self.speakers.casting(window.cue, window.part)
         sentence = self._sentences.get(window.numbers)
-        text = self._written(window.cue.text, window) if sentence is None else self._joined(sentence)
+        text = self._written(window.cue.text, window) if sentence is None else sentence.text
         request: dict[str, Any] = {**casting.request, "text": text}
         if self.base.options.audio is not None:
             found = self.recordings.track or self.recordings.cues.get(window.cue.number)
@@ -311,7 +301,7 @@ class FilePlan:
         self.segments[window.numbers] = segment
         return segment
 
-    def _fitted(self, segment: Segment, window: Window, sentence: _Sentence | None, *, is_last: bool) -> Segment:
+    def _fitted(self, segment: Segment, window: Window, sentence: CueSentence | None, *, is_last: bool) -> Segment:
         """A segment of speech with what its fit needs: rates, the next cue, and the sentence around it."""
         options, rate = self.base.options, self.speakers.settings(window.cue, window.part).rate
         windows = (window,) if sentence is None else sentence.windows
@@ -331,8 +321,8 @@ class FilePlan:
         if sentence is None:
             return segment
         parts = tuple(
-            CuePart(n_letters(text), own.end - own.begin, self._slot(own), own.margin_begin)
-            for own, text in zip(sentence.windows, sentence.texts, strict=True)
+            CuePart(letters, own.end - own.begin, self._slot(own), own.margin_begin)
+            for own, letters in zip(sentence.windows, sentence.n_letters, strict=True)
         )
         return replace(segment, parts=parts, part=sentence.windows.index(window))
 

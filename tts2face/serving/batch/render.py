@@ -214,7 +214,8 @@ class SegmentSpeech:
         self.fps = float(exact_rate(request.fps))
         self._session, self._segment = session, segment
         self._request, self._spoken = request, spoken
-        own = CuePart(n_letters(spoken.text), segment.window_frames, segment.slot_frames, segment.lead_frames or 0)
+        self._text = session.prepare(request).text.text  # without marks
+        own = CuePart(n_letters(self._text), segment.window_frames, segment.slot_frames, segment.lead_frames or 0)
         self._parts = segment.parts or (own,)
 
     @property
@@ -261,7 +262,7 @@ class SegmentSpeech:
 
     def _own_words(self) -> list[str]:
         first = sum(part.n_letters for part in self._parts[: self._segment.part])
-        text, own = self._spoken.text, self._parts[self._segment.part]
+        text, own = self._text, self._parts[self._segment.part]
         begin, end = (len(text_prefix(text, n)) for n in (first, first + own.n_letters))
         return text[begin:end].split()
 

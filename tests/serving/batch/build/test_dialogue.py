@@ -25,6 +25,7 @@ from tts2face.serving.batch.render import SegmentRenderer, _writer
 from tts2face.serving.batch.report import measure_plan
 from tts2face.serving.batch.run import SEGMENT_FOLDER, run_batch
 from tts2face.serving.batch.store import open_store
+from tts2face.session.prepared import prepare
 
 SENTENCE = (
     "1\n00:00:01,000 --> 00:00:02,500\nWhen I was a boy,\n\n"
@@ -136,12 +137,12 @@ def test_faces_without_a_studio_stand_before_that_of_the_drawn_faces(
     plan_of: Planner, world: World, tmp_path: Path
 ) -> None:
     segment = plan_of(SENTENCE).outputs[0].segments[0]
-    shown = _writer(world.session(), segment, Request(text="Hello."), (tmp_path / "a.mov", 10))
+    shown = _writer(world.session(), segment, prepare(Request(text="Hello.")), (tmp_path / "a.mov", 10))
     studio = load_face(DRAWN_FACE).light.baked.backdrop
     assert np.array_equal(shown._renderer.scene.background, draw_background(SMALL, studio))
     assert not np.array_equal(shown._renderer.scene.background, draw_background(SMALL))
     green = replace(segment, picture={"background": "green"})
-    shown = _writer(world.session(), green, Request(text="Hello."), (tmp_path / "b.mov", 10))
+    shown = _writer(world.session(), green, prepare(Request(text="Hello.")), (tmp_path / "b.mov", 10))
     assert len(np.unique(shown._renderer.scene.background.reshape(-1, 3), axis=0)) == 1
 
 
@@ -163,3 +164,23 @@ def test_a_recording_sounds_on_up_to_the_limit(
     assert any("cut off" in one for one in result.warnings) == (cut_s > 0.0)
     begin, end = render._span_after(segment, result)
     assert end - begin == pytest.approx(min(overlap_s + RELEASE_S, spoken + RELEASE_S - 1.0), abs=1e-6)
+
+
+def test_a_sentence_with_marks_is_cut_back_at_its_words(
+    plan_of: Planner, voices: list[LetterVoice], tmp_path: Path
+) -> None:
+    text = SENTENCE.replace("boy,", "boy, (sighs)").replace("my father", "[nod] my father")
+    run_batch(plan_of(text, per="file"), tmp_path / "marked")
+    run_batch(plan_of(SENTENCE, per="file"), tmp_path / "plain")
+    (marked,), (plain,) = (manifest(tmp_path / name)["outputs"] for name in ("marked", "plain"))
+    for name in ("begin_s", "speech_s", "rate", "cut_s"):
+        assert [cue[name] for cue in marked["cues"]] == [cue[name] for cue in plain["cues"]]
+
+
+def test_the_words_that_are_cut_have_no_marks(plan_of: Planner, voices: list[LetterVoice], tmp_path: Path) -> None:
+    marked = OVERLAP.replace("abcdefgh ijklmno.", "[nod] abcdefgh [smile] ijklmno pqrstuvwxyz abcdefgh.")
+    run_batch(plan_of(marked, per="file"), tmp_path / "out")
+    (output,) = manifest(tmp_path / "out")["outputs"]
+    (lost,) = [warning for warning in output["warnings"] if "is not spoken" in warning]
+    assert "[" not in lost
+    assert "abcdefgh" in lost
