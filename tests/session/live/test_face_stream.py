@@ -5,12 +5,14 @@ import itertools
 import threading
 from collections.abc import Iterator
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
 
 import tts2face
 from lexicon.errors import InputError
+from tests.golden.requests import with_pictures
 from tests.running import eventually
 from tests.tones import WorldVoices
 from tests.world import World
@@ -332,3 +334,28 @@ def test_without_idle_motion_nothing_comes_between_two_utterances(session: tts2f
 def test_the_first_frame_has_a_picture(session: tts2face.Session) -> None:
     with session.face_stream(size="16x16") as stream:
         assert stream.read(PATIENCE_S).pixels is not None
+
+
+@pytest.mark.parametrize("is_own", [False, True])
+def test_faces_without_gestures_and_a_talker_s_own_face_are_live_too(world: World, is_own: bool) -> None:
+    """What is said, and idle frames around it, are in the channels of the face."""
+    own: dict[str, Any] = {"talker": with_pictures(world.talker), "face": "self"}
+    session = world.session(**own if is_own else {"palette": None})
+    with session.face_stream(size="32x32") as stream:
+        frames = until_end(stream, stream.say("Yes."))
+    assert {len(frame.weights) for frame in frames} == {len(stream.channels)}
+    assert session.animated_face().channels == stream.channels
+    assert any(frame.pixels is not None for frame in frames)
+
+
+def test_sound_and_lips_are_those_of_a_clip(session: tts2face.Session) -> None:
+    with session.face_stream(draws=False, idle=False) as stream:
+        frames = until_end(stream, stream.say(TEXT))
+    clip = session.clip(TEXT, fps=30)
+    sound = clip.speech.waveform.resampled(SOUND_RATE).samples
+    found = np.concatenate([frame.sound for frame in frames])
+    assert abs(len(found) - len(sound)) <= SOUND_RATE / 30
+    n_samples = min(len(found), len(sound))
+    assert np.abs(found[:n_samples] - sound[:n_samples]).max() < 1e-2  # each sentence is resampled alone
+    jaw = [frame.weights[stream.channels.index("jawOpen")] for frame in frames[: len(clip.motion)]]
+    np.testing.assert_allclose(jaw, clip.motion.columns(["jawOpen"])[: len(jaw), 0], atol=1e-6)
