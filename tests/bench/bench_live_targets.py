@@ -75,6 +75,12 @@ class StampedReceiver:
         self.process.end()
 
 
+def memory_mb() -> float:
+    """Memory of this process that is not shared, in MB."""
+    pages, shared = (int(value) for value in Path("/proc/self/statm").read_text().split()[1:3])
+    return (pages - shared) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
 def spent_s() -> float:
     """Processor seconds of this process and its ended children."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
@@ -86,6 +92,7 @@ class Sayer:
 
     def __init__(self, seconds: float) -> None:
         self.seconds, self.latencies = seconds, list[float]()
+        self.memory_mb: list[float] = []
         self._said_at: float | None = None
         self._n_spoken = 0
 
@@ -96,6 +103,7 @@ class Sayer:
                 self._said_at = time.monotonic()
                 last = face.say(TEXTS[n % len(TEXTS)])
                 n += 1
+                self.memory_mb.append(memory_mb())
             time.sleep(0.02)
         return last
 
@@ -133,7 +141,8 @@ def measure(session: Session, kind: str, asked: argparse.Namespace) -> None:
         time.sleep(1.0)
         received = [event for event in server.events() if event["event"] in {"received", "closed"}]
     first = ", ".join(f"{latency:.2f}" for latency in sayer.latencies)
-    print(f"{kind}: text to first speaking frame sent: {first} s")
+    print(f"{kind}: text to first speaking frame sent: {first} s; memory at each text: ", end="")
+    print(", ".join(f"{used:.0f}" for used in sayer.memory_mb), "MB")
     report((kind, used / seconds, broadcast.n_late), asked, sent, received[-1] if received else {})
 
 
