@@ -19,7 +19,7 @@ from lexicon.sentence_ends import abbreviations
 _WORD = re.compile(r"[^\W\d_]+(?:['’][^\W\d_]+)*")
 _TWO_CAPITALS = re.compile(r"[^\W\d_a-z]{2}")  # without them no word is in capitals
 _PREFIX = re.compile(r"(?:Mc|Mac)(?=[A-Z])")
-_SENTENCE_END = re.compile(r"[.!?…。！？]|\n\s*\n|:\s|\A\Z")
+_SENTENCE_END = re.compile(r"[!?…。！？]|\.(?![0-9])|\n\s*\n|:\s|\A\Z")
 _OF_INITIALISM = re.compile(r"([A-Z]{2,5})(?:['’]?S)\Z")  # the FBI's, DVDs
 _STOP = re.compile(r"\s*[.!?…]")
 _VOWELS = frozenset("AEIOUY")

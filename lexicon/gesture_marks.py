@@ -5,6 +5,7 @@ with its degrees or without. ``[look left]`` is short for ``[look at left]``.
 """
 
 import functools
+import math
 import re
 
 from lexicon.errors import InputError
@@ -14,7 +15,7 @@ from lexicon.marked_text import GestureMark
 FIRST_WORDS = tuple(dict.fromkeys([*(name.partition("_")[0] for name in GESTURES)]))
 _NUMBER = r"(?:[0-9]{1,4}(?:\.[0-9]{0,4})?|\.[0-9]{1,4})"
 _REST = re.compile(
-    rf"\s*+(?:(?P<direction>{'|'.join(DIRECTIONS)})(?:\s+(?P<degrees>{_NUMBER})(?:°|\s*deg(?:rees)?)?)?"
+    rf"\s*+(?:(?P<direction>{'|'.join(DIRECTIONS)})(?:\s+(?P<degrees>{_NUMBER})(?P<sign>°|\s*deg(?:rees)?)?)?"
     rf"|(?P<seconds>{_NUMBER})\s?s|(?P<size>{_NUMBER}))(?=[\s,]|$),?",
     re.IGNORECASE,
 )
@@ -65,17 +66,24 @@ def _parse_rest(name: str, rest: str, at: int) -> GestureMark | None:
     place = 0
     while rest[place:].strip():
         part = _REST.match(rest, place)
-        if part is None:
+        values = None if part is None else _values(name, part)
+        if part is None or values is None:
             return None
+        found |= values
         place = part.end()
-        if not part["direction"]:
-            found |= {key: float(part[key]) for key in ("seconds", "size") if part[key]}
-            continue
-        if GESTURES[name].directions == "side" and (part["degrees"] or part["direction"].casefold() not in SIDES):
-            return None
-        usual = DIRECTIONS[part["direction"].casefold()]
-        for key, degrees in zip(("down_deg", "left_deg"), usual, strict=True):
-            given = float(part["degrees"]) if part["degrees"] else abs(degrees)
-            if degrees:
-                found[key] = given if degrees > 0 else -given
     return GestureMark(at, name, **found)
+
+
+def _values(name: str, part: "re.Match[str]") -> dict[str, float] | None:
+    """Values of a mark by their fields; behind the side of a wink or tilt stands its size. None for a wrong direction."""
+    if not part["direction"]:
+        return {key: float(part[key]) for key in ("seconds", "size") if part[key]}
+    direction, number = part["direction"].casefold(), part["degrees"]
+    has_sides = GESTURES[name].directions == "side"
+    if has_sides and (part["sign"] or direction not in SIDES):
+        return None
+    found = {"size": float(number)} if has_sides and number else {}
+    for key, usual in zip(("down_deg", "left_deg"), DIRECTIONS[direction], strict=True):
+        if usual:
+            found[key] = math.copysign(float(number) if number and not has_sides else abs(usual), usual)
+    return found

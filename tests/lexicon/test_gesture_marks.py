@@ -23,6 +23,8 @@ from lexicon.text_marks import parse_marks
         ("LOOK AWAY down 1.5s", {"name": "look_away", "down_deg": 12.0, "seconds": 1.5}),
         ("wink right", {"name": "wink", "left_deg": -15.0}),
         ("tilt left", {"name": "tilt", "left_deg": 15.0}),
+        ("wink left 0.8", {"name": "wink", "left_deg": 15.0, "size": 0.8}),
+        ("tilt right 1.5 2s", {"name": "tilt", "left_deg": -15.0, "size": 1.5, "seconds": 2.0}),
         ("look left", {"name": "look_at", "left_deg": 15.0}),
         ("look", {"name": "look_at"}),
         ("look at right 20, up 5, 2 s", {"name": "look_at", "left_deg": -20.0, "down_deg": -5.0, "seconds": 2.0}),
