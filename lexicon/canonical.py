@@ -37,6 +37,7 @@ _TRANSLATION = (
     | {ord(c): ", " for c in "，、،؛；"}
     | {ord(c): "? " for c in "？؟"}
     | {ord("٫"): ".", ord("٬"): ","}  # between Arabic digits
+    | {ord(c): "" for c in "\ufffc\ufffd"}  # of what is lost
     | {ord("！"): "! ", ord("："): ": ", ord("¿"): " ", ord("¡"): " "}
 )
 _SPOKEN_PUNCTUATION = frozenset(".,;:!?'-–/&@#%‰§¶^")

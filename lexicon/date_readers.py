@@ -86,10 +86,27 @@ def read_decade(m: re.Match[str], _: str) -> str:
 
 
 def read_short_name(m: re.Match[str], _: str) -> str:
-    """The days and months of Mon–Fri."""
-    written = m["dayone"] or m["daytwo"]
-    full = next(name for name in (*readings.DAYS, *readings.MONTHS) if name.startswith(written[:3]))
-    return keep_full_stop(full, m)
+    """The days and months of Mon–Fri, the day of Thu 9:30."""
+    return keep_full_stop(_full_name(m["dayone"] or m["daytwo"] or m["daythree"]), m)
+
+
+def _full_name(written: str) -> str:
+    """Name of a weekday or month by its first three letters."""
+    return next(name for name in (*readings.DAYS, *readings.MONTHS) if name.startswith(written[:3]))
+
+
+def read_short_date(m: re.Match[str], _: str) -> str:
+    """Thu 4/18 is Thursday, April eighteenth; on 4/18 on April eighteenth."""
+    first, second = m["sd1"] or m["sd3"], m["sd2"] or m["sd4"]
+    day = f"{_full_name(m['weekday'])}, " if m["weekday"] else ""
+    said = readings.numeric_date_words(int(first), int(second), "", "/") or readings.ratio_words(first, second)
+    return f"{day}{said}"
+
+
+def read_lasting(m: re.Match[str], _: str) -> str:
+    """3h 12m is three hours twelve minutes."""
+    parts = ((m["lasth"], "hr"), (m["lastm"], "min"), (m["lasts"], "sec"))
+    return " ".join(readings.measure_words(amount, unit) for amount, unit in parts if amount)
 
 
 def read_lap(m: re.Match[str], _: str) -> str:

@@ -36,8 +36,10 @@ _RULERS_NOT_FIRST = word_set(
 )
 Reader = Callable[[re.Match[str], str], str]
 _BEFORE_NAME = re.compile(r" [A-Z]")
-_BEFORE_LETTER = re.compile(r" [a-z]")
+_BEFORE_LETTER = re.compile(r"[ -][a-z]")
 _BEFORE_NUMBER = re.compile(r" ?[0-9]")
+_AMID_SENTENCE = re.compile(r" [a-z]|[:?,]")
+_DETERMINED = re.compile(r"\b(?:my|your|his|her|our|their|its|the|a) (?:[a-z]+ )?\Z", re.IGNORECASE)
 _NO_NAMES = word_set("The On In At And But When Dear I If As To From Near")
 _CENTURY = re.compile(r"(?:st|nd|rd|th)?[ -](?:[Cc]entur(?:y|ies)|[Dd]ynasty|[Oo]lympi)")
 _AT_END = re.compile(r"\s*$")
@@ -96,8 +98,8 @@ def _as_attribute(words: str, currency: str, m: re.Match[str], previous: str) ->
 
 def read_measure(m: re.Match[str], previous: str) -> str:
     """5 km is five kilometers, a 5 km run a five kilometer run."""
-    is_attribute = previous.lower() in {"a", "an"} and _BEFORE_LETTER.match(m.string, m.end())
-    if is_attribute:
+    is_joined = m.string[m.end("amount")] == "-" or previous.lower() in {"a", "an"}
+    if is_joined and _BEFORE_LETTER.match(m.string, m.end()):
         return f"{readings.signed_number_words(m['amount'])} {readings.unit_words(m['unit'], is_one=True)}"
     return readings.measure_words(m["amount"], m["unit"])
 
@@ -150,6 +152,11 @@ def read_per(m: re.Match[str], _: str) -> str:
     if m["per"]:
         return f"per {readings.unit_words(m['per'], is_one=True)}"
     return f"per {_RATES.get(m['perword'], m['perword'])}"
+
+
+def read_times(m: re.Match[str], _: str) -> str:
+    """The 3x of 3x/day is three times."""
+    return "once" if m["times"] == "1" else f"{number_words(m['times'])} times"
 
 
 def read_who(m: re.Match[str], previous: str) -> str:
@@ -281,13 +288,20 @@ def read_abbreviation(m: re.Match[str], previous: str) -> str:
     spoken, context = table.get(m["abbr"]) or table[m["abbr"].capitalize()]
     before_name = bool(_BEFORE_NAME.match(m.string, m.end()))
     after_name = previous[:1].isupper() and previous not in _NO_NAMES
-    if context == "number" and not _BEFORE_NUMBER.match(m.string, m.end()):
+    if context == "number" and not (_BEFORE_NUMBER.match(m.string, m.end()) or _is_named_number(m)):
         return m.group()
     if context == "doctor" and after_name and not before_name:
         return keep_full_stop("Drive", m)
     if context == "saint" and (after_name or not before_name):
         return keep_full_stop("Street", m)
     return spoken if context in {"title", "number"} else keep_full_stop(spoken, m)
+
+
+def _is_named_number(m: re.Match[str]) -> bool:
+    """Whether the number itself is named: my new no. is, your account no.?"""
+    if m["abbr"].lower() != "no" or not _AMID_SENTENCE.match(m.string, m.end()):
+        return False
+    return _DETERMINED.search(text_before(m)) is not None
 
 
 def read_dotted_letters(m: re.Match[str], _: str) -> str:

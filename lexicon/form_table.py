@@ -25,12 +25,17 @@ _TAIL = r"[^\s,;!]{0,500}[^\s,;!.:?]"
 _HALF = r"(?:[aApP]\.[mM]\.?|[aApP][mM]\b)"
 _LETTERS = r"[^\W\d_]+"
 _SHORT_NAME = r"(?:Mon|Tues?|Wed|Thu(?:rs?)?|Fri|Sat|Sun|Jan|Feb|Mar|Apr|Jun|Jul|Aug|Sept?|Oct|Nov|Dec)"
+_SHORT_DAY = "(?:Mon|Tues?|Wed|Thu(?:rs?)?|Fri|Sat|Sun)"
 _STATE = "|".join(readings.read_table("states.tsv"))
+_STATE_NAME = "|".join(
+    name for (name,) in readings.read_table("states.tsv").values() if name.replace(" ", "").isalpha()
+)
 _PART = r"[\w+-]{1,64}(?:\.[\w+-]{1,32}){0,4}"  # of a path
 _CLUSTER = "th|sh|ch|wh|st|pl|pr|br|cr|dr|fr|gr|tr|bl|cl|fl|gl|sl|sp|sk|sc|sm|sn|sw|tw|kn|wr|qu|[a-z]"  # of a stutter
 _ELEMENT = f"(?:{'|'.join(sorted(formulas.ELEMENTS, key=len, reverse=True))})"
 _TWO_LETTERS = f"(?:{'|'.join(symbol for symbol in sorted(formulas.ELEMENTS) if len(symbol) > 1)})"
 _METAL = "(?:Cl|Br|Fe|Ca|Mg|Na|Cu|Zn|Al|Pb|Ag|Hg|Li)"
+_MORE = "(?:more|less|better|worse|faster|slower|larger|bigger|smaller|higher|longer|stronger|cheaper)"
 _PER = "(?:mo|month|wk|week|yr|year|day|night|person|head|hour|minute|second|acre|gallon|page|item|user|share|ton)"
 
 
@@ -70,7 +75,7 @@ def _abbreviation_pattern() -> str:
     written = sorted(table, key=len, reverse=True)
     titles = "|".join(title.upper() for title in written if table[title][1] in forms.TITLES)
     dotless = (
-        r"(?:(?:Mr|Mrs|Ms|Dr|Prof|etc|vs|approx)|(?:St|Mt|Ft)(?= [A-Z])"
+        r"(?:(?:Mr|Mrs|Ms|Dr|Prof|etc|vs|approx)|(?:St|Mt|Ft)(?= [A-Z])|(?:Rm|Apt|Vol|Figs?|Jct)(?= [0-9])"
         rf"|(?<=[a-z] )(?:Ave|Blvd|Rd|Hwy|Pkwy|St(?![^\W_]| [A-Z0-9]))){_STOP}"
     )
     return rf"(?P<abbr>(?:{'|'.join(map(re.escape, written))})(?=\.)|(?:{titles})(?=\. ?[A-Z])|{dotless})\.?"
@@ -140,7 +145,8 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         (
             "zip",
             "a#",
-            rf"(?<=[a-z.,] )(?P<state>{_STATE}) (?P<zip>[0-9]{{5}}(?:-[0-9]{{4}})?)(?![\w-])",
+            rf"(?<=[a-z.,] )(?P<state>{_STATE}|(?<=, )(?:{_STATE_NAME}|D\.C\.)) "
+            r"(?P<zip>[0-9]{5}(?:-[0-9]{4})?)(?![\w-])",
             contexts.read_zip_code,
         ),
         (
@@ -149,6 +155,14 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
             r"(?=(?:[0-9]-?){9}(?:[0-9]-?){0,3}[0-9X](?![\w-]))[0-9]{1,5}(?:-[0-9]{1,7}){2,4}(?:-X)?(?![\w-])|[0-9]{5}-[0-9]{4}(?![\w-])"
             r"|[0-9]{4}(?: [0-9]{4}){3}(?![0-9])|(?<=ISSN )[0-9]{4}-[0-9]{3}[0-9X](?!\w)|(?<=ISBN )[0-9]{9,13}X?(?!\w)",
             contexts.read_digits,
+        ),
+        (
+            "shortdate",
+            "a0#",
+            rf"(?P<weekday>{_SHORT_DAY}(?![^\W\d_])\.?|{'|'.join(readings.DAYS)}),? (?P<sd1>[0-9]{{1,2}})/(?P<sd2>[0-9]{{1,2}})(?![\w/])"
+            r"|(?:(?<=[Oo]n )|(?<=[Bb]y )|(?<=due )|(?<=until )|(?<=since ))"
+            rf"(?P<sd3>1?[0-9])/(?P<sd4>1[3-9]|2[0-9]|3[01])(?![\w/-]| of\b| ?in(?:ch|\b)| ?{INCH})",
+            dates.read_short_date,
         ),
         ("iso", "0", r"(?P<isoy>[0-9]{4})-(?P<isom>[0-9]{2})-(?P<isod>[0-9]{2})(?![\w-])", dates.read_iso_date),
         (
@@ -194,6 +208,13 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
             rf"(?: ?(?P<arcseconds>[0-9]{{1,2}}(?:\.[0-9]{{1,3}})?){INCH})?"
             r"(?: ?(?P<pole>[NSEW])(?!\w))?",
             formulas.read_angle,
+        ),
+        (
+            "lasting",
+            "0",
+            r"(?:(?P<lasth>[0-9]{1,3}) ?h(?:rs?)? ?)?(?P<lastm>[0-5]?[0-9]) ?m(?:ins?)?(?: ?(?P<lasts>[0-5]?[0-9]) ?s(?:ecs?)?)?"
+            r"(?![\w/^-])(?(lasth)|(?(lasts)|(?!)))",
+            dates.read_lasting,
         ),
         ("points", "0", r"(?P<points>[0-9]{1,3}(?:\.[0-9]{1,2} ?pp| ?bps))(?!\w)", forms.read_points),
         (
@@ -255,6 +276,12 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         ),
         ("stars", "0.", rf"(?P<starnumber>[0-9])?{STAR}+", formulas.read_stars),
         (
+            "times",
+            "0",
+            rf"(?P<times>[0-9]{{1,3}}) ?[xX×](?=/{_PER}\b| (?:a|an|per|each|every|daily|weekly|monthly|as|{_MORE})\b)",
+            forms.read_times,
+        ),
+        (
             "packs",
             "0",
             rf"(?P<packs>[0-9]{{1,3}}) ?[x×] ?(?P<content>{_AMOUNT}) ?(?P<punit>{unit})(?= [a-z])",
@@ -292,7 +319,7 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         (
             "per",
             "./",
-            rf"(?:(?<=[0-9$£€])|(?<=llion))/(?:(?P<per>{unit})|(?P<perword>{_PER})\b)",
+            rf"(?:(?<=[0-9$£€¢])|(?<=[0-9][xX×])|(?<=llion))/(?:(?P<per>{unit})|(?P<perword>{_PER})\b)",
             forms.read_per,
         ),
         (
@@ -331,7 +358,8 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         (
             "shortname",
             "a",
-            rf"(?:(?P<dayone>{_SHORT_NAME})\b\.?(?= {RANGE})|(?<={RANGE} )(?P<daytwo>{_SHORT_NAME})\b\.?)",
+            rf"(?:(?P<dayone>{_SHORT_NAME})\b\.?(?= {RANGE})|(?<={RANGE} )(?P<daytwo>{_SHORT_NAME})\b\.?"
+            rf"|(?P<daythree>{_SHORT_DAY})(?=,? (?:{_FULL_MONTH}\b|[0-9]{{1,2}}(?:st|nd|rd|th|:[0-9]{{2}}| ?[apAP]\.?[mM])\b)))",
             dates.read_short_name,
         ),
         ("initial", "a", rf"{_START}[A-Z]\.(?= [A-Z](?:[a-z]|\.))", forms.read_initial),

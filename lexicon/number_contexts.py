@@ -96,8 +96,9 @@ def read_network_address(m: re.Match[str], _: str) -> str:
 
 
 def read_zip_code(m: re.Match[str], _: str) -> str:
-    """TX 78701 is Texas seven eight seven oh one, of 10001-2345 each digit."""
-    return f"{read_table('states.tsv')[m['state']][0]} {digit_words(m['zip']).replace('zero', 'oh')}"
+    """TX 78701 and Texas 78701 are Texas seven eight seven oh one, of 10001-2345 each digit."""
+    state = read_table("states.tsv").get(m["state"].replace(".", ""), (m["state"],))[0]
+    return f"{state} {digit_words(m['zip']).replace('zero', 'oh')}"
 
 
 def read_digits(m: re.Match[str], _: str) -> str:
