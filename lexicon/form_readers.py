@@ -298,7 +298,7 @@ def read_abbreviation(m: re.Match[str], previous: str) -> str:
 
 
 def _is_named_number(m: re.Match[str]) -> bool:
-    """Whether the number itself is named: my new no. is, your account no.?"""
+    """Whether the number itself is named: my new no. is, his account no. by noon."""
     if m["abbr"].lower() != "no" or not _AMID_SENTENCE.match(m.string, m.end()):
         return False
     return _DETERMINED.search(text_before(m)) is not None

@@ -24,8 +24,8 @@ _LABEL = r"[A-Za-z0-9][A-Za-z0-9-]{0,62}"
 _TAIL = r"[^\s,;!]{0,500}[^\s,;!.:?]"
 _HALF = r"(?:[aApP]\.[mM]\.?|[aApP][mM]\b)"
 _LETTERS = r"[^\W\d_]+"
-_SHORT_NAME = r"(?:Mon|Tues?|Wed|Thu(?:rs?)?|Fri|Sat|Sun|Jan|Feb|Mar|Apr|Jun|Jul|Aug|Sept?|Oct|Nov|Dec)"
 _SHORT_DAY = "(?:Mon|Tues?|Wed|Thu(?:rs?)?|Fri|Sat|Sun)"
+_SHORT_NAME = rf"(?:{_SHORT_DAY}|Jan|Feb|Mar|Apr|Jun|Jul|Aug|Sept?|Oct|Nov|Dec)"
 _STATE = "|".join(readings.read_table("states.tsv"))
 _STATE_NAME = "|".join(
     name for (name,) in readings.read_table("states.tsv").values() if name.replace(" ", "").isalpha()
@@ -159,7 +159,8 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         (
             "shortdate",
             "a0#",
-            rf"(?P<weekday>{_SHORT_DAY}(?![^\W\d_])\.?|{'|'.join(readings.DAYS)}),? (?P<sd1>[0-9]{{1,2}})/(?P<sd2>[0-9]{{1,2}})(?![\w/])"
+            rf"(?P<weekday>{_SHORT_DAY}\b\.?|{'|'.join(readings.DAYS)}),? "
+            r"(?P<sd1>[0-9]{1,2})/(?P<sd2>[0-9]{1,2})(?![\w/])"
             r"|(?:(?<=[Oo]n )|(?<=[Bb]y )|(?<=due )|(?<=until )|(?<=since ))"
             rf"(?P<sd3>1?[0-9])/(?P<sd4>1[3-9]|2[0-9]|3[01])(?![\w/-]| of\b| ?in(?:ch|\b)| ?{INCH})",
             dates.read_short_date,
@@ -212,7 +213,8 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
         (
             "lasting",
             "0",
-            r"(?:(?P<lasth>[0-9]{1,3}) ?h(?:rs?)? ?)?(?P<lastm>[0-5]?[0-9]) ?m(?:ins?)?(?: ?(?P<lasts>[0-5]?[0-9]) ?s(?:ecs?)?)?"
+            r"(?:(?P<lasth>[0-9]{1,3}) ?h(?:rs?)? ?)?(?P<lastm>[0-5]?[0-9]) ?m(?:ins?)?"
+            r"(?: ?(?P<lasts>[0-5]?[0-9]) ?s(?:ecs?)?)?"
             r"(?![\w/^-])(?(lasth)|(?(lasts)|(?!)))",
             dates.read_lasting,
         ),
@@ -359,7 +361,8 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
             "shortname",
             "a",
             rf"(?:(?P<dayone>{_SHORT_NAME})\b\.?(?= {RANGE})|(?<={RANGE} )(?P<daytwo>{_SHORT_NAME})\b\.?"
-            rf"|(?P<daythree>{_SHORT_DAY})(?=,? (?:{_FULL_MONTH}\b|[0-9]{{1,2}}(?:st|nd|rd|th|:[0-9]{{2}}| ?[apAP]\.?[mM])\b)))",
+            rf"|(?P<daythree>{_SHORT_DAY})(?=,? (?:{_FULL_MONTH}\b"
+            r"|[0-9]{1,2}(?:st|nd|rd|th|:[0-9]{2}| ?[apAP]\.?[mM])\b)))",
             dates.read_short_name,
         ),
         ("initial", "a", rf"{_START}[A-Z]\.(?= [A-Z](?:[a-z]|\.))", forms.read_initial),

@@ -75,7 +75,7 @@ def _parse_rest(name: str, rest: str, at: int) -> GestureMark | None:
 
 
 def _values(name: str, part: "re.Match[str]") -> dict[str, float] | None:
-    """Values of a mark by their fields; behind the side of a wink or tilt stands its size. None for a wrong direction."""
+    """Values of a mark by their fields, behind the side of a wink its size; None for a direction that it has not."""
     if not part["direction"]:
         return {key: float(part[key]) for key in ("seconds", "size") if part[key]}
     direction, number = part["direction"].casefold(), part["degrees"]
