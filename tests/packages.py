@@ -21,6 +21,8 @@ EXTRAS = {  # modules that the product imports where they are installed; what on
     "pyvista": "view",
     "pxr": "usd",
     "c2pa": "c2pa",
+    "livekit": "livekit", "livekit.agents": "livekit",
+    "pipecat": "pipecat",
 }  # fmt: skip
 OTHERS = "test-all"
 
