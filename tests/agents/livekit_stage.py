@@ -65,13 +65,19 @@ class Stage:
         await self.runner.start()
 
     async def say(self, sound: bytes, *, is_whole: bool = True) -> None:
+        await self.push(sound)
+        if is_whole:
+            await self.end()
+
+    async def push(self, sound: bytes) -> None:
         from livekit import rtc
 
         for at in range(0, len(sound), 960):
             block = sound[at : at + 960]
             await self.audio.capture_frame(rtc.AudioFrame(block, RATE, 1, len(block) // 2))
-        if is_whole:
-            self.audio.flush()
+
+    async def end(self) -> None:
+        self.audio.flush()
 
     async def until(self, condition: Callable[[], object]) -> None:
         async with asyncio.timeout(PATIENCE_S):

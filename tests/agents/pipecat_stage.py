@@ -59,13 +59,23 @@ class Stage:
         self.worker = PipelineWorker(pipeline, cancel_on_idle_timeout=False, enable_rtvi=False)
 
     async def say(self, sound: bytes, *, is_whole: bool = True) -> None:
-        from pipecat.frames.frames import TTSAudioRawFrame, TTSStartedFrame, TTSStoppedFrame
+        from pipecat.frames.frames import TTSStartedFrame
 
         await self.worker.queue_frame(TTSStartedFrame())
+        await self.push(sound)
+        if is_whole:
+            await self.end()
+
+    async def push(self, sound: bytes) -> None:
+        from pipecat.frames.frames import TTSAudioRawFrame
+
         for at in range(0, len(sound), 960):
             await self.worker.queue_frame(TTSAudioRawFrame(sound[at : at + 960], RATE, 1))
-        if is_whole:
-            await self.worker.queue_frame(TTSStoppedFrame())
+
+    async def end(self) -> None:
+        from pipecat.frames.frames import TTSStoppedFrame
+
+        await self.worker.queue_frame(TTSStoppedFrame())
 
     async def until(self, condition: Callable[[], object]) -> None:
         async with asyncio.timeout(PATIENCE_S):

@@ -143,12 +143,14 @@ async def utter(
     n_pictures, n_sounds, n_new = len(watched.pictures), len(watched.sounds), watched.n_new
     n_ended, used, began = watched.n_ended, cpu_s(), time.monotonic()
     for at in range(0, len(sound), 2 * BLOCK):
-        await watched.stage.say(sound[at : at + 2 * BLOCK], is_whole=at + 2 * BLOCK >= len(sound))
+        await watched.stage.push(sound[at : at + 2 * BLOCK])
         if realtime:
             await asyncio.sleep(max(0.0, began + (at / 2 + BLOCK) / RATE - time.monotonic()))
         if interrupt and time.monotonic() - began > INTERRUPTED_AFTER_S:
             break
-    if interrupt:
+    if not interrupt:
+        await watched.stage.end()
+    else:
         await asyncio.sleep(max(0.0, began + INTERRUPTED_AFTER_S - time.monotonic()))
         called = time.monotonic()
         await interrupt()
@@ -167,7 +169,8 @@ async def utter(
     return {
         "first_picture_s": seen[0] - began, "first_sound_s": heard[0][0] - began, "pictures": len(seen),
         "new": watched.n_new - n_new, "gap_p95_ms": 1000 * float(np.percentile(np.diff(seen), 95)),
-        "sound_after_picture_ms": 1000 * float(np.median(of_pictures - seen)), "cpu_s_a_second": (cpu_s() - used) / took,
+        "sound_after_picture_ms": 1000 * float(np.median(of_pictures - seen)),
+        "cpu_s_a_second": (cpu_s() - used) / took,
         "sound_lost_s": len(sound) / 2 / RATE - sum(seconds for _, seconds in heard),
     }  # fmt: skip
 
@@ -191,8 +194,10 @@ async def run(watched: Watched, interrupt: Callable[[], Any], minutes: float, so
     idle = (cpu_s() - used) / (time.monotonic() - at)
     figures = {kind: {name: round(float(np.median([one[name] for one in many])), 3) for name in many[0]}
                for kind, many in found.items() if many}  # fmt: skip
-    return {"n": n + 1, **figures, "idle cpu_s_a_second": round(idle, 3), "memory_mb": memory[:: max(1, len(memory) // 10)],
-            "late": watched.face.stream.late}  # fmt: skip
+    return {
+        "n": n + 1, **figures, "idle cpu_s_a_second": round(idle, 3), "late": watched.face.stream.late,
+        "memory_mb": memory[:: max(1, len(memory) // 10)],
+    }  # fmt: skip
 
 
 async def livekit(session: tts2face.Session, minutes: float, sound: bytes, **options: Any) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from lexicon.errors import InputError, Tts2faceError
 from lexicon.gesture_marks import parse_gesture
 from lexicon.gesture_names import GESTURES
 from lexicon.marked_text import GestureMark
+from tts2face.numeric.arrays import Float32Array
 from tts2face.picture.frame_renderer import FrameRenderer
 from tts2face.session.live import AHEAD_S
 from tts2face.session.live.blocks import Item
@@ -90,6 +91,7 @@ class FaceStream:
         self._failure: BaseException | None = None  # that ended a thread
         self._is_closed = False
         self._numbers = UtteranceNumbers()
+        self._pushed: dict[int, list[Float32Array]] = {}  # blocks of utterances that have not been taken
         tasks = [self._make, *([] if renderer is None else [partial(self._draw, renderer)])]
         self._threads = [
             threading.Thread(target=self._guarded, args=[task], name=THREAD, daemon=True) for task in tasks
@@ -137,7 +139,10 @@ class FaceStream:
                     f"the sound began with {self._numbers.open_rate} Hz, not {rate}; end it before another rate"
                 )
             number = self._numbers.open_sound(rate)
-            self._post(number, lambda: self._face.add_sound(number, samples, rate))
+            waiting = self._pushed.setdefault(number, [])
+            waiting.append(samples)
+            if len(waiting) == 1:
+                self._post(number, lambda: self._take_sound(number, rate))
             return number
 
     def end_sound(self) -> None:
@@ -182,6 +187,7 @@ class FaceStream:
         with self._lock:
             self._numbers.forget(utterance)
             self._inbox = deque(message for message in self._inbox if not self._numbers.is_forgotten(message[0]))
+            self._pushed = {one: kept for one, kept in self._pushed.items() if not self._numbers.is_forgotten(one)}
             self._post(0, lambda: self._forget(utterance))
             return self._line.interrupt(utterance)
 
@@ -190,6 +196,13 @@ class FaceStream:
             self._face.interrupt()
         else:
             self._face.forget(utterance)
+
+    def _take_sound(self, number: int, rate: int) -> None:
+        """Add all blocks that have come at once: the lips of many short ones take longer."""
+        with self._lock:
+            blocks = self._pushed.pop(number, None)
+        if blocks:
+            self._face.add_sound(number, np.concatenate(blocks), rate)
 
     def _post(self, number: int, follow: Callable[[], None]) -> None:
         if self._is_closed:
