@@ -41,6 +41,15 @@ class FakeStream:
             number, samples, _ = self._spoken[-1]
             self._spoken[-1], self._open = (number, samples, True), 0
 
+    def push_text(self, part: str) -> int:
+        """Speak a tone of a tick for each character."""
+        if not self._open:
+            self.push_sound(np.zeros(0, np.float32), SOUND_RATE)
+        return self.push_sound(np.full(TICK * len(part), 0.25, np.float32), SOUND_RATE)
+
+    def end_text(self) -> None:
+        self.end_sound()
+
     def interrupt(self) -> float:
         self._spoken, self._open = [], 0
         return 0.0

@@ -102,9 +102,12 @@ def perform(script: Callable[[Stage], Awaitable[None]], session: Any = None, **o
         stage, runner = Stage(session or FakeSession(), **options), WorkerRunner()
         await runner.add_workers(stage.worker)
         running = asyncio.create_task(runner.run())
-        await script(stage)
-        await stage.worker.queue_frame(EndFrame())
-        await asyncio.wait_for(running, PATIENCE_S)
+        try:
+            await script(stage)
+            await stage.worker.queue_frame(EndFrame())
+            await asyncio.wait_for(running, PATIENCE_S)
+        finally:
+            await stage.worker.cancel()
         return stage
 
     return asyncio.run(run())

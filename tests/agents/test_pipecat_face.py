@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.agents.made import FPS, SIZE, FakeSession, tone
+from tests.agents.made import FPS, SIZE, TICK, FakeSession, tone
 from tests.agents.pipecat_stage import RATE, Stage, perform
 from tts2face.types import SOUND_RATE
 
@@ -68,6 +68,18 @@ def test_a_pipeline_ends_when_all_has_been_spoken() -> None:
     assert stage.face.face.stream.is_closed  # type: ignore[attr-defined]
 
 
+def test_a_text_is_spoken_without_a_speech_service() -> None:
+    from pipecat.frames.frames import LLMFullResponseEndFrame, LLMTextFrame, TTSSpeakFrame
+
+    async def script(stage: Stage) -> None:
+        for frame in (LLMTextFrame("Hello "), LLMTextFrame("there."), LLMFullResponseEndFrame(), TTSSpeakFrame("Bye.")):
+            await stage.worker.queue_frame(frame)
+        await stage.until(lambda: stage.count("stopped") == 2)
+
+    stage = perform(script, speaks_text=True)
+    assert len(stage.sound) == pytest.approx(16 * TICK, abs=2 * CHUNK_S * SOUND_RATE)
+
+
 def test_sound_that_cannot_be_spoken_ends_and_the_next_is_spoken() -> None:
     async def script(stage: Stage) -> None:
         await stage.say(np.full(4800, -30_000, "<i2").tobytes())
@@ -85,6 +97,6 @@ def test_no_attribute_of_the_base_class_is_taken() -> None:
     from tts2face.agents import PipecatFace
 
     own = set(vars(PipecatFace(FakeSession(), size=str(SIZE)))) - set(vars(FrameProcessor()))
-    assert own == {"face", "_showing", "_is_open", "_contexts", "_is_silent"}
+    assert own == {"face", "_speaks_text", "_showing", "_contexts", "_is_silent"}
     overridden = {name for name in vars(PipecatFace) if hasattr(FrameProcessor, name) and not name.startswith("_")}
     assert overridden == {"process_frame", "cleanup"}

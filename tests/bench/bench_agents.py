@@ -207,6 +207,7 @@ async def livekit(session: tts2face.Session, minutes: float, sound: bytes, **opt
     watched = watch_livekit(stage)
 
     async def interrupt() -> None:
+        stage.audio.flush()
         stage.audio.clear_buffer()
 
     try:

@@ -8,9 +8,12 @@ from pipecat.frames.frames import (
     EndFrame,
     Frame,
     InterruptionFrame,
+    LLMFullResponseEndFrame,
+    LLMTextFrame,
     OutputImageRawFrame,
     StartFrame,
     TTSAudioRawFrame,
+    TTSSpeakFrame,
     TTSStartedFrame,
     TTSStoppedFrame,
 )
@@ -26,10 +29,13 @@ CHUNKS_10MS = 2  # of sound that a transport gathers: with its 4, sound is 40 ms
 
 
 class PipecatFace(FrameProcessor):
-    """Takes the sound of a speech service; gives pictures, and the sound of each at the same instant.
+    """Takes the sound of a speech service, or the text of a model; gives pictures, and sound at the same instants.
 
     Parameters
     ----------
+    speaks_text
+        Whether it speaks what a language model writes (`LLMTextFrame`, `TTSSpeakFrame`) in the voice of its face, so
+        that no speech service is needed.
     size, fps
         Of the pictures.
     options
@@ -41,11 +47,13 @@ class PipecatFace(FrameProcessor):
         The `AgentFace`, whose ``stream`` takes gestures and styles.
     """
 
-    def __init__(self, session: "Session", *, size: str = "auto", fps: float = 30.0, **options: Any) -> None:
+    def __init__(
+        self, session: "Session", *, speaks_text: bool = False, size: str = "auto", fps: float = 30.0, **options: Any
+    ) -> None:
         super().__init__()
+        self._speaks_text = speaks_text
         self.face = AgentFace(session, size, fps, options)
         self._showing: asyncio.Task[None] | None = None
-        self._is_open = False  # whether an utterance has begun, and its end has not come
         self._contexts: dict[int, str | None] = {}  # of the utterances that have not been given to their end
         self._is_silent = asyncio.Event()
         self._is_silent.set()
@@ -65,16 +73,15 @@ class PipecatFace(FrameProcessor):
         if isinstance(frame, TTSAudioRawFrame):
             return self._hear(frame)
         if isinstance(frame, TTSStoppedFrame) and self._contexts:
-            return self._end()  # one of our own follows the last sound: the bot speaks until then
-        if isinstance(frame, TTSStartedFrame):
-            self._end()
+            return self.face.end()  # one of our own follows the last sound: the bot speaks until then
         if isinstance(frame, InterruptionFrame):
             return await self._interrupt(frame, direction)
-        if isinstance(frame, EndFrame):
-            self._end()
-            await self._is_silent.wait()
+        if isinstance(frame, (TTSStartedFrame, EndFrame)):
+            self.face.end()
+        if self._speaks_text:
+            self._read(frame)
         if isinstance(frame, (EndFrame, CancelFrame)):
-            await self._stop()
+            await self._stop(is_patient=isinstance(frame, EndFrame))
         await self.push_frame(frame, direction)
         if isinstance(frame, StartFrame):
             self._showing = self.create_task(self._show(), "face")
@@ -83,23 +90,26 @@ class PipecatFace(FrameProcessor):
     async def cleanup(self) -> None:
         """Close the face."""
         await super().cleanup()
-        await self._stop()
+        await self._stop(is_patient=False)
         await asyncio.to_thread(self.face.close)
 
     def _hear(self, frame: TTSAudioRawFrame) -> None:
-        number = self.face.push(frame.audio, frame.sample_rate, frame.num_channels)
-        self._contexts[number] = frame.context_id
-        self._is_open = True
-        self._is_silent.clear()
+        self._begin(self.face.push(frame.audio, frame.sample_rate, frame.num_channels), frame.context_id)
 
-    def _end(self) -> None:
-        if self._is_open:
-            self._is_open = False
+    def _read(self, frame: Frame) -> None:
+        """Speak a text, or more of one, sentence by sentence."""
+        if isinstance(frame, (LLMTextFrame, TTSSpeakFrame)):
+            self._begin(self.face.push_text(frame.text), None)
+        if isinstance(frame, (LLMFullResponseEndFrame, TTSSpeakFrame)):
             self.face.end()
+
+    def _begin(self, utterance: int, context: str | None) -> None:
+        self._contexts[utterance] = context
+        self._is_silent.clear()
 
     async def _interrupt(self, frame: Frame, direction: FrameDirection) -> None:
         self.face.interrupt()
-        spoken, self._is_open = list(self._contexts.values()), False
+        spoken = list(self._contexts.values())
         self._contexts.clear()
         self._is_silent.set()
         await self.push_frame(frame, direction)
@@ -120,13 +130,15 @@ class PipecatFace(FrameProcessor):
                 await self._finish(tick)
 
     async def _finish(self, tick: Tick) -> None:
-        ended = [tick.utterance] if tick.utterance else list(self._contexts)
-        for number in ended:
-            await self.push_frame(TTSStoppedFrame(context_id=self._contexts.pop(number, None)))
+        for number in [one for one in self._contexts if one <= (tick.utterance or one)]:
+            await self.push_frame(TTSStoppedFrame(context_id=self._contexts.pop(number)))
         if not self._contexts:
             self._is_silent.set()
 
-    async def _stop(self) -> None:
+    async def _stop(self, *, is_patient: bool) -> None:
+        """End the ticks; `is_patient`: when all has been spoken."""
         task, self._showing = self._showing, None
         if task is not None:
+            if is_patient:
+                await self._is_silent.wait()
             await self.cancel_task(task)
