@@ -24,7 +24,7 @@ class LiveKitAvatar(VideoGenerator):
     size, fps
         Of the pictures.
     options
-        As for `tts2face.Session.face_stream`: ``face``, ``style``, ``hair``, ``background``, ...
+        As for `tts2face.Session.face_stream`: ``style``, ``voice``, ``hair``, ``background``, ...
 
     Attributes
     ----------

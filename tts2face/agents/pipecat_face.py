@@ -39,7 +39,7 @@ class PipecatFace(FrameProcessor):
     size, fps
         Of the pictures.
     options
-        As for `tts2face.Session.face_stream`: ``face``, ``style``, ``hair``, ``background``, ...
+        As for `tts2face.Session.face_stream`: ``style``, ``voice``, ``hair``, ``background``, ...
 
     Attributes
     ----------
