@@ -100,7 +100,8 @@ class AgentFace:
             self.stream.end_text()
 
     def _open(self, number: int) -> int:
-        self._spoken, self._is_open, self._n_quiet = number, True, 0
+        self._spoken, self._is_open = number, True
+        self._n_quiet = 0
         return number
 
     def interrupt(self) -> float:
