@@ -99,8 +99,9 @@ def read_range(place: Place) -> str:
     locale, first = place.locale, place.match["amount"]
     said = year_or_number(locale, first, Grammar(case=place.grammar("cardinal").case))
     second = _RESULT.match(place.text, place.match.end())
-    falls = second is not None and first.isdigit() and int(first) > int(second.group())  # 3-2 is a result
-    return f"{said} {locale.setting('against' if falls else 'to')}".rstrip() + " "
+    falls = second is not None and first.isdigit() and int(first) >= int(second.group())  # 3-2 is a result
+    score = locale.setting("score", locale.setting("against"))
+    return f"{said} {score if falls else locale.setting('to')}".rstrip() + " "
 
 
 def read_number(place: Place) -> str:

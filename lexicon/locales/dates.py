@@ -33,10 +33,11 @@ def _month(locale: Locale, number: int) -> str:
 
 
 def read_short_date(place: Place) -> str | None:
-    """5/3 and 5.3. without a year, behind a word that dates have before them."""
+    """5/3 and 5.3. without a year, behind a word that dates have before them; 12/08 anywhere."""
     is_listed = place.text[max(place.match.start() - 2, 0) : place.match.start()] == ", "  # Fr., 13.12.
     is_dotted = place.match.group().endswith(".") and (is_listed or not place.is_last)
-    if not is_dotted and place.before.lower() not in place.locale.words("date_before"):
+    has_zero = "/0" in place.match.group()
+    if not (is_dotted or has_zero or place.before.lower() in place.locale.words("date_before")):
         return None
     day, month = int(place.match["day"]), int(place.match["month"])
     if not (1 <= day <= _DAYS and 1 <= month <= _MONTHS):

@@ -2,7 +2,7 @@
 
 import re
 
-from lexicon.locales.numbers import cardinal, digits, number, whole
+from lexicon.locales.numbers import Grammar, cardinal, digits, number, whole
 from lexicon.locales.place import Place, amount_pattern, read_amount
 from lexicon.locales.tables import Locale
 
@@ -58,5 +58,8 @@ def read_scientific(place: Place) -> str:
 
 def read_score(place: Place) -> str:
     """Result of a match, or a proportion: 3:1."""
-    first, second = (whole(place.locale, place.match[name]) for name in ("first", "second"))
-    return f"{first} {place.locale.setting('against')} {second}".replace("  ", " ")
+    locale, against = place.locale, place.locale.setting("against")
+    row = locale.rows("case").get(against)
+    first = whole(locale, place.match["first"])
+    second = whole(locale, place.match["second"], Grammar(case=row.spoken) if row else Grammar())
+    return f"{first} {against} {second}".replace("  ", " ")

@@ -35,7 +35,9 @@ def read_fraction(place: Place) -> str:
     known = locale.rows("fraction")
     row = known.get(f"{top}/{bottom}") or known.get(f"/{bottom}")
     if row:
-        part = row.details.get(gender) or row.spoken.format(whole(locale, top))
+        case = place.grammar("fraction").case  # mit einem halben Liter
+        forms = (row.details.get(key) for key in (f"{gender} {case}".strip(), case, gender) if key)
+        part = next(filter(None, forms), row.spoken.format(whole(locale, top)))
     else:
         part = f"{whole(locale, top)} {locale.setting('over')} {whole(locale, bottom)}"
     said = locale.setting("mixed", "{} {}").format(whole(locale, integer), part) if integer else part

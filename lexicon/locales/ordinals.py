@@ -13,8 +13,11 @@ def read_suffixed(place: Place) -> str | None:
     n, grammar = int(place.match["digits"]), place.grammar("ordinal")
     if place.match["suffix"] == "°" and not noun_behind(place):  # 25° are degrees
         return None
-    case = row.details.get("noun", "") if noun_behind(place) else ""  # tercer piso
+    noun = noun_behind(place)
+    case = row.details.get("noun", "") if noun else ""  # tercer piso
     grammar = Grammar(row.details.get("gender", grammar.gender), case or row.details.get("case", grammar.case))
+    if noun and noun[-1] in row.details:  # на 1-й странице
+        grammar = Grammar(*row.details[noun[-1]].split(" "))
     if "tens" in row.details and n % 10 == 0 and n > 10:  # 90-е годы
         grammar = Grammar(case=row.details["tens"])
     if row.spoken == "ordinal":
