@@ -27,6 +27,7 @@ BLOCK = 480  # samples
 PAUSE_S = 1.0
 INTERRUPTED_AFTER_S = 2.0
 PATIENCE_S = 30.0
+QUEUE_S = 0.1  # of sound that waits in the transport, as in LiveKit's source
 
 
 def cpu_s() -> float:
@@ -116,7 +117,7 @@ def watch_pipecat(stage: Any) -> Watched:
         plays_until = max(plays_until, now)
         watched.hear(seconds, plays_until - now)
         plays_until += seconds
-        await asyncio.sleep(max(0.0, plays_until - now - seconds))
+        await asyncio.sleep(max(0.0, plays_until - now - QUEUE_S))
         return True
 
     async def pass_on(frame: Any, *more: Any) -> None:
