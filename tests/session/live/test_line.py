@@ -221,3 +221,20 @@ def test_the_last_pose_stands_where_a_sentence_is_not_made_in_time() -> None:
     assert (held.number, held.utterance, held.pixels) == (2, 1, None)
     assert not held.sound.any()
     assert held.weights is frames[-1].weights
+
+
+def test_utterances_without_frames_end_one_after_another() -> None:
+    """A text of a gesture alone, or a sound without samples; also before there is idle motion."""
+    line = line_of()
+    line.interrupt()
+    take(line, 6)
+    for number in (1, 2, 3):
+        line.add(End(number))
+    assert [frame.utterance for frame in take(line, 10) if frame.ends] == [1, 2, 3]
+    early = Line(FPS, 6, has_idle=False, draws=False)
+    early.add(End(1))
+    early.add(block(2, 2))
+    assert early.take(fills_gaps=True) is None
+    early.idle = Still()  # type: ignore[assignment]
+    early.fill()
+    assert [(frame.utterance, frame.ends) for frame in take(early, 9)] == [(1, True), (2, False), (2, False)]

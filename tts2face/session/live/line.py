@@ -85,7 +85,6 @@ class Line:
         self._speaks = 0  # utterance of which more is to come
         self._is_pushed = False  # whether it is pushed sound
         self._is_gap = False  # whether idle motion goes on until there is more of it
-        self._ended = 0  # utterance whose last frame has been read before its end was known
         self._notes: list[LiveEvent] = []
         self._heard: OrderedDict[int, int] = OrderedDict()  # frames that have been read of utterances
         self._draw_s = 0.0  # mean time of drawing
@@ -142,8 +141,7 @@ class Line:
             Whether idle motion goes on where more of an utterance is not made in time.
         """
         if not self._places:
-            has_gap = fills_gaps and (self._speaks or self.is_moved)
-            if self.idle is None or not (self._ended or has_gap):
+            if self.idle is None or not (fills_gaps and (self._speaks or self.is_moved)):
                 return None
             self._begin(self.idle.next(1))
             self._enter()
@@ -175,9 +173,6 @@ class Line:
             self._heard[utterance] = self._heard.pop(utterance, 0) + 1
             while len(self._heard) > KNOWN_UTTERANCES:
                 self._heard.popitem(last=False)
-        if self._ended:
-            utterance, self._ended = self._ended, 0
-            place.ends = True
         events = tuple(replace(event, start=event.start + start, end=event.end + start) for event in place.events)
         state: State = "speaking" if utterance else place.block.state
         return Frame(self._number, pixels, place.sound, place.weights, place.head, state, utterance, place.ends, events)
@@ -190,7 +185,9 @@ class Line:
                 self._n_waiting -= len(item.motion)
                 self._begin(item)
                 return True
-            self._end(item)
+            if not self._end(item):
+                self._blocks.appendleft(item)
+                return False
         is_awaited = bool(self._speaks) or self.is_moved
         if self.idle is None or not (self._is_gap if is_awaited else self._has_idle):
             return False
@@ -231,13 +228,19 @@ class Line:
         if self._n_entered == len(block.motion):
             self._now = self._joined = None
 
-    def _end(self, end: End) -> None:
-        self._speaks = 0 if self._speaks == end.utterance else self._speaks
+    def _end(self, end: End) -> bool:
+        """Mark the last frame of an utterance; False where that has been read, and no motion is there for another."""
         last = next((place for place in reversed(self._places) if place.utterance == end.utterance), None)
-        if last is not None:
-            last.ends = True
-        else:
-            self._ended = end.utterance
+        if last is None:
+            if self.idle is None:
+                return False
+            self._begin(self.idle.next(1))
+            self._enter()
+            last = self._places[-1]
+            last.utterance = end.utterance
+        last.ends = True
+        self._speaks = 0 if self._speaks == end.utterance else self._speaks
+        return True
 
     def _samples(self, number: int) -> int:
         """Samples of a frame."""
