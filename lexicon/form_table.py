@@ -229,7 +229,8 @@ def form_table() -> tuple[tuple[str, str, str, forms.Reader], ...]:
             "clock",
             "0",
             rf"(?P<hh>[0-9]{{1,2}}):(?P<mm>[0-9]{{2}})(?::(?P<ss>[0-9]{{2}}))?(?![\w:])(?: ?(?P<half>{_HALF}))?"
-            rf"|(?P<hh2>[0-9]{{1,2}}) ?(?P<half2>{_HALF})|(?P<hh3>[0-9]{{1,2}}):(?P<mm3>[0-9]{{2}})(?P<half3>{_HALF})",
+            rf"|(?P<hh2>[0-9]{{1,2}}) ?(?P<half2>{_HALF})|"
+            rf"(?P<hh3>[0-9]{{1,2}})(?::|\.(?=[0-9]{{2}} ?[ap]))(?P<mm3>[0-9]{{2}}) ?(?P<half3>{_HALF})",
             dates.read_clock,
         ),
         ("ratio", "0", r"(?P<ra>[0-9]{1,3}):(?P<rb>[0-9]{1,3})(?![\w:])", dates.read_proportion),
