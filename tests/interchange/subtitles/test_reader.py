@@ -211,7 +211,7 @@ def test_an_encoding_can_be_named(tmp_path: Path) -> None:
     [
         ("[door slams]", "", ""),
         ("[door slams", "", ""),
-        ("(sighs) No.", "No.", ""),
+        ("(door slams) No.", "No.", ""),
         ("♪ La la la ♪", "", ""),
         ("♫ La la\nla", "", ""),
         ("# La la la #", "", ""),

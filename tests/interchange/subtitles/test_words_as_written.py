@@ -155,6 +155,8 @@ def test_marks_end_where_somebody_speaks(text: str, words: str, read: ReadText) 
         ("[happy] Great!\n(laughs)", "[happy] Great! (laughs)"),
         ("[nod x] Yes [pause 1] no.", "[nod x] Yes [pause 1] no."),
         ("[door creaks] Yes. (2 HOURS LATER)", "Yes."),
+        ("Yes, [style:sad no.\n(applause) Really.", "Yes, [style:sad no. Really."),
+        ("[emphasis]Yes. [door creaks", "[emphasis]Yes."),
         ("[listen to the radio] Yes. [applause]", "Yes."),
     ],
 )

@@ -5,7 +5,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from lexicon.inline_marks import read_parts
-from lexicon.mark_parts import Cue, Own, Rules
+from lexicon.mark_parts import Cue, Own, Rules, Silent
 from lexicon.text_marks import has_words, is_ssml
 from tts2face.interchange.subtitles.cues import CuePart
 from tts2face.interchange.subtitles.labels import divided_at_labels, split_label, without_manners
@@ -127,7 +127,7 @@ def _without_additions(
             marks = _mark_spans(text, rules, has_directions=kind not in keep)
         parts, at = list[str](), 0
         for match in passage.finditer(text):
-            if any(start <= match.start() and match.end() <= end for start, end in marks):
+            if any(match.start() == start or (start < match.start() and match.end() <= end) for start, end in marks):
                 continue
             parts += [text[at : match.start()], brackets.sub(" ", match[0]) if kind in keep else " "]
             at = match.end()
@@ -138,14 +138,16 @@ def _without_additions(
 
 
 def _mark_spans(text: str, rules: Rules, *, has_directions: bool) -> tuple[tuple[int, int], ...]:
-    """Where a text has marks of this project, and directions that show something, with its lines as one."""
+    """Where a text has marks, also those that are not understood, and directions that show something."""
     if not _BRACKETS.search(text):
         return ()
     parts = read_parts(text.replace("\n", " "), rules)
     return tuple(
         (part.start, part.end)
         for part in parts
-        if isinstance(part, Own) or (has_directions and isinstance(part, Cue) and (part.ends_style or _shows(part)))
+        if isinstance(part, Own)
+        or (isinstance(part, Silent) and part.note)  # [style:sad without its end
+        or (has_directions and isinstance(part, Cue) and (part.ends_style or _shows(part)))
     )
 
 
