@@ -22,6 +22,8 @@ def read_suffixed(place: Place) -> str | None:
         grammar = Grammar(case=row.details["tens"])
     if row.spoken == "ordinal":
         return ordinal(place.locale, n, grammar)
+    if n == 1 and "one" in row.details:  # 1-комнатная
+        return row.spoken.format(row.details["one"])
     said = year(place.locale, n) if n > 1100 and place.locale.setting("years") else cardinal(place.locale, n, grammar)
     return row.spoken.format(said)
 
