@@ -2,8 +2,10 @@
 
     python tests/bench/bench_live_targets.py [--seconds 20] [--fps 60] [--size 512] [TARGET ...]
 
-Targets are vmc, livelink, ws, vts, rtmp, rtsp and whip; all by default, one after another. Ten minutes (`--seconds 600
-livelink`) show the drift of the clock. Quiet machine; the load is printed.
+Targets are vmc, livelink, ws, vts, rtmp, rtsp and whip; all by default, one after another. `aiortc-h264` and
+`aiortc-vp8` send to the endpoint of whip by aiortc, as one would without this. Ten minutes (`--seconds 600
+livelink`) show the drift of the clock, and with pictures (`--seconds 600 rtmp`) whether memory grows and sound stays
+with its pictures. Quiet machine; the load is printed.
 """
 
 import argparse
@@ -12,6 +14,7 @@ import resource
 import socket
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -20,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from tests.running import LoggedProcess, free_port
+from tests.started import children
 from tests.targets.receivers import TOKEN, receiver, tell
 from tts2face import Session
 from tts2face.picture.options import Picture
@@ -28,8 +32,11 @@ from tts2face.targets.table import parse_targets
 
 DATAGRAMS = ("vmc", "livelink")
 ALL = (*DATAGRAMS, "ws", "vts", "rtmp", "rtsp", "whip")
+BY_AIORTC = {"aiortc-h264": "H264", "aiortc-vp8": "VP8"}
 TEXTS = ("Hello there, this is a live connection.", "And this is a second sentence.")
 FIRST_S, EVERY_S = 3.0, 6.0  # of the first text, and between two
+MEMORY_S = 5.0  # between two looks at the memory
+PAGE_MB = os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def stamp(port: int) -> None:
@@ -75,16 +82,49 @@ class StampedReceiver:
         self.process.end()
 
 
-def memory_mb() -> float:
-    """Memory of this process that is not shared, in MB."""
-    pages, shared = (int(value) for value in Path("/proc/self/statm").read_text().split()[1:3])
-    return (pages - shared) * os.sysconf("SC_PAGE_SIZE") / 1e6
-
-
 def spent_s() -> float:
     """Processor seconds of this process and its ended children."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(one.ru_utime + one.ru_stime for one in used)
+
+
+class Memory:
+    """Resident MB of this process and of those that it has started, but for the receiver, while it sends."""
+
+    def __init__(self, receiver: int) -> None:
+        self._receiver, self._ended = receiver, threading.Event()
+        self.seen: list[tuple[float, ...]] = []  # seconds, MB of this process, of the others
+        threading.Thread(target=self._look, daemon=True).start()
+
+    def _look(self) -> None:
+        began = time.monotonic()
+        while not self._ended.wait(MEMORY_S):
+            others = [one for one in children(os.getpid()) if one != self._receiver]
+            held = resident_mb(os.getpid()), sum(map(resident_mb, others))
+            self.seen.append((time.monotonic() - began, *held))
+
+    def end(self) -> str:
+        """What it has seen: after half a minute (or the first look), at the highest, at the end."""
+        self._ended.set()
+        if not self.seen:
+            return "memory not seen"
+        seconds, *held = np.array(self.seen).T
+        total = np.sum(held, axis=0)
+        early = int(np.searchsorted(seconds, 30.0)) % len(seconds)
+        slope = 60 * np.polyfit(seconds[early:], total[early:], 1)[0] if len(seconds) > early + 2 else np.nan
+        parts = " + ".join(f"{one[-1]:.0f}" for one in held)
+        return (
+            f"memory {total[early]:.0f} MB after {seconds[early]:.0f} s, at most {total.max():.0f}, at the end "
+            f"{total[-1]:.0f} ({parts} of the senders), {slope:+.2f} MB a minute"
+        )
+
+
+def resident_mb(process: int) -> float:
+    """Resident MB of a process; 0 if it has ended."""
+    try:
+        return int(Path(f"/proc/{process}/statm").read_text().split()[1]) * PAGE_MB
+    except OSError:
+        return 0.0
 
 
 class Sayer:
@@ -92,7 +132,6 @@ class Sayer:
 
     def __init__(self, seconds: float) -> None:
         self.seconds, self.latencies = seconds, list[float]()
-        self.memory_mb: list[float] = []
         self._said_at: float | None = None
         self._n_spoken = 0
 
@@ -103,7 +142,6 @@ class Sayer:
                 self._said_at = time.monotonic()
                 last = face.say(TEXTS[n % len(TEXTS)])
                 n += 1
-                self.memory_mb.append(memory_mb())
             time.sleep(0.02)
         return last
 
@@ -119,8 +157,13 @@ def measure(session: Session, kind: str, asked: argparse.Namespace) -> None:
     """Print the figures of one target."""
     port, token = free_port(), Path(tempfile.mkdtemp(), "token")
     token.write_text(TOKEN)
-    plan = LivePlan(parse_targets([address(kind, port, token)]), Picture(size=str(asked.size)), fps=asked.fps)
+    protocol = "whip" if kind in BY_AIORTC else kind
+    plan = LivePlan(parse_targets([address(protocol, port, token)]), Picture(size=str(asked.size)), fps=asked.fps)
     targets, sayer = plan.make_targets(), Sayer(asked.seconds)
+    if kind in BY_AIORTC:
+        from tests.bench.aiortc_target import AiortcTarget
+
+        targets = (AiortcTarget(plan.addresses[0], plan.format, BY_AIORTC[kind]),)
     sent: list[tuple[float, int]] = []
     send = targets[0].send
 
@@ -131,9 +174,10 @@ def measure(session: Session, kind: str, asked: argparse.Namespace) -> None:
 
     targets[0].send = noted  # type: ignore[method-assign]
     broadcast = Broadcast(plan, targets, Listener(lambda state: None, print))
-    with started(kind, port) as server:
-        before, began = spent_s(), time.monotonic()
+    with started(protocol, port) as server:
+        before, began, memory = spent_s(), time.monotonic(), Memory(server.process.pid)
         broadcast.run(session, sayer.feed)
+        held = memory.end()
         seconds, used = time.monotonic() - began, spent_s() - before
         if kind in DATAGRAMS:
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ending:
@@ -141,8 +185,7 @@ def measure(session: Session, kind: str, asked: argparse.Namespace) -> None:
         time.sleep(1.0)
         received = [event for event in server.events() if event["event"] in {"received", "closed"}]
     first = ", ".join(f"{latency:.2f}" for latency in sayer.latencies)
-    print(f"{kind}: text to first speaking frame sent: {first} s; memory at each text: ", end="")
-    print(", ".join(f"{used:.0f}" for used in sayer.memory_mb), "MB")
+    print(f"{kind}: text to first speaking frame sent: {first} s; {held}")
     report((kind, used / seconds, broadcast.n_late), asked, sent, received[-1] if received else {})
 
 
@@ -181,8 +224,8 @@ def main() -> None:
     session = Session()
     session.clip("Warm up.")
     for kind in asked.targets:
-        if kind not in ALL:
-            sys.exit(f"there is no target {kind}; the targets are {', '.join(ALL)}")
+        if kind not in (*ALL, *BY_AIORTC):
+            sys.exit(f"there is no target {kind}; the targets are {', '.join([*ALL, *BY_AIORTC])}")
         measure(session, kind, asked)
 
 
