@@ -1,6 +1,7 @@
 """Written forms of spoken words: which part of a text (1 234 567, 3,50 €) each word is a part of."""
 
 import unicodedata
+from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import accumulate
@@ -47,9 +48,60 @@ def written_groups(words: Sequence[str], forms: Sequence[WrittenForm]) -> list[t
 
     Words whose written form is not known are as they are spoken.
     """
+    return _grouped(sources_of(words, forms) or list(enumerate(words)))
+
+
+def english_groups(words: Sequence[str], tokens: Sequence[WrittenForm], text: str) -> list[tuple[str, range]]:
+    """As `written_groups`, of the tokens of an English text; those of a range without a space are one (6-8pm)."""
+    found = english_sources(words, tokens)
+    if found is None:
+        return _grouped(list(enumerate(words)))
+    within = _words_around(tokens, text)
+    return _grouped([within[at] or (at, source) for at, source in found])
+
+
+def _words_around(tokens: Sequence[WrittenForm], text: str) -> list[tuple[int, str] | None]:
+    """Number and text of the word between spaces of which each token is a part; None if it is all of it.
+
+    Tokens that are spoken as they are written (well, known) are words of their own.
+    """
+    written = text.split()
+    ends = list(accumulate(len(_folded(word)) for word in written))
+    reached = [0, *accumulate(len(_folded(token.source)) for token in tokens)]
+    if not ends or reached[-1] != ends[-1]:
+        return [None] * len(tokens)
+    places = [bisect_right(ends, at) if at < ends[-1] else len(ends) - 1 for at in reached[:-1]]
+    members: dict[int, list[int]] = {}
+    for at, place in enumerate(places):
+        is_inside = reached[at + 1] <= ends[place] and (reached[at + 1] > reached[at] or reached[at] not in ends)
+        if is_inside:
+            members.setdefault(place, []).append(at)
+    joined: list[tuple[int, str] | None] = [None] * len(tokens)
+    for place, own in members.items():
+        if len(own) > 1 and any(_letters(tokens[at].source) != _letters(tokens[at].spoken) for at in own):
+            for at in own:
+                joined[at] = (own[0], written[place].strip(_MARKS))
+    return joined
+
+
+def english_sources(words: Sequence[str], tokens: Iterable[WrittenForm]) -> list[tuple[int, str]] | None:
+    """Number and text of the token of each spoken word; None if the tokens are not spoken in these words."""
+    pieces = [
+        (number, token.source.strip(" .,;:!?—…") or piece, piece)
+        for number, token in enumerate(tokens)
+        for piece in token.spoken.split()
+        if any(map(str.isalnum, piece))
+    ]
+    spoken = [_letters(piece).casefold() for *_, piece in pieces]
+    if spoken != [_letters(word).casefold() for word in words]:
+        return None
+    return [(number, source) for number, source, _ in pieces]
+
+
+def _grouped(sources: Sequence[tuple[int, str]]) -> list[tuple[str, range]]:
     found: list[tuple[str, range]] = []
     before = None
-    for at, (number, source) in enumerate(sources_of(words, forms) or enumerate(words)):
+    for at, (number, source) in enumerate(sources):
         if found and number == before:
             found[-1] = (found[-1][0], range(found[-1][1].start, at + 1))
         else:

@@ -13,7 +13,7 @@ from lexicon.marked_text import MarkedText
 from lexicon.normalize import split_tokens, spoken_forms
 from lexicon.pronounce import NOTHING, Pronunciation, Word, pronounce
 from lexicon.sentences import Phrase, split_sentences
-from lexicon.sources import sources_of
+from lexicon.sources import english_sources, sources_of
 
 
 def pronounce_marked(
@@ -46,16 +46,10 @@ def pronounce_phrase(phrase: Phrase, language: str, dictionary: Dictionary | Non
 
 def _with_sources(words: Sequence[Word], written: str, language: str) -> tuple[Word, ...]:
     """Words with the written forms ($5) of which they are parts, where these are known."""
-    if not language.startswith("en"):
-        found = sources_of([word.text for word in words], spoken_forms(written, language))
-        pairs = zip(words, found or (), strict=False)
-        return tuple(replace(word, source=source) for word, (_, source) in pairs) or tuple(words)
-    sources = [
-        token.source.strip(" .,;:!?—…") or piece
-        for token in split_tokens(written)
-        for piece in token.spoken.split()
-        if any(letter.isalnum() for letter in piece)
-    ]
-    if len(sources) != len(words):
-        return tuple(words)
-    return tuple(replace(word, source=source) for word, source in zip(words, sources, strict=True))
+    said = [word.text for word in words]
+    if language.startswith("en"):
+        found = english_sources(said, split_tokens(written))
+    else:
+        found = sources_of(said, spoken_forms(written, language))
+    pairs = zip(words, found or (), strict=False)
+    return tuple(replace(word, source=source) for word, (_, source) in pairs) or tuple(words)

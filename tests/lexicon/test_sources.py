@@ -4,8 +4,8 @@ import pytest
 
 from lexicon.locales.harmony import with_tail
 from lexicon.marked_text import MarkedText
-from lexicon.normalize import spoken_forms, written_pieces
-from lexicon.sources import sources_of, written_groups
+from lexicon.normalize import split_tokens, spoken_forms, written_pieces
+from lexicon.sources import english_groups, sources_of, written_groups
 from lexicon.spoken_words import pronounce_marked
 from lexicon.written_forms import WrittenForm
 
@@ -22,6 +22,28 @@ from lexicon.written_forms import WrittenForm
 )
 def test_pieces_are_those_of_the_text(language: str, text: str, pieces: str) -> None:
     assert "|".join(written + after for written, after in written_pieces(text, language)) == pieces
+
+
+@pytest.mark.parametrize(
+    ("text", "written"),
+    [
+        ('It costs "$3.50", 1,250 km away.', "It|costs|$3.50|1,250 km|away"),
+        ("Open 6-8pm (THE WHO), x^2 & 10-15 km!", "Open|6-8pm|THE|WHO|x^2|&|10-15 km"),
+        ("Dr. Lee's well-known 27\" TV — café №5.", "Dr|Lee's|well-known|27\"|TV|café|№5"),
+        ("No numbers, at all.", "No|numbers|at|all"),
+    ],
+)
+def test_english_words_are_those_of_the_text(text: str, written: str) -> None:
+    words = [word.text for word in pronounce_marked(MarkedText(text)).words]
+    groups = english_groups(words, list(split_tokens(text)), text)
+    assert "|".join(group for group, _ in groups) == written
+    assert [at for _, inside in groups for at in inside] == list(range(len(words)))
+
+
+def test_words_that_are_not_those_of_the_english_text_stay_as_they_are() -> None:
+    text = "Ich habe 5 km."
+    groups = english_groups(["Ich", "habe", "5 km"], list(split_tokens(text)), text)
+    assert [written for written, _ in groups] == ["Ich", "habe", "5 km"]
 
 
 def test_words_of_another_text_have_no_written_forms() -> None:

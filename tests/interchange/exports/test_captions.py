@@ -70,6 +70,19 @@ def test_numbers_have_the_time_of_the_words_that_say_them():
     assert [(token.start, token.end) for token in cue] == [(0, 0.4), (0.4, 0.8), (0.8, 2.0), (2.0, 2.4)]
 
 
+def test_words_are_captions_as_they_are_written(tmp_path):
+    said, text = ["it", "costs", "five", "dollars", "only", "now"], 'It costs "$5" only now!'
+    phones = PhoneSequence(["sil", *"abcdef", "sil"], [*(0.1 * at for at in range(8)), 1.0])
+    words = tuple(WordSpan(word, at, at + 1) for at, word in enumerate(said, start=1))
+    waveform = Waveform(np.zeros(RATE, np.float32), RATE)
+    clip = Clip(made_clip().motion, made_clip().head, Speech(waveform, phones, words))
+    tts2face.export([piece(text, clip)], tmp_path / "a.words.srt")
+    tts2face.export(clip, tmp_path / "b.words.srt")
+    shown = [(line.text, line.start, line.end) for line in read(tmp_path / "a.words.srt")]
+    assert shown == [("It", 100, 200), ("costs", 200, 300), ("$5", 300, 500), ("only", 500, 600), ("now", 600, 700)]
+    assert [line.text for line in read(tmp_path / "b.words.srt")] == said  # the text is not known
+
+
 def test_signs_that_are_not_spoken_lie_between_their_neighbours():
     (cue,) = sentence_cues(evenly(["a", "b"], pause=0.2), "– a – b –")
     assert [(token.text.strip(), round(token.start, 3), round(token.end, 3)) for token in cue] == [

@@ -69,6 +69,8 @@ def test_the_preview_is_the_clip_of_the_saved_project(studio: TestClient, number
     [
         ({"kind": "request", "options": {"audio": "/etc/passwd"}}, "has no file '/etc/passwd' for audio"),
         ({"kind": "request", "options": {"audio": "../../x/assets/recording.wav"}}, "has no file"),
+        ({"kind": "request", "options": {"text_marks": "marks.tsv"}}, "remove text_marks, or add the table again"),
+        ({"kind": "request", "options": {"dictionary": "/etc/passwd"}}, "for dictionary; remove dictionary, or give"),
         ({"kind": "request", "options": {"dictionary": "/etc/passwd"}}, "for dictionary"),
         ({"kind": "request", "options": {"timeline": "/etc/passwd"}}, "for timeline"),
         ({"kind": "request", "options": {"voice": "/tmp/x.onnx"}}, "there is no voice"),

@@ -5,6 +5,8 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from difflib import SequenceMatcher
 
+from lexicon.normalize import split_tokens
+from lexicon.sources import english_groups
 from tts2face.interchange.exports.labels import Label, part_words
 from tts2face.interchange.exports.parts import Part, Target
 
@@ -25,7 +27,7 @@ def sentence_cues(words: Sequence[Label], text: str) -> list[list[Label]]:
     Parameters
     ----------
     words
-        Spoken words.
+        Words as they are written or spoken.
     text
         Written text of the part; where its tokens are not the spoken words (``$3.50``), their times are taken from the
         words at the same share of the letters. If empty, the words are the text, and pauses end cues.
@@ -43,6 +45,20 @@ def sentence_cues(words: Sequence[Label], text: str) -> list[list[Label]]:
             cues.append([])
         cues[-1].append(token)
     return cues
+
+
+def written_words(words: Sequence[Label], text: str) -> list[Label]:
+    """Words as they are written ($3.50), each with the time of all its spoken words; those of a clip without a text.
+
+    Clips of other languages than English have written words already.
+    """
+    if not words or not text.strip():
+        return list(words)
+    groups = english_groups([word.text for word in words], list(split_tokens(text)), text)
+    return [
+        Label(written, words[at[0]].start, words[at[-1]].end, min(words[k].confidence for k in at))
+        for written, at in groups
+    ]
 
 
 def written_tokens(text: str) -> list[str]:
@@ -141,7 +157,7 @@ class _CaptionWriter:
 
     def add(self, part: Part) -> None:
         """Append the cues of a part."""
-        for tokens in self.cues(part_words(part), part.text):
+        for tokens in self.cues(written_words(part_words(part), part.text), part.text):
             self._n_cues += 1
             start, end = (_clock(time, self.decimal) for time in (tokens[0].start, tokens[-1].end))
             number = f"{self._n_cues}\n" if self.has_numbers else ""
@@ -188,7 +204,7 @@ class WordVttWriter(_CaptionWriter):
     """WebVTT by word."""
 
     def cues(self, words: Sequence[Label], text: str) -> list[list[Label]]:
-        """Each spoken word as a cue."""
+        """Each word as a cue."""
         return [[word] for word in words]
 
 
@@ -208,5 +224,5 @@ class WordSrtWriter(SentenceSrtWriter):
     """SubRip by word."""
 
     def cues(self, words: Sequence[Label], text: str) -> list[list[Label]]:
-        """Each spoken word as a cue."""
+        """Each word as a cue."""
         return [[word] for word in words]

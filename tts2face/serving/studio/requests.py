@@ -25,6 +25,7 @@ from tts2face.session.project import Project
 from tts2face.session.project_file import parse_project, project_json
 
 FILE_OPTIONS = ("audio", "dictionary", "text_marks", "timeline")  # of a request
+KEPT_FILES = {"audio": "import its recording", "text_marks": "add the table again"}  # with what to do without one
 TASKS = tuple(f"tts2face.serving.studio.{module}:TASKS" for module in ("tasks", "comparison_tasks", "style_tasks"))
 OPTION_PARTS = frozenset({"request", "models", "picture"})
 
@@ -153,10 +154,9 @@ async def events_of(messages: AsyncIterator[Message]) -> AsyncIterator[tuple[dic
 def _asset(option: str, name: str, folder: Path) -> str:
     found = folder / ASSETS / Path(name).name
     # a client names files of its project alone
-    if option != "audio" or not ASSET.fullmatch(Path(name).name) or not found.is_file():
-        raise InputError(
-            f"the project has no file {name[:40]!r} for {option}; remove {option}, or import its recording"
-        )
+    if option not in KEPT_FILES or not ASSET.fullmatch(Path(name).name) or not found.is_file():
+        advice = KEPT_FILES.get(option, "give it to `tts2face render`")
+        raise InputError(f"the project has no file {name[:40]!r} for {option}; remove {option}, or {advice}")
     return str(found)
 
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from functools import lru_cache
 
@@ -12,6 +13,7 @@ from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.library import Library, shipped_names
 from tts2face.serving.work.resource_check import FACE, PALETTE
 from tts2face.session import catalogue
+from tts2face.source_options import AUTO_STYLE
 from tts2face.storage.shipped import find_file
 
 # Of styles in their order: far apart in hue and lightness also for colour-blind people (Okabe and Ito 2008, extended).
@@ -71,6 +73,12 @@ async def appearance(library: Library, key: ApiKey, face: str) -> dict[str, dict
         "hair": own | (_haircuts(face) if takes_haircuts else {}),
         "hair_color": own | (_hair_colours() if takes_haircuts else {}),
     }
+
+
+def style_options(found: Iterable[Mapping[str, str]]) -> dict[str, str]:
+    """Styles of a whole clip by name, with what is said of them; the empty one is the palette's first."""
+    named = {style["name"]: f"{style['name']} - {style['summary']}" for style in found}
+    return {"": "the palette's first", AUTO_STYLE: "auto - by the words of each sentence", **named}
 
 
 async def styles(library: Library, key: ApiKey, palette: str | None) -> list[dict[str, str]]:

@@ -7,8 +7,9 @@ from nicegui import ui
 
 from tts2face.request import GESTURES, OWN_FACE, Recorded
 from tts2face.serving.studio.pages import character_dialog
-from tts2face.serving.studio.pages.choices import appearance, languages, models, voices
+from tts2face.serving.studio.pages.choices import appearance, languages, models, style_options, styles, voices
 from tts2face.serving.studio.pages.frame import heading
+from tts2face.serving.studio.pages.mark_table_dialog import MarkTableDialog
 from tts2face.serving.studio.pages.open_page import OpenPage
 from tts2face.serving.studio.pages.photo_dialog import TITLE, PhotoDialog, may_make_faces
 from tts2face.serving.work.resource_check import FACE, PALETTE, TALKER
@@ -39,6 +40,7 @@ class SpeechPanel:
         )
         self._controls["text"] = text
         self._select("request", "markup", "Marks in the text", {name: name for name in MARKUPS})
+        self._marks = MarkTableDialog(page)
         if not is_recording:
             self._select("request", "voice", "Voice", voices())
             self._slider("rate", "Rate", 0.5, 2.0, 0.05)
@@ -60,6 +62,7 @@ class SpeechPanel:
             self._select("models", name, label, offered[name])
         heading(2, "Gestures")
         self._select("models", PALETTE, PALETTE.capitalize(), found[PALETTE])
+        self._select("request", "style", "Style", await self._styles())
         self._select("request", "gestures", "Method", {name: name for name in GESTURES})
 
     def refresh(self) -> None:
@@ -80,12 +83,19 @@ class SpeechPanel:
         self._show(FACE)
 
     async def show_appearance(self) -> None:
-        """Offer the identities and the hair of the present face."""
+        """Offer the identities and the hair of the present face, and the styles of the palette."""
         page = self._page
         offered = await appearance(page.studio.state.library, page.workspace.key, page.workspace.project.models.face)
+        offered["style"] = await self._styles()
         for name, options in offered.items():
             value = self._value(name)
             self._controls[name].set_options({value: value, **options}, value=value)
+
+    async def _styles(self) -> dict[str, str]:
+        """Styles that a whole clip may have."""
+        page = self._page
+        palette = page.workspace.project.models.palette
+        return style_options(await styles(page.studio.state.library, page.workspace.key, palette))
 
     async def _models(self) -> dict[str, dict[str, str]]:
         """Shown names of talkers, faces and palettes, by kind and value."""
@@ -104,6 +114,7 @@ class SpeechPanel:
         """Allow or refuse changes."""
         for control in self._controls.values():
             control.set_enabled(is_enabled)
+        self._marks.set_enabled(is_enabled)
 
     def _select(self, part: str, name: str, label: str, options: dict[str, str], *, with_filter: bool = False) -> None:
         value = self._value(name)
