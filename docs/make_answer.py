@@ -28,7 +28,8 @@ TAGS = (
     "**Great**", "smiling emoji", "*nods*", "(thinking)", "*looks away*", "astonished emoji", "*laughs*", "*sighs*",
     "<smile>", "winking emoji",
 )  # fmt: skip
-N_FRAMES, COLUMNS, WORD_PIXELS = 24, 6, 26
+N_FRAMES, COLUMNS = 24, 6
+WORD_PIXELS = 26
 
 
 def answer_sheet(session: Session) -> Image.Image:

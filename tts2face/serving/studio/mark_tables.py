@@ -16,13 +16,7 @@ MAX_TABLE_BYTES = 1_000_000
 
 
 async def add_mark_table(studio: StudioHost, workspace: Workspace, path: Path) -> Path:
-    """Path of the checked table among the files of a project, named by its content.
-
-    Raises
-    ------
-    InputError
-        It is no table of marks, or has more than `MAX_TABLE_BYTES`.
-    """
+    """Path of the checked table among the files of a project, named by its content; an `InputError` if it is none."""
     if path.stat().st_size > MAX_TABLE_BYTES:
         raise InputError(f"the table has more than {MAX_TABLE_BYTES} bytes; remove rows")
     state = studio.state
