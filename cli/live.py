@@ -89,7 +89,13 @@ def live(  # noqa: PLR0913 - one parameter a flag
         check_photo(photo, {}, {})
         face = face_of_photo(photo, consent, quiet=quiet)
     models = Models(talker, face or "", identity, palette, hair, hair_color, person)
-    broadcast = Broadcast(plan, targets, Listener(lambda state: _show(state.sentence, quiet), _warn))
+    unspoken: list[Tts2faceError] = []
+
+    def warn(error: Tts2faceError) -> None:
+        unspoken.append(error)
+        write_message(f"tts2face: {error}")
+
+    broadcast = Broadcast(plan, targets, Listener(lambda state: _show(state.sentence, quiet), warn))
     with compilation_messages(quiet):
         session = open_session(models, draws=any(target.draws for target in targets))
     resume_collection()
@@ -100,6 +106,8 @@ def live(  # noqa: PLR0913 - one parameter a flag
         raise
     seconds = broadcast.n_frames / fps
     _show(f"sent {seconds:.1f} s, {broadcast.n_frames} frames, of which {broadcast.n_late} had no new picture", quiet)
+    if unspoken:
+        raise InputError("not all has been spoken; the messages above say why")
 
 
 def _feed(text: str | None, file: Path | None, microphone: str | None, *, stay: bool) -> "Feed | None":
@@ -126,7 +134,3 @@ def _feed(text: str | None, file: Path | None, microphone: str | None, *, stay: 
 def _show(sentence: str, quiet: bool) -> None:
     if not quiet:
         write_message(sentence)
-
-
-def _warn(error: Tts2faceError) -> None:
-    write_message(f"tts2face: {error}")

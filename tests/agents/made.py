@@ -70,7 +70,7 @@ class FakeStream:
         else:
             sound, rest = samples[:TICK], samples[TICK:]
             if len(sound) and sound.min() < BAD:
-                del self._spoken[0]
+                self._spoken[0] = number, np.zeros(0, np.float32), is_whole
                 raise InputError("this cannot be spoken")
             ends = is_whole and not len(rest)
             sound = np.pad(sound, (0, TICK - len(sound)))

@@ -78,7 +78,7 @@ def test_sound_that_cannot_be_spoken_ends_and_the_next_is_spoken() -> None:
         await stage.until(lambda: len(stage.ended) == 2)
 
     stage = perform(script)
-    assert stage.ended == [(0.0, False), (pytest.approx(0.1, abs=1 / FPS), False)]
+    assert stage.ended == [(pytest.approx(1 / FPS), False), (pytest.approx(0.1, abs=1 / FPS), False)]
 
 
 @pytest.mark.parametrize("depth", [3, 4])

@@ -27,7 +27,7 @@ N_FRAMES = 12  # of an utterance
 
 
 class MadeStream:
-    """Speaks each text in `N_FRAMES` frames; a text with ``?`` cannot be spoken."""
+    """Speaks each text in `N_FRAMES` frames; a text with ``?`` cannot be spoken, and has one."""
 
     channels = ("jawOpen",)
     late = 3
@@ -51,8 +51,7 @@ class MadeStream:
             self._n += 1
             if "?" in part:
                 self._errors.append(InputError(f"cannot speak {part!r}"))
-            else:
-                self._frames += [self._n] * N_FRAMES
+            self._frames += [self._n] * (1 if "?" in part else N_FRAMES)
             return self._n
 
     def end_text(self) -> None:
@@ -136,8 +135,7 @@ def test_nobody_is_waited_for_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
     assert session.stream.given == ["closed"]
 
 
-def test_a_text_that_cannot_be_spoken_is_said_and_the_rest_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(broadcast_module, "SILENT_S", 0.3)
+def test_a_text_that_cannot_be_spoken_is_said_and_the_rest_goes_on() -> None:
     broadcast, session, _, errors = made(MadeTarget("take"))
 
     def feed(speaker: Any, _: Callable[[], bool]) -> int:
@@ -221,4 +219,6 @@ def test_a_microphone_that_is_not_there_ends_the_broadcast() -> None:
 def test_names_of_targets_are_those_of_the_operator() -> None:
     plan = LivePlan((parse_target("rtmp://a/secret"),), Picture(), names=("stage",))
     assert plan.shown_names == ("stage",)
+    places = [parse_target(place) for place in ("rtmp://a/one", "vmc:a", "rtmp://a/two")]
+    assert LivePlan((*places,), Picture()).shown_names == ("rtmp:a:1935", "vmc:a:39539", "rtmp:a:1935 (2)")
     assert plan.format == FORMAT.__class__(plan.format.fps, 512, 512)

@@ -127,6 +127,16 @@ def test_standard_input_is_spoken_as_it_is_written(
     assert max(packets.jaws) > min(packets.jaws)
 
 
+def test_what_cannot_be_spoken_is_said_and_is_no_success(
+    tones: World, packets: Packets, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target = f"livelink:127.0.0.1:{packets.port}"
+    assert run(["live", "<speak>Papa <b", "--to", target, "--quiet", *tones.flags]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert said[0].startswith("tts2face: the SSML is not well-formed")
+    assert said[1] == "tts2face: not all has been spoken; the messages above say why"
+
+
 def test_ctrl_c_closes_the_targets(
     tones: World, packets: Packets, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

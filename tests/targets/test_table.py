@@ -29,10 +29,13 @@ REFUSED = [
     ("", "there is no target ''"),
     ("whip:ftp://a.example/x", "needs a URL of http or https"),
     ("whip:https:///x", "names no host"),
+    ("whip:a.example/secret", "'a.example' names no host"),
     ("rtmp://user:secret@a.example/x", "holds no password"),
     ("rtmp://a.example:99999/x", "is no address of a target"),
     ("vmc:a.example:1/x", "needs a host and a port alone"),
-    ("vmc:", "names no host"),
+    ("vmc:", "'' names no host"),
+    ("vmc:a.example:b", "'a.example:b' is no address of a target"),
+    ("vmc:a.example:0", "(port 0 is none)"),
     ("window:1", "takes no place"),
     ("vmc:a#vowel", "there is no option 'vowel' of vmc:HOST:39539; its options are vowels"),
     ("vmc:a#vowels=1", "must stand there once, as vowels, without a value"),
@@ -62,6 +65,7 @@ def test_wrong_addresses_are_refused_in_one_sentence(subtests: pytest.Subtests) 
 def test_the_same_place_twice_is_refused() -> None:
     with pytest.raises(InputError, match="rtmp:a:1935 is given twice"):
         parse_targets(["rtmp://a/b", "window", "rtmp://a/b#kbps=800"])
+    assert len(parse_targets(["rtmp://a/b#key=one.txt", "rtmp://a/b#key=two.txt"])) == 2
 
 
 def test_paths_and_options_are_never_shown() -> None:

@@ -19,7 +19,7 @@ from tts2face.targets.window import WindowTarget
 
 @pytest.fixture
 def window(monkeypatch: pytest.MonkeyPatch) -> WindowTarget:
-    monkeypatch.setattr(target_window, "require_display", lambda _: None)
+    monkeypatch.setattr(target_window, "require_display", lambda *_: None)
     made = make_target(parse_target("window"), FORMAT)
     assert isinstance(made, WindowTarget)
     return made
@@ -52,11 +52,11 @@ def test_a_window_takes_the_newest_motion_once(window: WindowTarget, monkeypatch
 
 
 def test_a_window_without_a_display_is_refused_before_anything_is_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(purpose: str) -> None:
-        raise BackendError(f"{purpose} opens a window, and this machine has no display")
+    def refuse(purpose: str, instead: str) -> None:
+        raise BackendError(f"{purpose} opens a window, and this machine has no display; {instead}")
 
     monkeypatch.setattr(target_window, "require_display", refuse)
-    with pytest.raises(BackendError, match="the target window opens a window, and this machine has no display"):
+    with pytest.raises(BackendError, match="this machine has no display; choose another target"):
         make_target(parse_target("window"), FORMAT)
 
 

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 LOG = logging.getLogger("tts2face.agents")
 FULL_SCALE = 32767
 SAMPLE_BYTES = 2
-QUIET_S = 2.0  # of silence behind what was pushed, after which it has failed: an error ends no utterance
 FORMATS = {3: "RGB", 4: "RGBA"}  # by the bytes of a pixel
 
 
@@ -34,7 +33,7 @@ class Tick:
     utterance
         Number that `AgentFace.push` returned; 0 in silence.
     ends
-        Whether it is the last tick of its utterance; in silence: all that was pushed has failed, and does not go on.
+        Whether it is the last tick of its utterance.
     epoch
         Number of interruptions before it.
     """
@@ -67,9 +66,8 @@ class AgentFace:
         self.width, self.height = parse_size(size)
         self.fps = fps
         self.stream = session.face_stream(size=size, fps=fps, **options)
-        self._epoch = self._n_quiet = 0
+        self._epoch = 0
         self._is_open = False  # whether more of the last utterance is to come
-        self._spoken = 0  # number of the last utterance; 0: all have ended
         self._picture: tuple[bytes | None, str] = (None, "RGB")
 
     def push(self, samples: bytes, rate: int, n_channels: int) -> int:
@@ -86,11 +84,14 @@ class AgentFace:
             )
         rows = np.frombuffer(samples, "<i2").reshape(-1, n_channels)
         number = self.stream.push_sound(rows.mean(axis=1, dtype=np.float32) / np.float32(FULL_SCALE + 1), rate)
-        return self._open(number)
+        self._is_open = True
+        return number
 
     def push_text(self, part: str) -> int:
         """Speak more of a text, as it is written, until `end`; returns the number of its utterance."""
-        return self._open(self.stream.push_text(part))
+        number = self.stream.push_text(part)
+        self._is_open = True
+        return number
 
     def end(self) -> None:
         """The sound, or the text, that was pushed is complete."""
@@ -99,15 +100,10 @@ class AgentFace:
             self.stream.end_sound()
             self.stream.end_text()
 
-    def _open(self, number: int) -> int:
-        self._spoken, self._is_open = number, True
-        self._n_quiet = 0
-        return number
-
     def interrupt(self) -> float:
         """Forget what is spoken and what waits; returns the seconds of it that were read."""
         self._epoch += 1
-        self._spoken, self._is_open = 0, False
+        self._is_open = False
         return self.stream.interrupt()
 
     def is_current(self, tick: Tick) -> bool:
@@ -143,12 +139,7 @@ class AgentFace:
                     f"the pictures have {width}x{height} pixels, not {self.width}x{self.height}; give this size"
                 )
             self._picture = frame.pixels.tobytes(), FORMATS[depth]
-        sound, ends = None, frame.ends
-        self._n_quiet = 0 if frame.utterance else self._n_quiet + 1
-        if ends and frame.utterance == self._spoken:
-            self._spoken = 0
-        if self._spoken and not self._is_open and self._n_quiet > QUIET_S * self.fps:
-            self._spoken, ends = 0, True
+        sound = None
         if frame.utterance:
             sound = np.rint(frame.sound.clip(-1.0, 1.0) * FULL_SCALE).astype("<i2").tobytes()
-        return Tick(*self._picture, sound, frame.utterance, ends, self._epoch)
+        return Tick(*self._picture, sound, frame.utterance, frame.ends, self._epoch)

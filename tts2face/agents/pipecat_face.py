@@ -130,7 +130,7 @@ class PipecatFace(FrameProcessor):
                 await self._finish(tick)
 
     async def _finish(self, tick: Tick) -> None:
-        for number in [number for number in self._contexts if number <= (tick.utterance or number)]:
+        for number in [number for number in self._contexts if number <= tick.utterance]:
             await self.push_frame(TTSStoppedFrame(context_id=self._contexts.pop(number)))
         if not self._contexts:
             self._is_silent.set()

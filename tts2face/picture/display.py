@@ -21,14 +21,14 @@ PROBE = "probe"  # name of the call
 PROBE_PROGRAM = Program(f"{__name__}:HANDLERS")
 
 
-def require_display(purpose: str) -> None:
+def require_display(purpose: str, instead: str = "write a file with --out clip.mp4") -> None:
     """Check that a window can be opened on this machine.
 
     Raises
     ------
     BackendError
         pyvista is not installed, there is no display, or VTK cannot open a window on it; the message begins with
-        `purpose`.
+        `purpose`, and ends with what to do instead.
     """
     from importlib.util import find_spec
 
@@ -37,13 +37,10 @@ def require_display(purpose: str) -> None:
     is_linux = sys.platform.startswith("linux")
     # VTK 9.7 ends the process where it finds no display (decision 223)
     if is_linux and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise BackendError(
-            f"{purpose} opens a window, and this machine has no display; write a file with --out clip.mp4"
-        )
+        raise BackendError(f"{purpose} opens a window, and this machine has no display; {instead}")
     if not can_open_window():
         raise BackendError(
-            "VTK cannot open a window on this display (it needs X11 or XWayland, and OpenGL 3.2); "
-            "write a file with --out clip.mp4"
+            f"VTK cannot open a window on this display (it needs X11 or XWayland, and OpenGL 3.2); {instead}"
         )
 
 

@@ -74,7 +74,8 @@ def split_place(place: str, example: str) -> SplitResult:
     """
     try:
         parts = urlsplit(place)
-        _ = parts.port
+        if parts.port == 0:
+            raise ValueError("port 0 is none")
     except ValueError as wrong:
         raise InputError(f"{_hidden(place)!r} is no address of a target ({wrong}); give one as {example}") from wrong
     if parts.username is not None or parts.password is not None:
@@ -109,5 +110,6 @@ def parse_options(text: str, known: Mapping[str, bool], shown: str) -> Mapping[s
 
 def _hidden(place: str) -> str:
     """The beginning of an address for messages: what follows the host may be a key."""
-    scheme, slashes, rest = place.partition("//")
-    return f"{scheme}{slashes}{rest.partition('/')[0].rpartition('@')[2]}"[:60]
+    scheme, slashes, rest = place.partition("//") if "//" in place else ("", "", place)
+    host = rest.partition("/")[0].rpartition("@")[2]
+    return f"{scheme}{slashes}{host}"[:60] if scheme else host[:60]

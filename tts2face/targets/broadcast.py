@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from tts2face.session.session import Session
 
 TAIL_S = 0.5  # of silence behind the last utterance
-SILENT_S = 5.0  # of silence after which nothing more is expected of an utterance that could not be spoken
 REACH_S = 60.0  # within which one of the targets must be reached, where the end of what is said is awaited
 
 
@@ -58,8 +57,11 @@ class LivePlan:
 
     @property
     def shown_names(self) -> tuple[str, ...]:
-        """Names of the targets in states."""
-        return self.names or tuple(address.shown for address in self.addresses)
+        """Names of the targets in states, each another one: several places of a server are numbered."""
+        shown = [address.shown for address in self.addresses]
+        numbers = (shown[: at + 1].count(name) for at, name in enumerate(shown))
+        numbered = (f"{name} ({n})" if n > 1 else name for name, n in zip(shown, numbers, strict=True))
+        return self.names or tuple(numbered)
 
     def make_targets(self) -> tuple[Target, ...]:
         """The targets, which connect later; errors as `make_target`."""
@@ -168,9 +170,8 @@ class Broadcast:
 
     def _is_over(self, silent_s: float) -> bool:
         """Whether all has been said, some silence ago."""
-        if self._last is None or self._plan.stays:
-            return False
-        return silent_s > (TAIL_S if self._n_ended >= self._last else SILENT_S)
+        has_said_all = self._last is not None and self._n_ended >= self._last
+        return has_said_all and not self._plan.stays and silent_s > TAIL_S
 
     def _feed(self, stream: "FaceStream", feed: Feed | None) -> None:
         """Give what is to be said as soon as a target shows it."""
@@ -190,7 +191,7 @@ class Broadcast:
         """
 
         def is_ready() -> bool:
-            has_tried = len(self._reached) == len(set(self._plan.shown_names))
+            has_tried = len(self._reached) == len(self._plan.shown_names)
             return self._has_ended.is_set() or (has_tried and any(self._reached.values()))
 
         with self._changed:

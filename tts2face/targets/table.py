@@ -134,10 +134,11 @@ def parse_target(text: str) -> Address:
 
 
 def parse_targets(texts: Sequence[str]) -> tuple[Address, ...]:
-    """Addresses of several targets, of which no two are the same place; raises as `parse_target`."""
+    """Addresses of several targets, of which no two are the same place and key; raises as `parse_target`."""
     found = tuple(map(parse_target, texts))
-    for address in found:
-        if sum((other.kind, other.url) == (address.kind, address.url) for other in found) > 1:
+    places = [(address.kind, address.url, address.options.get("key")) for address in found]
+    for address, place in zip(found, places, strict=True):
+        if places.count(place) > 1:
             raise InputError(f"the target {address.shown} is given twice; remove one of them")
     return found
 

@@ -22,7 +22,7 @@ class WindowTarget(Target):
 
     def __init__(self, address: Address, format: LiveFormat) -> None:
         super().__init__(address, format)
-        require_display("the target window")
+        require_display("the target window", "choose another target")
         self._newest: tuple[Float32Array, Float32Array] | None = None
         self._ended = asyncio.Event()
 

@@ -226,11 +226,42 @@ def test_errors_of_a_text_are_raised_by_the_next_read_and_the_stream_goes_on(ses
         (lambda stream: (stream.push_sound(np.zeros(4), 16_000), stream.push_sound(np.zeros(4), 8_000)), "16000 Hz"),
         (lambda stream: stream.gesture("somersault"), "there is no gesture 'somersault'"),
         (lambda stream: stream.listen(np.zeros(4)), "need their rate"),
+        (lambda stream: stream.gesture(5), "there is no gesture '5'"),
+        (lambda stream: stream.say(None), "text must be a text in quotes, not null"),
+        (lambda stream: stream.push_text(5), "part must be a text in quotes, not 5"),
+        (lambda stream: stream.style(None), "style must be a text in quotes, not null"),
     ],
 )
 def test_what_cannot_be_followed_is_refused_at_once(session: tts2face.Session, call: object, reason: str) -> None:
     with session.face_stream(draws=False) as stream, pytest.raises(InputError, match=reason):
         call(stream)
+
+
+def test_each_utterance_ends_also_one_that_cannot_be_spoken(session: tts2face.Session) -> None:
+    """Whoever waits for an end gets one, behind the error and in the order of what was said."""
+    lacks_map = np.zeros(800, np.float32)
+    reasons: list[str] = []
+    with session.face_stream(draws=False) as stream:
+        numbers = [
+            stream.say("One."),
+            stream.say("<speak>a<b"),
+            stream.say("   "),
+            stream.push_sound(lacks_map, 16_000),
+        ]
+        stream.end_sound()
+        numbers += [stream.push_text("<speak>a<b"), stream.say("Two.")]
+        stream.end_text()
+        ended: list[int] = []
+        while len(ended) < len(numbers):
+            try:
+                frame = stream.read(PATIENCE_S)
+            except InputError as refused:
+                reasons.append(str(refused))
+                continue
+            assert frame is not None
+            ended += [frame.utterance] * frame.ends
+    assert ended == numbers
+    assert sum("not well-formed" in reason for reason in reasons) == 2
 
 
 @pytest.mark.parametrize("ahead_s", [0.0, 2.5])

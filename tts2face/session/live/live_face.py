@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lexicon.errors import Tts2faceError
 from lexicon.growing_text import GrowingText
 from lexicon.marked_text import GestureMark
 from tts2face.gestures.listening import PartnerSound
@@ -105,11 +106,13 @@ class LiveFace:
         found.add(samples)
 
     def end(self, number: int) -> None:
-        """End a growing text or a sound."""
+        """End a growing text or a sound, also one of which nothing could be spoken."""
         found = self._find(number)
-        if isinstance(found, PushedSound):
+        if found is None:
+            self._utterances.append(_Text(number))
+        elif isinstance(found, PushedSound):
             found.end()
-        elif found is not None and found.growing is not None:
+        elif found.growing is not None:
             found.sentences += found.growing.flush()
             found.growing = None
 
@@ -163,7 +166,7 @@ class LiveFace:
     def speak(self) -> Iterator[Item]:
         """Make the next sentence, or the sound that is known; it ends early after `interrupt`.
 
-        An error leaves out the sentence, or the rest of the sound.
+        An error leaves out the sentence, or the rest of the sound; it is raised behind the end of its utterance.
         """
         self.is_listening = False
         first = self._utterances[0]
@@ -173,23 +176,31 @@ class LiveFace:
         text = first.sentences.popleft() if first.sentences else ""
         if first.is_done:
             self._utterances.popleft()
-        n_interruptions = self._n_interruptions
-        if text:
-            yield from self._speak_text(text, first.number)
+        n_interruptions, error = self._n_interruptions, None
+        try:
+            if text:
+                yield from self._speak_text(text, first.number)
+        except Tts2faceError as refused:
+            error = refused
         if first.is_done and self._n_interruptions == n_interruptions:
             yield End(first.number)
+        if error is not None:
+            raise error
 
     def _speak_sound(self, pushed: PushedSound) -> Iterator[Item]:
-        fps = self.speech.fps
+        fps, error = self.speech.fps, None
         try:
             if pushed.n_ready(fps):
                 yield pushed.make(self.speech)
-        finally:
-            is_done = pushed.is_ended and not pushed.n_ready(fps)
-            if is_done and self._utterances and self._utterances[0] is pushed:
-                self._utterances.popleft()
+        except Tts2faceError as refused:
+            error = refused
+        is_done = pushed.is_ended and (error is not None or not pushed.n_ready(fps))
+        if is_done and self._utterances and self._utterances[0] is pushed:
+            self._utterances.popleft()
         if is_done:
             yield End(pushed.number)
+        if error is not None:
+            raise error
 
     def _speak_text(self, text: str, number: int) -> Iterator[Item]:
         n_interruptions = self._n_interruptions

@@ -17,6 +17,8 @@ from lexicon.errors import InputError, Tts2faceError
 from lexicon.gesture_marks import parse_gesture
 from lexicon.gesture_names import GESTURES
 from lexicon.marked_text import GestureMark
+from lexicon.values.checks import Place as Argument
+from lexicon.values.checks import typed
 from tts2face.numeric.arrays import Float32Array
 from tts2face.picture.frame_renderer import FrameRenderer
 from tts2face.session.live import AHEAD_S
@@ -38,6 +40,7 @@ IDLE_AHEAD_S = 2.0  # of idle motion that is made before it is needed
 SHARED_WAIT_S = 0.02  # until it is seen whether another stream has made more of the idle motion
 FIRST_WAIT_S = 0.005  # after which an asynchronous reader asks for a first frame again
 THREAD = "live face"
+checked_text = typed(str)
 CLOSED = "the stream is closed; open another one"
 
 
@@ -102,6 +105,7 @@ class FaceStream:
 
     def say(self, text: str) -> int:
         """Speak a text, of one sentence or several, after everything before it; returns the number of the utterance."""
+        text = checked_text(text, Argument("text"))
         with self._lock:
             number = self._numbers.next()
             self._post(number, lambda: self._face.say(number, text))
@@ -109,6 +113,7 @@ class FaceStream:
 
     def push_text(self, part: str) -> int:
         """Speak more of a text as it is written, sentence by sentence; until `end_text` it is one utterance."""
+        part = checked_text(part, Argument("part"))
         with self._lock:
             number = self._numbers.open_text()
             self._post(number, lambda: self._face.add_text(number, part))
@@ -165,13 +170,14 @@ class FaceStream:
         `written` is as between the brackets of a mark of a text: ``nod``, ``wink left``, ``look left 20 2s``.
         """
         mark = parse_gesture(written, 0) if isinstance(written, str) else written
-        if mark is None:
+        if not isinstance(mark, GestureMark):
             raise InputError(f"there is no gesture {str(written)[:40]!r}; choose {', '.join(GESTURES)}")
         with self._lock:
             self._post(0, lambda: self._face.gesture(mark))
 
     def style(self, name: str) -> None:
         """From the next word or the next silence on, face and voice have another style, as of `LiveSpeech`."""
+        name = checked_text(name, Argument("style"))
 
         def change() -> None:
             self._face.change_style(name)
