@@ -46,11 +46,7 @@ _AT_END = re.compile(r"\s*$")
 CONTEXT_AFTER = 48  # characters after a full stop that decide whether a sentence begins there
 # 50-50, 80-20: shares of a whole
 _SPLITS = frozenset((str(part), str(100 - part)) for part in range(10, 95, 5) if part >= 50 or part % 10 == 0)
-_NAMED_FRACTIONS = {
-    "24/7": "twenty-four seven",
-    "9/11": "nine eleven",
-    "50/50": "fifty fifty",
-}
+_NAMED_FRACTIONS = {"24/7": "twenty-four seven", "9/11": "nine eleven", "50/50": "fifty fifty"}
 _SCORED = re.compile(
     r"\b(?:scor|rat(?:e|ing)|grade|quiz|test|exam|review|mark|points?|got|gave|give|solid|perfect)", re.I
 )

@@ -146,18 +146,18 @@ class LiveFace:
         self.idle = IdlePlayer(idle_motion(self.speech))
         return style
 
-    def interrupt(self) -> int:
-        """Forget all that waits, gestures among it; returns the number of utterances that had not begun."""
-        n_waiting = len(self._utterances)
-        self.forget()
-        self.speech.gestures.clear()
-        return n_waiting
+    def interrupt(self, number: int | None = None) -> int:
+        """Forget an utterance, or all that waits with its gestures; what `speak` makes of it ends.
 
-    def forget(self, number: int | None = None) -> None:
-        """Forget an utterance; None: all. What is made of it by `speak` ends."""
+        Returns the number of utterances that had not begun.
+        """
+        n_waiting = len(self._utterances)
         self._utterances = deque(found for found in self._utterances if number not in (None, found.number))
         self._n_interruptions += 1
         self.rest()
+        if number is None:
+            self.speech.gestures.clear()
+        return n_waiting
 
     def rest(self) -> None:
         """The sentence before has been heard: the next one begins without the pause behind it."""

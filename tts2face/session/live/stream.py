@@ -8,7 +8,6 @@ from collections import deque
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
-from types import TracebackType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,7 +88,7 @@ class FaceStream:
         self._face = LiveFace(speech, lips)
         self._lock = threading.Lock()
         self._changed = threading.Condition(self._lock)
-        self._inbox: deque[tuple[int, Callable[[], None]]] = deque()  # each with its utterance; 0: none
+        self._inbox: deque[tuple[int, Callable[[], object]]] = deque()  # each with its utterance; 0: none
         self._errors: deque[BaseException] = deque()
         self._failure: BaseException | None = None  # that ended a thread
         self._is_closed = False
@@ -178,12 +177,8 @@ class FaceStream:
     def style(self, name: str) -> None:
         """From the next word or the next silence on, face and voice have another style, as of `LiveSpeech`."""
         name = checked_text(name, Argument("style"))
-
-        def change() -> None:
-            self._face.change_style(name)
-
         with self._lock:
-            self._post(0, change)
+            self._post(0, lambda: self._face.change_style(name))
 
     def interrupt(self, utterance: int | None = None) -> float:
         """Forget an utterance, or all; returns the seconds of it (None: of the present one) that have been read.
@@ -193,15 +188,11 @@ class FaceStream:
         with self._lock:
             self._numbers.forget(utterance)
             self._inbox = deque(message for message in self._inbox if not self._numbers.is_forgotten(message[0]))
-            self._pushed = {one: kept for one, kept in self._pushed.items() if not self._numbers.is_forgotten(one)}
-            self._post(0, lambda: self._forget(utterance))
+            self._pushed = {
+                number: blocks for number, blocks in self._pushed.items() if not self._numbers.is_forgotten(number)
+            }
+            self._post(0, lambda: self._face.interrupt(utterance))
             return self._line.interrupt(utterance)
-
-    def _forget(self, utterance: int | None) -> None:
-        if utterance is None:
-            self._face.interrupt()
-        else:
-            self._face.forget(utterance)
 
     def _take_sound(self, number: int, rate: int) -> None:
         """Add all blocks that have come at once: the lips of many short ones take longer."""
@@ -210,7 +201,7 @@ class FaceStream:
         if blocks:
             self._face.add_sound(number, np.concatenate(blocks), rate)
 
-    def _post(self, number: int, follow: Callable[[], None]) -> None:
+    def _post(self, number: int, follow: Callable[[], object]) -> None:
         if self._is_closed:
             raise InputError(CLOSED)
         self._inbox.append((number, follow))
@@ -306,9 +297,7 @@ class FaceStream:
         """Return the stream itself."""
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close the stream."""
         self.close()
 
@@ -316,9 +305,7 @@ class FaceStream:
         """Return the stream itself."""
         return self
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    async def __aexit__(self, *_: object) -> None:
         """Close the stream in a thread."""
         await asyncio.to_thread(self.close)
 
