@@ -1,8 +1,11 @@
 """What becomes of targets: states, another try after a loss, and what waits for a slow one."""
 
 import asyncio
+import errno
 import itertools
+import os
 import socket
+import ssl
 import threading
 from collections.abc import Callable
 
@@ -151,6 +154,24 @@ def test_datagrams_to_nobody_cost_nothing_and_lose_nothing() -> None:
                 live.send(made_tick(number))
             received = [receiver.recv(4096) for _ in range(20)]
     assert len({len(data) for data in received}) == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [
+        (OSError(errno.ECONNREFUSED, "Connect call failed ('10.0.0.7', 9790)"), os.strerror(errno.ECONNREFUSED)),
+        (OSError("Multiple exceptions: Connect call failed ('10.0.0.7', 80)"), "it cannot be reached"),
+        (socket.gaierror(-2, "Name or service not known"), "name or service not known"),
+        (ssl.SSLCertVerificationError(1, "certificate is not valid for '10.0.0.7'"), "the encryption fails"),
+        (TimeoutError("timed out during opening handshake"), "it does not answer"),
+        (TargetLostError("it is full"), "it is full"),
+    ],
+)
+def test_reasons_hold_no_address(error: Exception, reason: str) -> None:
+    """A client of the service reads them, too."""
+    found = live_targets.reason_of(error)
+    assert found.lower().startswith(reason.lower())
+    assert "10.0.0.7" not in found
 
 
 def test_an_unknown_host_is_a_loss_with_its_reason() -> None:

@@ -2,6 +2,9 @@
 
 import asyncio
 import contextlib
+import os
+import socket
+import ssl
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -95,7 +98,7 @@ class LiveTargets:
                 await target.connect(note)
                 reason = "it has closed the connection"
             except (OSError, TimeoutError, Tts2faceError) as error:
-                reason = _reason(error)
+                reason = reason_of(error)
             if self._ends.is_set():
                 return
             if connected_at and time.monotonic() - connected_at[0] > HELD_S:
@@ -106,10 +109,15 @@ class LiveTargets:
             wait_s = min(2 * wait_s, LONGEST_WAIT_S)
 
 
-def _reason(error: Exception) -> str:
-    """Why a target is lost, in one line and without its address."""
-    if isinstance(error, TimeoutError) and not str(error):
+def reason_of(error: Exception) -> str:
+    """Why a target is lost, in one line and without its address, which clients of a service read, too."""
+    if isinstance(error, TimeoutError) and error.errno is None:
         return "it does not answer"
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror[:1].lower() + error.strerror[1:]
+    if isinstance(error, ssl.SSLError):
+        kind = getattr(error, "reason", None) or "of an unknown kind"  # CERTIFICATE_VERIFY_FAILED
+        return f"the encryption fails: {kind.lower().replace('_', ' ')}"
+    if isinstance(error, OSError):  # asyncio adds the address to the text of the system, and joins those of several
+        number = None if isinstance(error, socket.gaierror) else error.errno
+        said = os.strerror(number) if number else error.strerror or "it cannot be reached"
+        return said[:1].lower() + said[1:]
     return " ".join(str(error).split())

@@ -6,6 +6,7 @@ from dataclasses import replace
 from fractions import Fraction
 from types import MappingProxyType
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 
@@ -94,7 +95,9 @@ def _reason(error: Exception, url: str) -> str:
     said = getattr(error, "strerror", None) or str(error)
     log = getattr(error, "log", None)  # level, part of the library, message
     said += f": {log[2]}" if log else ""
-    return " ".join(said.split()).replace(url, "the server")[:MAX_REASON_CHARACTERS]
+    for address in (url, str(urlsplit(url).hostname)):
+        said = said.replace(address, "the server")
+    return " ".join(said.split())[:MAX_REASON_CHARACTERS]
 
 
 HANDLERS: Mapping[str, Handler] = MappingProxyType({SEND: send})
