@@ -128,7 +128,7 @@ def _feed(text: str | None, file: Path | None, microphone: str | None, *, stay: 
     is_typed = text is None and sys.stdin.isatty()
     if is_typed and not stay:
         raise InputError("there is nothing to say; add a text, --file, --microphone, or --stay for a silent face")
-    return None if is_typed else growing_feed(sys.stdin.fileno())
+    return None if is_typed else growing_feed(sys.stdin.fileno(), may_be_empty=stay)
 
 
 def _show(sentence: str, quiet: bool) -> None:

@@ -37,6 +37,13 @@ def picture(path: Path, body: str) -> Path:
     return path
 
 
+@pytest.mark.parametrize("format", ["bmp", "tiff"])
+def test_pictures_without_a_place_for_marks_have_the_name_of_their_format(format: str, tmp_path: Path) -> None:
+    path = tmp_path / f"a.{format}"
+    Image.new("RGB", (16, 16)).save(path)
+    assert (inspect_file(path).format, inspect_file(path).source) == (format, "")
+
+
 @pytest.mark.parametrize("name", ["a.png", "a.jpg", "a.webp"])
 def test_pictures_of_other_programs_are_read(name: str, tmp_path: Path) -> None:
     written = f"<i:DigitalSourceType>{CAMERA}</i:DigitalSourceType><xmp:CreatorTool>Camera 3</xmp:CreatorTool>"

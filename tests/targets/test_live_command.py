@@ -127,6 +127,15 @@ def test_standard_input_is_spoken_as_it_is_written(
     assert max(packets.jaws) > min(packets.jaws)
 
 
+def test_an_input_without_a_text_is_no_success(
+    tones: World, packets: Packets, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with open(os.devnull) as stdin:
+        monkeypatch.setattr("sys.stdin", stdin)
+        assert run(["live", "--to", f"livelink:127.0.0.1:{packets.port}", "--quiet", *tones.flags]) == 2
+    assert "standard input ended without a text; write one, or add --stay" in capsys.readouterr().err
+
+
 def test_what_cannot_be_spoken_is_said_and_is_no_success(
     tones: World, packets: Packets, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -155,7 +155,7 @@ def _tags(path: Path) -> tuple[str, dict[str, str]]:
     with open_container(path) as container:
         tags = [container.metadata, *(stream.metadata for stream in container.streams)]
         known = container.format.name.split(",")
-        format = "webm" if path.suffix.lower() in WEBM_SUFFIXES and "webm" in known else known[0]
+        format = "webm" if path.suffix.lower() in WEBM_SUFFIXES and "webm" in known else known[0].removesuffix("_pipe")
         said: dict[str, str] = {}
         for name, value in (pair for found in tags for pair in found.items()):
             if len(value) <= MOST_BYTES:

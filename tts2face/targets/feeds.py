@@ -56,15 +56,22 @@ def with_notice(words: str, then: Feed | None) -> Feed:
     return feed
 
 
-def growing_feed(descriptor: int) -> Feed:
-    """Says the text of a file descriptor as it is written, each sentence when it is complete."""
+def growing_feed(descriptor: int, *, may_be_empty: bool = False) -> Feed:
+    """Says the text of a file descriptor as it is written, each sentence when it is complete.
+
+    One that ends without a text is an `InputError`, unless it may be empty.
+    """
 
     def feed(speaker: Speaker, has_ended: Callable[[], bool]) -> int:
         decoder, number = codecs.getincrementaldecoder("utf-8")(errors="replace"), 0
+        has_text = may_be_empty
         while not has_ended() and (content := os.read(descriptor, READ_BYTES)):
             if part := decoder.decode(content):
                 number = speaker.push_text(part)
+                has_text = has_text or not part.isspace()
         speaker.end_text()
+        if not has_text and not has_ended():
+            raise InputError("standard input ended without a text; write one, or add --stay for a silent face")
         return number
 
     return feed

@@ -148,7 +148,7 @@ def decode_frames(container: "InputContainer", stream: Any, path: Path, start: f
         yield frame
         n_frames += 1
     if n_frames == 0:
-        raise DataError(f"{path} holds a {stream.type} track without a frame; copy or record it again")
+        raise DataError(f"{path} holds no frame of its {stream.type} track; copy or record it again")
     stated = (container.duration or 0) / 1e6
     is_short = max(end, end - start) < stated - MAX_SHORTFALL_S
     if is_short and _states_duration(container) and not _is_whole_riff(path):
