@@ -6,6 +6,7 @@ import os
 import socket
 import struct
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -159,32 +160,51 @@ def test_ctrl_c_closes_the_targets(
     assert said.endswith("tts2face: interrupted; the connections to the targets have been closed\n")
 
 
-def test_the_process_of_the_service_follows_a_client(tones: World, packets: Packets) -> None:
+def presented(tones: World, packets: Packets, said: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], float]:
+    """Events of the service's process, and the seconds that it spoke."""
     models = dict(zip(("talker", "face", "palette"), tones.models[1::2], strict=True))
     request = {"voice": "tones", "fps": 30}
     content = {
         "models": models, "request": request, "targets": {"puppet": f"livelink:127.0.0.1:{packets.port}"}, "rate": None,
     }  # fmt: skip
-    said = [
-        {"type": "style", "style": "no-such-style"},
-        {"type": "listen", "rate": None},
-        {"type": "say", "text": "Papa, mama."},
-        {"type": "say", "text": "Bob."},
-        {"type": "end"},
-    ]
     out = io.BytesIO()
     call = Call(Message(PRESENT, content), out, threading.Condition())
-    for given in said:
+    for given in [*said, {"type": "end"}]:
         call.control(Message(MORE, given))
     answer(call, HANDLERS)
     out.seek(0)
     messages = list(iter(lambda: read_message(out), None))
     events = [message.content["event"] for message in messages if message.kind == EVENT]
+    return events, messages[-1].content["seconds"]
+
+
+def test_the_process_of_the_service_ends_behind_what_is_cancelled(tones: World, packets: Packets) -> None:
+    cancel = {"type": "cancel", "arrived": time.monotonic()}
+    events, _ = presented(tones, packets, [{"type": "say", "text": "Papa, mama."}, cancel])
+    assert [event["n"] for event in events if event["type"] == "said"] == [1]
+    assert events[-1] == {"type": "target", "name": "puppet", "state": "closed"}
+
+
+def test_the_process_of_the_service_tells_the_end_of_each_text(tones: World, packets: Packets) -> None:
+    """One that cannot be spoken ends in its turn, not when its error is told."""
+    texts = ("Papa, mama.", "<speak>Papa <b")
+    events, _ = presented(tones, packets, [{"type": "say", "text": text} for text in texts])
+    assert [event["type"] for event in events if event["type"] in {"said", "error"}] == ["error", "said", "said"]
+
+
+def test_the_process_of_the_service_follows_a_client(tones: World, packets: Packets) -> None:
+    said: list[dict[str, Any]] = [
+        {"type": "style", "style": "no-such-style"},
+        {"type": "listen", "rate": None},
+        {"type": "say", "text": "Papa, mama."},
+        {"type": "say", "text": "Bob."},
+    ]
+    events, seconds = presented(tones, packets, said)
     states = [event["state"] for event in events if event["type"] == "target"]
     assert states == ["connecting", "connected", "closed"]
     assert sum(event["n"] for event in events if event["type"] == "said") == 2
     assert ["no-such-style" in event["message"] for event in events if event["type"] == "error"] == [True]
-    assert messages[-1].content["seconds"] > 0.8
+    assert seconds > 0.8
     assert json.dumps(events)
 
 

@@ -55,8 +55,8 @@ class LiveKitAvatar(VideoGenerator):
         where the next one reaches it later (livekit-agents 1.8).
         """
         if isinstance(frame, rtc.AudioFrame):
-            self._is_open = True
             self.face.push(bytes(frame.data), frame.sample_rate, frame.num_channels)
+            self._is_open = True
         elif self._is_open:
             self._is_open = False
             self._has_ended.clear()

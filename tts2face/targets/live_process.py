@@ -48,7 +48,8 @@ class _Stream:
         last = 0
         try:
             while (given := self._call.more()).content["type"] != "end":
-                last = self._follow(face, given) or last
+                is_forgotten = given.content["type"] == "cancel"  # what was said before ends no more
+                last = self._follow(face, given) or (0 if is_forgotten else last)
         except StoppedError:
             self.is_stopped = True
             self.broadcast.end()
@@ -89,10 +90,6 @@ class _Stream:
 
     def _show_error(self, error: Tts2faceError) -> None:
         self._event({"type": "error", "message": " ".join(str(error).split())})
-        with self._lock:
-            number = self._open[0] if self._open else 0
-        if number:
-            self._say(number)
 
     def _note_end(self, utterance: int) -> None:
         self._say(utterance)
