@@ -138,10 +138,8 @@ class FaceStream:
         if not low <= rate <= high:
             raise InputError(f"the sample rate must lie between {low} and {high} Hz, not {rate}; convert the sound")
         with self._lock:
-            if self._numbers.open_rate not in (0, rate):
-                raise InputError(
-                    f"the sound began with {self._numbers.open_rate} Hz, not {rate}; end it before another rate"
-                )
+            if (begun := self._numbers.open_rate) not in (0, rate):
+                raise InputError(f"the sound began with {begun} Hz, not {rate}; end it before another rate")
             number = self._numbers.open_sound(rate)
             waiting = self._pushed.setdefault(number, [])
             waiting.append(samples)
