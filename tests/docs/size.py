@@ -26,10 +26,10 @@ TOLERANCES = (0, 500, 500)  # by which they may differ, so that few commits have
 # mouths, eyes and hair as drawn (450), lids and mouths of photographs (250), hair, glasses and children of avatars
 # (500). Since then came the text of language models: numbers, dates, units and words in sixteen languages (2,000),
 # marks, Markdown, SSML and growing text (1,000), gestures that text names (300), hats, hair and lids of
-# photographs (300); then its formulas, lists, scripture and grammar of other languages (500), a live face on a clock with
-# lines, threads and plans of sound that arrives (1,250, of which the service's stream gave 80), targets of live faces
-# (1,100), agents (200), marks of synthesis in every format, signatures and what reads them (750), marks over HTTP, in
-# subtitles and in the studio (150).
+# photographs (300); then its formulas, lists, scripture and grammar of other languages (500), a live face on a clock
+# with lines, threads and plans of sound that arrives (1,250, of which the service's stream gave 80), targets of live
+# faces (1,100), agents (200), marks of synthesis in every format, signatures and what reads them (750), marks over
+# HTTP, in subtitles and in the studio (150).
 MOST_STATEMENTS = 76_700
 
 

@@ -38,7 +38,7 @@ def test_cues_are_read_and_widened_up_to_their_neighbours(name: str, content: by
     ("shown", "spoken"),
     [
         ("[door slams] Come in.", "Come in."),
-        ("(sighs) No.", "No."),
+        ("(door slams) No.", "No."),
         ("MRS. O'NEIL: Good evening.", "Good evening."),
         ("- Who is it?\n- Me.", "Who is it? Me."),
         ("♪ La la la ♪\nStop it.", "Stop it."),

@@ -25,6 +25,7 @@ from tests.interchange.characters.made import (
 )
 from tests.interchange.exports import programs
 from tests.packages import package
+from tests.walkers import unmarked
 from tts2face.face.deformation import build_rig
 from tts2face.interchange.characters.animation import write_character
 from tts2face.interchange.characters.bone_tracks import NECK_SHARE
@@ -255,7 +256,7 @@ def test_an_export_is_the_animated_character(tmp_path: Path) -> None:
     assert out.with_suffix(".wav").stat().st_size > 10_000
     session = Session(face=str(face))
     written = write_character(session.clip("Hello.", fps=10), session.mesh, tmp_path / "same.glb")
-    assert written.path.read_bytes() == out.read_bytes()
+    assert unmarked(written.path) == unmarked(out)  # a clip does not know its text
     before = character.read_bytes()
     assert run(["Hello.", "--face", str(face), "--out", str(character), "--fps", "10", "--quiet"]) == 2
     with pytest.raises(InputError, match="would replace the character"):

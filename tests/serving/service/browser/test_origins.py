@@ -55,7 +55,7 @@ EXPECTED = {
     "deleted": 204,
     "hello": "HeadTTS",
     "synthesize": ["Hello"],
-    "live": ["speech", "curves", "done"],
+    "live": ["mark", "speech", "curves", "done"],
     "headtts": ["audio"],
 }
 

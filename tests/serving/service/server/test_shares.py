@@ -127,6 +127,7 @@ def test_silent_streams_hold_no_places(running: RunningService, keys: tuple[Path
             )
             await silent.send(json.dumps({"type": "text", "text": "Yes."}))
             await silent.send(json.dumps({"type": "flush"}))
+            assert json.loads(await asyncio.wait_for(silent.recv(), 60))["type"] == "mark"
             spoken = json.loads(await asyncio.wait_for(silent.recv(), 60))
             async with httpx.AsyncClient(timeout=60, headers={"authorization": f"Bearer {modest}"}) as client:
                 curves = await client.post(f"{running.url}/v1/clips", json={"text": "Yes.", "format": "curves"})
@@ -145,6 +146,7 @@ def test_large_texts_of_live_streams_are_refused(running: RunningService, keys: 
         found: list[str] = []
         async with socket(running, "/v1/stream", greedy) as connection:
             await connection.send(json.dumps({"type": "start", "with_idle": False}))
+            assert json.loads(await connection.recv())["type"] == "mark"
             sending = asyncio.create_task(_send_many(connection, text))
             while len(found) < 5:
                 found.append(json.loads(await connection.recv())["message"])
