@@ -37,8 +37,9 @@ _URL = r"\([^()\s]{0,2000}(?:\([^()\s]{0,200}\)[^()\s]{0,200})?(?:\s+\"[^\"\n]{0
 _ATTRIBUTES = r"(?P<attributes>(?:\s[^<>]{0,400})?)"
 _KINDS: Mapping[str, str] = MappingProxyType({
     "formula": r"(?<![\w$\\])\$(?=[^\s$])(?P<inline>[^$\n]{1,300})(?<=\S)\$(?![0-9])|\$\$(?P<display>[^$]{1,500})\$\$"
-    r"|\\\((?P<parenthesized>(?:[^\\\n]++|\\(?!\))){1,80}+)\\\)|\\\[(?P<bracketed>(?:[^\\]++|\\(?!\])){1,80}+)\\\]"
-    rf"|\\begin\{{{ENVIRONMENTS}\}}(?P<environment>(?:[^\\]++|\\(?!end\{{)){{1,80}}+)\\end\{{{ENVIRONMENTS}\}}",
+    r"|\\\((?P<parenthesized>(?!\\\))[^\\\n]*(?:\\(?!\))[^\\\n]*){0,40})\\\)"
+    r"|\\\[(?P<bracketed>(?!\\\])[^\\]*(?:\\(?!\])[^\\]*){0,40})\\\]"
+    rf"|\\begin\{{{ENVIRONMENTS}\}}(?P<environment>(?!\\end)[^\\]*(?:\\(?!end\{{)[^\\]*){{0,40}})\\end\{{{ENVIRONMENTS}\}}",
     "token": r"<\|[\w ./:-]{1,40}\|>(?:(?<=start\|>)(?:assistant|user|system)\b)?|\[/?INST\]"
     r"|【[0-9:]{1,9}†[^【】\n]{0,80}】",
     "marked": r"(?<![=+\w])(?P<marker>==|\+\+)(?=[^\s=+][^=+\n]{0,200}(?<!\s)(?P=marker)(?![=+\w]))"

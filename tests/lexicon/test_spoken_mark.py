@@ -22,7 +22,10 @@ def test_marks_and_runs_move_with_their_words() -> None:
     assert marked.runs[0].styles == ()
 
 
-@pytest.mark.parametrize("code", sentences())
+@pytest.mark.parametrize(
+    "code",
+    [pytest.param(code, marks=[pytest.mark.needs("pyopenjtalk")] if code == "ja" else []) for code in sentences()],
+)
 def test_each_language_speaks_its_sentence(code: str) -> None:
     assert language_code(code).partition("-")[0] == code
     assert prepare(Request(text="1", language=code, spoken_mark="auto")).text.text.startswith(mark_words("auto", code))

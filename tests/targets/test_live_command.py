@@ -37,7 +37,7 @@ REFUSED = [
     (["Hi.", "--to", "vmc:a", "--size", "63"], "size"),
     (["Hi.", "--to", "vmc:a", "--consent", "me"], "--consent"),
     (["Hi.", "--to", "vmc:a", "--spoken-mark", " "], "--spoken-mark is empty"),
-    (["Hi.", "--to", "whip:https://a/b#token=none"], "the file none with the token of whip:a:443 cannot be read"),
+    (["Hi.", "--to", "rtmp://a/b#key=none"], "the file none with the key of rtmp:a:1935 cannot be read"),
 ]
 
 

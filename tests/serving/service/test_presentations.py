@@ -1,7 +1,8 @@
 """Live streams on targets of the operator: who may choose which, and that no address of a client is followed."""
 
 from collections.abc import AsyncIterator, Iterator, Mapping
-from contextlib import contextmanager
+from concurrent.futures import CancelledError
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +76,10 @@ def client(tmp_path: Path, keys: dict[str, str], monkeypatch: pytest.MonkeyPatch
 @contextmanager
 def opened(client: TestClient, key: str, *targets: str, **options: Any) -> Iterator[WebSocketTestSession]:
     headers = {"Authorization": f"Bearer {key}"}
-    with client.websocket_connect("ws://localhost/v1/stream", headers=headers) as socket:
+    with (
+        suppress(CancelledError),  # the client of tests cancels a server that has not ended when it leaves
+        client.websocket_connect("ws://localhost/v1/stream", headers=headers) as socket,
+    ):
         socket.send_json({"type": "start", "targets": targets, **options})
         yield socket
 
