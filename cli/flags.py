@@ -30,6 +30,8 @@ Out = Annotated[
         alias="-o",
     ),
 ]
+Talker = Annotated[str, Parameter(help="Talker whose articulation is used: a shipped talker or a .talker file.")]
+Palette = Annotated[str, Parameter(help="Palette of gesture styles: a shipped palette or a .palette file.")]
 Face = Annotated[
     str | None,
     Parameter(

@@ -6,7 +6,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from cli.flags import Face, Hair, HairColor, Person, add_option_flags, options_from_flags, switch
+from cli.flags import (
+    Face,
+    Hair,
+    HairColor,
+    Palette,
+    Person,
+    Talker,
+    add_option_flags,
+    options_from_flags,
+    switch,
+)
 from cli.photo import Consent, Photo, Yes, check_photo, face_of_photo, refuse_beside, refuse_without
 from cli.process import WhatRemains, write_message
 from cli.progress import compilation_messages
@@ -50,9 +60,7 @@ def live(  # noqa: PLR0913 - one parameter a flag
         str | None, Parameter(help="Microphone whose sound it speaks: default, or the name of a device.")
     ] = None,
     stay: Annotated[bool, switch("Go on when all has been said, until Ctrl-C.")] = False,
-    talker: Annotated[
-        str, Parameter(help="Talker whose articulation is used: a shipped talker or a .talker file.")
-    ] = "grid_s1",
+    talker: Talker = "grid_s1",
     face: Face = None,
     identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
     hair: Hair = None,
@@ -61,9 +69,7 @@ def live(  # noqa: PLR0913 - one parameter a flag
     photo: Photo = None,
     consent: Consent = None,
     yes: Yes = False,
-    palette: Annotated[
-        str, Parameter(help="Palette of gesture styles: a shipped palette or a .palette file.")
-    ] = "starter",
+    palette: Palette = "starter",
     quiet: Annotated[bool, switch("Print no states of targets and no summary.")] = False,
     **options: Any,
 ) -> None:

@@ -14,8 +14,10 @@ from cli.flags import (
     Hair,
     HairColor,
     Out,
+    Palette,
     Person,
     Sign,
+    Talker,
     TimeStamp,
     add_option_flags,
     check_options,
@@ -150,9 +152,7 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     text_option: Annotated[
         str | None, Parameter(help="The text as an option, for example the words of --audio.", name="--text")
     ] = None,
-    talker: Annotated[
-        str, Parameter(help="Talker whose articulation is used: a shipped talker or a .talker file.")
-    ] = "grid_s1",
+    talker: Talker = "grid_s1",
     face: Face = None,
     identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
     hair: Hair = None,
@@ -163,9 +163,7 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     fit: Fit = None,
     smile: Smile = None,
     yes: Yes = False,
-    palette: Annotated[
-        str, Parameter(help="Palette of gesture styles: a shipped palette or a .palette file.")
-    ] = "starter",
+    palette: Palette = "starter",
     explain: Annotated[
         Path | None, Parameter(help="Write the recorded phones used for each phone (.json or .txt).")
     ] = None,

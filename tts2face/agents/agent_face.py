@@ -5,17 +5,15 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from lexicon.errors import InputError, Tts2faceError
 from tts2face.picture.options import parse_size
+from tts2face.storage.wave_files import pcm_bytes, pcm_samples
 
 if TYPE_CHECKING:
     from tts2face.session.live.frames import Frame
     from tts2face.session.session import Session
 
 LOG = logging.getLogger("tts2face.agents")
-FULL_SCALE = 32767
 SAMPLE_BYTES = 2
 FORMATS = {3: "RGB", 4: "RGBA"}  # by the bytes of a pixel
 
@@ -82,8 +80,8 @@ class AgentFace:
             raise InputError(
                 f"a block of {len(samples)} bytes does not hold whole 16-bit samples of {n_channels} channels"
             )
-        rows = np.frombuffer(samples, "<i2").reshape(-1, n_channels)
-        number = self.stream.push_sound(rows.mean(axis=1, dtype=np.float32) / np.float32(FULL_SCALE + 1), rate)
+        rows = pcm_samples(samples).reshape(-1, n_channels)
+        number = self.stream.push_sound(rows.mean(axis=1), rate)
         self._is_open = True
         return number
 
@@ -141,5 +139,5 @@ class AgentFace:
             self._picture = frame.pixels.tobytes(), FORMATS[depth]
         sound = None
         if frame.utterance:
-            sound = np.rint(frame.sound.clip(-1.0, 1.0) * FULL_SCALE).astype("<i2").tobytes()
+            sound = pcm_bytes(frame.sound.clip(-1.0, 1.0))
         return Tick(*self._picture, sound, frame.utterance, frame.ends, self._epoch)

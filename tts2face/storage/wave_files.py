@@ -85,6 +85,12 @@ def pcm_bytes(samples: NDArray[np.floating]) -> bytes:
     return steps.tobytes()
 
 
+def pcm_samples(content: bytes) -> NDArray[np.float32]:
+    """Samples (n,) in [-1, 1] of 16-bit integers, as programs send them."""
+    samples: NDArray[np.float32] = np.frombuffer(content, "<i2").astype(np.float32) / np.float32(FULL_SCALE + 1)
+    return samples
+
+
 def wave_bytes(samples: NDArray[np.floating], rate: int, mark: Mark | None = None) -> bytes:
     """Content of a .wav file."""
     content = io.BytesIO()

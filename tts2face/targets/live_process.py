@@ -10,9 +10,6 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from lexicon.errors import Tts2faceError
 from lexicon.marked_text import GestureMark
 from tts2face.picture.options import Picture
@@ -20,13 +17,13 @@ from tts2face.processes.child import Call, Handler, StoppedError
 from tts2face.processes.message import Message
 from tts2face.processes.program import Program
 from tts2face.session.named_models import Models
+from tts2face.storage.wave_files import pcm_samples
 from tts2face.targets.broadcast import Broadcast, Listener, LivePlan
 from tts2face.targets.states import TargetState
 from tts2face.targets.table import parse_targets
 
 LIVE_PROGRAM = Program(f"{__name__}:HANDLERS", at_once=2)  # so that a caller who leaves ends the call, not the process
 PRESENT = "present"  # name of the call
-FULL_SCALE = np.float32(32_768)
 
 
 class _Stream:
@@ -66,7 +63,7 @@ class _Stream:
                     self._open.append(number)
                 return number
             case "audio":
-                spoken: int = face.push_sound(_samples(given), self._call.content["rate"])
+                spoken: int = face.push_sound(pcm_samples(given.payload), self._call.content["rate"])
                 return spoken
             case "gesture":
                 face.gesture(GestureMark(**content["gesture"]))
@@ -76,7 +73,7 @@ class _Stream:
                 self._rate = content["rate"]
                 face.listen()
             case "heard" if self._rate is not None:
-                face.listen(_samples(given), self._rate)
+                face.listen(pcm_samples(given.payload), self._rate)
             case "cancel":
                 face.interrupt()
                 self._say(0)
@@ -104,11 +101,6 @@ class _Stream:
 
     def _event(self, content: Mapping[str, Any]) -> None:
         self._call.event({"event": content, "seconds": round(self.broadcast.n_spoken / self.fps, 4)})
-
-
-def _samples(given: Message) -> NDArray[np.float32]:
-    samples: NDArray[np.float32] = np.frombuffer(given.payload, "<i2").astype(np.float32) / FULL_SCALE
-    return samples
 
 
 def present(call: Call) -> Mapping[str, Any]:

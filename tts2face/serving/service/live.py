@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from lexicon.errors import Tts2faceError
 from lexicon.marked_text import GestureMark
 from tts2face.processes.message import Message
@@ -17,6 +15,7 @@ from tts2face.serving.service.scheduler import InterruptedTaskError, check_words
 from tts2face.session.live.blocks import Block, Note
 from tts2face.session.live.joins import Joins
 from tts2face.session.live.live_face import LiveFace
+from tts2face.storage.wave_files import pcm_bytes, pcm_samples
 from tts2face.types import Chunk, Clip
 
 if TYPE_CHECKING:
@@ -176,7 +175,7 @@ class LiveTask:
     def _hear(self, given: Message) -> None:
         """Begin to listen, or hear a block of the partner's sound."""
         if given.content["type"] == "heard":
-            self._face.hear(np.frombuffer(given.payload, "<i2").astype(np.float32) / np.float32(32768))
+            self._face.hear(pcm_samples(given.payload))
             return
         self._face.listen(given.content["rate"])
         if self._began is None or self._clock() - self._began > self._seconds:
@@ -208,7 +207,7 @@ def listen(session: "Session", work: Work, inputs: Inputs) -> Iterator[Event | L
             continue
         given = inputs.popleft()
         is_ended = given.content["type"] == "end"
-        samples = np.frombuffer(given.payload, "<i2").astype(np.float32) / 32768
+        samples = pcm_samples(given.payload)
         motion = lips.finish() if is_ended else lips.add_samples(samples)
         if motion is not None:
             yield curves.of_motion(motion, n_frames / lips.fps)
@@ -228,6 +227,4 @@ def _speech_event(piece: "Piece", begin: float) -> Event:
 
 
 def _sound(clip: Clip) -> Chunk:
-    from tts2face.storage.wave_files import pcm_bytes
-
     return Chunk(pcm_bytes(clip.speech.waveform.samples), clip.speech.waveform.duration)
